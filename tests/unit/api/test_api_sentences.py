@@ -142,6 +142,18 @@ SENTENCES = [
      ("spec.simulators[0].start_deadline_seconds: is not a field; "
      "did you mean startDeadlineSeconds?")),
     ({"steps": 1}, "spec.steps: is not a field here; did you mean spec.trainer.steps?"),
+    # Words of other projects, with their places.
+    ({"trainer.n_timesteps": 1},
+     ("spec.trainer.n_timesteps: is not a field; write trainer.steps "
+     "(`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo)")),
+    ({"trainer.algorithm.total_timesteps": 1},
+     "spec.trainer.algorithm.total_timesteps: is not a field; write trainer.steps"),
+    ({"trainer.n_steps": 1},
+     ("spec.trainer.n_steps: is not a field; "
+     "write a hyperparameter as spec.trainer.algorithm.hyperparameters.n_steps")),
+    ({"trainer.algorithm.policy_kwargs": {}},
+     ("spec.trainer.algorithm.policy_kwargs: is not a field; "
+     "write a hyperparameter as spec.trainer.algorithm.hyperparameters.policy_kwargs")),
     ({"network": {"x": 1}}, "spec.network.x: is not a field; use egress"),
     ({"storage.x": 1},
      ("spec.storage.x: is not a field; use size, storageClassName, retain, ephemeral, "

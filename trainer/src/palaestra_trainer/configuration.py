@@ -295,9 +295,15 @@ def dump(configuration: Configuration) -> str:
     return yaml.safe_dump(content, sort_keys=False)  # ASCII: YAML takes some other characters for line ends
 
 
-def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:
-    """Return the remedy for an unknown name: the most similar known name, or all of them."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+def nearest(word: str, known: Mapping[str, object] | list[str], likeness: float = 0.6) -> str:
+    """Return the remedy for an unknown name: the most similar known name, or all of them.
+
+    Args:
+        word: the unknown name.
+        known: the known names.
+        likeness: how similar a name must be, 0 to 1.
+    """
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=likeness)
     return f"did you mean {close[0]}?" if close else f"use one of {', '.join(sorted(known))}"
 
 

@@ -14,6 +14,7 @@ from palaestra.zoo import expressions
 from palaestra.zoo.draft import MOST_COLLECTING, Draft
 from palaestra.zoo.expressions import NotPlain
 from palaestra.zoo.reading import CHOOSES_ALGORITHM
+from palaestra_protocol.elsewhere import ELSEWHERE
 
 _SCHEDULED = frozenset({"clip_range", "clip_range_vf", "delta_std", "learning_rate"})
 _OFF_POLICY = frozenset({"DQN", "SAC", "TD3", "DDPG", "QRDQN", "TQC", "CrossQ"})
@@ -32,18 +33,7 @@ _NORMALIZE = {
     "clip_obs": "clipObservations",
     "clip_reward": "clipRewards",
 }
-_LEFT_OUT: Mapping[str, str] = {
-    "_init_setup_model": "left out; a run sets its model up itself",
-    "action_noise": "left out; write noise_type and noise_std",
-    "device": "left out; a run takes the GPU that trainer.resources asks for",
-    "env": "left out; the job names its environment",
-    "max_episode_length": "left out; replay buffers of today need no length of episodes",
-    "monitor_kwargs": "left out; a run records return, length and is_success of every episode itself",
-    "rollout_buffer_class": "left out; a run has buffers of its own, without rows of broken simulators",
-    "rollout_buffer_kwargs": "left out; a run has buffers of its own, without rows of broken simulators",
-    "tensorboard_log": "left out; every run directory has a folder tensorboard",
-    "verbose": "left out; the log of a run has every figure",
-}
+_LENGTH = "max_episode_length"  # of her.yml
 # Callbacks whose work a run does itself, and the fields of the job for it.
 _CALLBACKS: Mapping[str, str] = {
     "CheckpointCallback": "a run saves checkpoints; set trainer.checkpoint.everySteps",
@@ -59,10 +49,12 @@ def put(draft: Draft, word: str, value: Any) -> None:
     """Put one word of an entry into its place, or note why it has none."""
     if word == CHOOSES_ALGORITHM:
         return
-    if word in _LEFT_OUT:
-        draft.note(word, _LEFT_OUT[word])
-    elif word in _PLACES:
+    if word in _PLACES:
         _PLACES[word](draft, value)
+    elif word == _LENGTH:
+        draft.note(word, "left out; replay buffers of today need no length of episodes")
+    elif word in ELSEWHERE:
+        draft.note(word, f"left out; {ELSEWHERE[word].removesuffix('; leave it out')}")
     elif word in _SCHEDULED and isinstance(value, str):
         draft.hyperparameters[word] = _schedule(draft, word, value)
     else:

@@ -56,7 +56,7 @@ def mistakes(
         if fact := _refused(value, known.get(name, Any)):
             yield f"{FIELD}.{name}: {fact}"
         elif name == "policy_kwargs" and value:
-            yield from _mistakes_of_policy(types(policy), value)
+            yield from _mistakes_of_policy(policy, value)
 
 
 def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -81,8 +81,13 @@ def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None)
     return aliases[named] if named else usual
 
 
-def _mistakes_of_policy(known: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[str]:
-    names = [name for name in known if name not in _GIVEN]
+def arguments_of(policy: type[BasePolicy]) -> list[str]:
+    """Return the arguments of a policy that a job may give."""
+    return [name for name in types(policy) if name not in _GIVEN]
+
+
+def _mistakes_of_policy(policy: type[BasePolicy], given: Mapping[str, Any]) -> Iterator[str]:
+    known, names = types(policy), arguments_of(policy)
     for name, value in given.items():
         field = f"{FIELD}.policy_kwargs.{name}"
         if name not in names:
@@ -95,8 +100,17 @@ def _mistakes_of_policy(known: Mapping[str, Any], given: Mapping[str, Any]) -> I
                     f"{field}: {value!r} is not known; {nearest(_bare(str(value)), dict(CLASSES[name]))}, "
                     "or write module:Class"
                 )
+        elif name == "net_arch" and _has_shared_layers(value):
+            yield (
+                f"{field}: {value!r} is a form of Stable-Baselines3 before 1.8, where layers were shared; "
+                "write {pi: [...], vf: [...]}, or a list of numbers for both"
+            )
         elif fact := _refused(value, known[name]):
             yield f"{field}: {fact}"
+
+
+def _has_shared_layers(layers: Any) -> bool:
+    return isinstance(layers, list) and any(isinstance(layer, dict) for layer in layers)
 
 
 def _mistakes_of_class(field: str, name: str) -> Iterator[str]:
