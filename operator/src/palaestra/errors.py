@@ -34,6 +34,7 @@
     │   ├── NotOfThisSweep           a job has the name of a sweep's trial (sweeps.there)
     │   ├── QueueDecides             Kueue alone suspends and resumes this job
     │   └── TookTooLong              a deadline passed
+    ├── NoSuccess                    a sweep compares success rates, and there are none (sweeps.carrying_out)
     ├── NotLeading                   this operator may have lost its lease (operator.writing)
     ├── Outdated                     the cluster has changed since the decision (operator.confirming)
     ├── TooLarge                     a file is larger than what it should be can be (reading)
