@@ -56,6 +56,18 @@ class OwnReplay(sb3.DQN):
         self.replay_buffer = ReplayBuffer(10, self.observation_space, self.action_space)
 
 
+def halving(left):
+    return 0.01 * 0.5 ** (4 * (1 - left))
+
+
+def rising(left):
+    return -left
+
+
+def failing(left):
+    raise RuntimeError("no rate today")
+
+
 class Doubled(FlattenExtractor):
     """Twice the observation."""
 
@@ -373,6 +385,49 @@ def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
     )
 
     assert shown.stdout == "0.002\n"
+
+
+def test_a_schedule_may_be_a_function_of_ones_own_which_the_model_names(lab, make, tmp_path):
+    """A change of the function must reach the next attempt, and no code travels in a file."""
+    wanted = Algorithm(
+        name="PPO",
+        hyperparameters=ROLLOUTS | {"learning_rate": "my_lab:halving", "clip_range": "my_lab:halving"},
+    )
+    check(wanted)
+
+    model = make(wanted)
+    model.save(tmp_path / "model.zip")
+
+    assert (model.lr_schedule(1.0), model.lr_schedule(0.5)) == pytest.approx((0.01, 0.0025))
+    assert model.clip_range(0.75) == pytest.approx(0.005)
+    program = f"""
+        import my_lab
+        my_lab.halving = lambda left: 0.5
+        from stable_baselines3 import PPO
+        print(PPO.load({str(tmp_path / "model.zip")!r}, device="cpu").clip_range(1.0))
+    """
+    shown = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], check=True, capture_output=True, text=True, cwd=lab
+    )
+    assert shown.stdout == "0.5\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "fact"),
+    [
+        ("my_lab:rising", "my_lab:rising(1.0) is -1.0; return a finite number of 0 or more"),
+        ("my_lab:failing", "my_lab:failing(1.0) cannot be used (RuntimeError: no rate today"),
+        ("my_lab:Doubled", "my_lab:Doubled(1.0) cannot be used ("),
+        ("my_lab:none", "my_lab:none cannot be imported (AttributeError"),
+    ],
+)
+def test_a_function_that_returns_no_rate_is_refused(lab, name, fact):
+    """The first update would fail, or learn backwards, after a simulator was started."""
+    del lab
+    with pytest.raises(ConfigurationError) as refusal:
+        check(Algorithm(name="DQN", hyperparameters={"learning_rate": name}))
+
+    assert str(refusal.value).startswith(f"algorithm.hyperparameters.learning_rate: {fact}")
 
 
 @pytest.mark.parametrize(
