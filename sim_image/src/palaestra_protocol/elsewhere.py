@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 _BUFFER = "a run has buffers of its own, which keep rows of broken simulators out of every loss; leave it out"
-_VECTOR = "a run makes the vector environment itself; wrap each environment in its entry point"
-_WRAPPER = "wrap the environment in its entry point; leave it out"
+_VECTOR = "a run makes the vector environment itself; write wrappers of one as trainer.environment.wrappers"
 _EVALUATION = "write trainer.evaluation"
 _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
@@ -28,10 +27,10 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "device": "the trainer takes the GPU that its resources ask for; leave it out",
         "env": "write trainer.environment",
         "env_kwargs": "write trainer.environment.options",
-        "env_wrapper": _WRAPPER,
+        "env_wrapper": "write trainer.environment.wrappers",
         "eval_episodes": f"{_EVALUATION}.episodes",
         "eval_freq": f"{_EVALUATION}.everySteps",
-        "frame_stack": "stack the frames in the environment's entry point; leave it out",
+        "frame_stack": "write trainer.environment.frameStack",
         "log_interval": "the log of a run has every figure; leave it out",
         "max_episode_steps": "write trainer.environment.options.max_episode_steps",
         "max_steps": "write trainer.steps, or trainer.environment.options for the steps of an episode",

@@ -169,11 +169,15 @@ def test_a_flat_file_is_one_entry():
 NOTED = [
     ("n_envs: 32", "n_envs: 32 became 31, because a pod has at most 32 simulators"),
     ("n_envs: many", "n_envs: left out; 'many' is not a number; write one"),
-    ("frame_stack: 4", "frame_stack: 4 is left out; stack the frames"),
-    ("env_wrapper: a.Own", "env_wrapper: a.Own is left out; wrap the environment in its entry point"),
-    ("env_wrapper: [{a.Own: {k: 1}}]", "env_wrapper: a.Own with {'k': 1} is left out"),
+    ("frame_stack: four", "frame_stack: left out; 'four' is not a number"),
+    (
+        "env_wrapper: a.Own",
+        "env_wrapper: a run counts returns outside of the wrappers, and Zoo inside of them",
+    ),
+    ("env_wrapper: rl_zoo3.wrappers.FrameSkip", "rl_zoo3.wrappers.FrameSkip needs the package rl_zoo3"),
     ("env_wrapper: [{a.Own: 1, b: 2}]", "is left out; it is not one class; check the indentation"),
     ("vec_env_wrapper: a.Own", "vec_env_wrapper: a.Own is left out; a run makes the vector environment"),
+    ("vec_env_wrapper: [{b.VecFrameStack: {n_stack: 2, channels_order: first}}]", "is left out; a run makes"),
     ("callback: stable_baselines3.common.callbacks.EvalCallback", "set trainer.evaluation"),
     ("callback: rl_zoo3.callbacks.ParallelTrainCallback", "it needs Zoo's own training"),
     ("monitor_kwargs: \"dict(info_keywords=('is_success',))\"", "monitor_kwargs: left out; a run records"),
@@ -236,6 +240,26 @@ def test_hindsight_is_written_as_in_a_job(converted):
     assert now.algorithm.hyperparameters == before.algorithm.hyperparameters == buffer
     assert before.algorithm.name == "TQC"
     assert notes == []
+
+
+@pytest.mark.parametrize("word", ["frame_stack: 4", "vec_env_wrapper: [{sb3.VecFrameStack: {n_stack: 4}}]"])
+def test_wrappers_and_stacked_frames_are_fields_of_the_environment(converted, word):
+    """Both words of Zoo stack in the same layout as a job."""
+    trainer, notes = converted("env_wrapper: [a.b.Own: {k: 1}, a.Other]", word)
+
+    own, other = trainer.environment.wrappers
+    assert (own.name, own.options, other.name) == ("a.b:Own", {"k": 1}, "a:Other")
+    assert trainer.environment.frame_stack == 4
+    assert len(notes) == 1
+
+
+def test_frames_of_normalized_observations_have_a_note(converted):
+    """Zoo stacks after it has normalized; rewards are the same either way."""
+    _, notes = converted("frame_stack: 4", "normalize: true")
+    _, of_rewards = converted("frame_stack: 4", "normalize: {norm_obs: false}")
+
+    assert notes == ["frame_stack: a run normalizes the stacked observation; Zoo stacks normalized ones"]
+    assert of_rewards == []
 
 
 def test_own_callbacks_and_policies_are_classes_of_the_job(converted):

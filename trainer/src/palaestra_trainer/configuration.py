@@ -56,6 +56,18 @@ class _Section(BaseModel):
     )
 
 
+class Wrapper(_Section):
+    """A wrapper around the environment, see `environments.wrapping`.
+
+    Attributes:
+        name: its class, as `module:Class`.
+        options: keyword arguments of the class.
+    """
+
+    name: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
 class Environment(_Section):
     """The gymnasium environment to train in.
 
@@ -63,11 +75,15 @@ class Environment(_Section):
         id: name under which the environment is registered with gymnasium.
         reward: Dense gives a reward at each step, Sparse only at the end of an episode.
         options: keyword arguments of the environment.
+        wrappers: the first one is innermost; None: none.
+        frame_stack: how many of the newest observations are one; None: only the newest.
     """
 
     id: str
     reward: Reward = DEFAULT_REWARD
     options: dict[str, Any] = Field(default_factory=dict)
+    wrappers: tuple[Wrapper, ...] | None = None
+    frame_stack: Annotated[int, Field(ge=2)] | None = None
 
 
 class Normalize(_Section):

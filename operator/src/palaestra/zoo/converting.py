@@ -10,7 +10,7 @@ from palaestra.api.trainer import OWN_TASKS
 from palaestra.api.yaml_text import write
 from palaestra.zoo.draft import Draft
 from palaestra.zoo.reading import ZooError, algorithm_of, entry_of, read_file
-from palaestra.zoo.words import put
+from palaestra.zoo.words import note_together, put
 
 _LONGEST_NAME = 48
 _OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has hyperparameters of its own for it
@@ -50,6 +50,7 @@ def convert(text: str, name: str, *, env: str | None = None, algorithm: str | No
         draft.note("--env", f"{name} does not name {environment}; as in Zoo, it gets the entry {chosen}")
     for word, value in entry.items():
         put(draft, word, value)
+    note_together(draft)
     if draft.steps is None:
         raise ZooError(f"{name}: the entry {chosen} has no n_timesteps; add it")
     _note_the_environment(draft)

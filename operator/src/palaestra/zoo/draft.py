@@ -19,6 +19,8 @@ class Draft:
         algorithm: fields of `trainer.algorithm`, without its hyperparameters.
         hyperparameters: the keyword arguments of the algorithm's class.
         options: the keyword arguments of the environment.
+        wrappers: the wrappers of the environment.
+        frame_stack: how many observations are one.
         collecting: how many simulators collect.
         steps: length of training.
         seed: seed of the job; None: the job's default.
@@ -30,6 +32,8 @@ class Draft:
     algorithm: dict[str, Any]
     hyperparameters: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=dict)
+    wrappers: list[dict[str, Any]] = field(default_factory=list)
+    frame_stack: int | None = None
     collecting: int = 1
     steps: int | None = None
     seed: int | None = None
@@ -52,6 +56,10 @@ class Draft:
         environment: dict[str, Any] = {"id": self.environment}
         if self.options:
             environment["options"] = self.options
+        if self.wrappers:
+            environment["wrappers"] = self.wrappers
+        if self.frame_stack is not None:
+            environment["frameStack"] = self.frame_stack
         trainer = {"environment": environment, "algorithm": algorithm}
         steps = {} if self.steps is None else {"steps": self.steps}
         seed = {} if self.seed is None else {"seed": self.seed}

@@ -45,6 +45,13 @@ _CALLBACKS: Mapping[str, str] = {
 }
 
 
+def note_together(draft: Draft) -> None:
+    """Note what only words together change, once all words are in their places."""
+    normalized = draft.algorithm.get("normalize", {}).get("observations", False)
+    if draft.frame_stack is not None and normalized:
+        draft.note("frame_stack", "a run normalizes the stacked observation; Zoo stacks normalized ones")
+
+
 def put(draft: Draft, word: str, value: Any) -> None:
     """Put one word of an entry into its place, or note why it has none."""
     if word == CHOOSES_ALGORITHM:
@@ -207,23 +214,27 @@ def _callbacks(draft: Draft, value: Any) -> None:
 
 def _wrappers(draft: Draft, value: Any) -> None:
     for name, options in _classes(draft, "env_wrapper", value):
-        arguments = f" with {options}" if options else ""
-        draft.note("env_wrapper", f"{name}{arguments} is left out; wrap the environment in its entry point")
+        draft.wrappers.append({"name": _as_class(name), **({"options": options} if options else {})})
+        if name.startswith("rl_zoo3."):
+            draft.note("env_wrapper", f"{name} needs the package rl_zoo3; install it in the trainer's image")
+    if draft.wrappers:
+        draft.note("env_wrapper", "a run counts returns outside of the wrappers, and Zoo inside of them")
 
 
 def _vector_wrappers(draft: Draft, value: Any) -> None:
     for name, options in _classes(draft, "vec_env_wrapper", value):
+        if name.rpartition(".")[2] == "VecFrameStack" and options.keys() == {"n_stack"}:
+            _frames(draft, options["n_stack"])
+            continue
         arguments = f" with {options}" if options else ""
-        draft.note(
-            "vec_env_wrapper",
-            f"{name}{arguments} is left out; a run makes the vector environment itself, so wrap each "
-            "environment in its entry point",
-        )
+        draft.note("vec_env_wrapper", f"{name}{arguments} is left out; {ELSEWHERE['vec_env_wrapper']}")
 
 
 def _frames(draft: Draft, value: Any) -> None:
-    if value is not None:
-        draft.note("frame_stack", f"{value} is left out; stack the frames in the environment's entry point")
+    number = None if value is None else _whole(draft, "frame_stack", value)
+    if number is None or number == 1:  # one frame is the observation itself
+        return
+    draft.frame_stack = number
 
 
 def _environment_arguments(draft: Draft, value: Any) -> None:
