@@ -65,3 +65,18 @@ OF_ZOO = frozenset(
     }
 )  # fmt: skip
 FROM_ZOO = "`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo"
+
+_HINDSIGHT = (
+    "HER is a replay buffer; use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer"
+)
+# Algorithms of Stable-Baselines3 and sb3-contrib that a run cannot have, by their names in lower case.
+NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
+    {
+        "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",
+        "her": _HINDSIGHT,
+        "maskableppo": (
+            "MaskablePPO keeps masks of actions in a buffer that has no place for rows of broken simulators, "
+            "and evaluations would act without masks; use PPO, and let the environment ignore such actions"
+        ),
+    }
+)

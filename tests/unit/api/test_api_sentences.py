@@ -18,6 +18,9 @@ SENTENCES = [
     ({"trainer.algorithm.name": "TD4"},
      ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
      "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),
+    ({"trainer.algorithm.name": "HER"},
+     ('spec.trainer.algorithm.name: "HER" cannot be used: HER is a replay buffer; '
+     "use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer")),
     ({"trainer.robot": "Robotinoo"},
      'spec.trainer.robot: "Robotinoo" is not a robot; use Robotino, TurtleBot3Burger, EPuck or module:Class'),
     ({"trainer.algorithm.policy": "my policy"},

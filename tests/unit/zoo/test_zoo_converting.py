@@ -134,7 +134,7 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
             "--env: atari is not an environment in ppo.yml; use one of Reach",
         ),
         (OFF_POLICY, "sac.yml", {"env": "a-v2"}, "a-v2 is not an environment in sac.yml; did you mean a-v1?"),
-        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns and has no losses"),
+        (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which rows of"),
         (OFF_POLICY, "mine.yml", {}, "mine.yml: its name is not an algorithm; give one as --algorithm: DQN"),
         (OFF_POLICY, "sac.yml", {"algorithm": "SAK"}, "--algorithm: SAK is not an algorithm; give one as"),
         ("n_timesteps: 5", "sac.yml", {}, "sac.yml: has the words of one environment and no id; give it as"),

@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from palaestra.api.fields import PATTERNS
+from palaestra.api.fields import ALGORITHM, PATTERNS
 from palaestra.api.job import TrainingJob
 from palaestra.api.paths import Path, shown
 from palaestra.api.tree import fields_of, model_at, walk
-from palaestra_protocol.elsewhere import ELSEWHERE, FROM_ZOO, OF_ZOO
+from palaestra_protocol.elsewhere import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, OF_ZOO
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
@@ -85,6 +85,8 @@ def _no_member(path: Path, value: Any, ctx: dict[str, Any]) -> str:
 
 def _no_match(_: Path, value: Any, ctx: dict[str, Any]) -> str:
     noun, remedy = PATTERNS[ctx["pattern"]]
+    if ctx["pattern"] == ALGORITHM and (why := NO_ALGORITHM.get(str(value).lower())):
+        return f"{quoted(value)} cannot be used: {why}"
     return f"{quoted(value)} is not {noun}; {remedy}"
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from palaestra.api.fields import ALGORITHM, ALGORITHMS
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.errors import PalaestraError
+from palaestra_protocol.elsewhere import NO_ALGORITHM
 
 # Zoo names its files after these words for algorithms.
 OF_FILES: Mapping[str, str] = {
@@ -23,9 +24,6 @@ OF_FILES: Mapping[str, str] = {
     "td3": "TD3",
     "tqc": "TQC",
     "trpo": "TRPO",
-}
-_NOT_HERE: Mapping[str, str] = {
-    "ars": "ARS learns from whole returns and has no losses, so no rows of faults could be kept out of it",
 }
 _SHARED = ("default", "atari")  # entries that stand for other environments
 CHOOSES_ALGORITHM = "model_class"  # a word of her.yml, where HER was not yet a replay buffer
@@ -97,8 +95,8 @@ def algorithm_of(given: str | None, name: str, entry: Mapping[str, Any]) -> str:
     here = {**{known.lower(): known for known in ALGORITHMS}, **OF_FILES}
     if found := here.get(word.lower()):
         return found
-    if why := _NOT_HERE.get(word.lower()):
-        raise ZooError(f"--algorithm: {word} cannot be used: {why}; choose another algorithm")
+    if why := NO_ALGORITHM.get(word.lower()):
+        raise ZooError(f"--algorithm: {word} cannot be used: {why}")
     if given is not None and re.fullmatch(ALGORITHM, given):
         return given
     subject = f"--algorithm: {given} is" if given is not None else f"{name}: its name is"

@@ -17,6 +17,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.keeper import Keeper
 
 LAB = '''
+import sb3_contrib
 import stable_baselines3 as sb3
 import torch
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
@@ -30,6 +31,14 @@ class Careful(sb3.PPO):
     def __init__(self, *args, care: float = 0.5, **kwargs):
         self.care = care
         super().__init__(*args, **kwargs)
+
+
+class Search(sb3_contrib.ARS):
+    """ARS under another name."""
+
+
+class Masked(sb3_contrib.MaskablePPO):
+    """MaskablePPO under another name."""
 
 
 class Eager(sb3.DQN):
@@ -200,10 +209,14 @@ def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, dir
 
 
 REFUSED = [
+    ("sb3_contrib:ARS", "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which rows of"),
     (
-        "sb3_contrib:ARS",
-        "ARS is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
+        "my_lab:Search",
+        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
     ),
+    ("sb3_contrib:MaskablePPO", "sb3_contrib:MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
+    ("MaskablePPO", "MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
+    ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
     ("my_lab:Doubled", "my_lab:Doubled is no subclass of BaseAlgorithm; name a class that is one"),
     ("my_lab:no_class", "my_lab:no_class is no subclass of BaseAlgorithm"),
     ("my_lab:Missing", "my_lab:Missing cannot be imported .* has no attribute 'Missing'"),
@@ -223,7 +236,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact)
 @pytest.mark.parametrize(
     ("name", "buffer"),
     [
-        ("sb3_contrib:MaskablePPO", "MaskableRolloutBuffer"),
+        ("my_lab:Masked", "MaskableRolloutBuffer"),
         ("my_lab:OwnRollouts", "Own"),
         ("my_lab:OwnReplay", "ReplayBuffer"),
     ],
