@@ -34,9 +34,11 @@
     │   ├── NotOfThisSweep           a job has the name of a sweep's trial (sweeps.there)
     │   ├── QueueDecides             Kueue alone suspends and resumes this job
     │   └── TookTooLong              a deadline passed
+    ├── NoSuccess                    a sweep compares success rates, and there are none (sweeps.carrying_out)
     ├── NotLeading                   this operator may have lost its lease (operator.writing)
     ├── Outdated                     the cluster has changed since the decision (operator.confirming)
     ├── TooLarge                     a file is larger than what it should be can be (reading)
+    ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.reading)
     └── TrialFailed                  the trial's job did not succeed in time (trial)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.

@@ -3,6 +3,7 @@
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
 - `ros`: between trainer and simulator: connections, types and values of ROS 1
+- `elsewhere`: words of other projects, and their places in a TrainingJob
 - `fields`: checks of received JSON, because its sender is not trusted
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options

@@ -10,7 +10,7 @@ from palaestra.errors import PalaestraError
 from palaestra.sweeps import ledger
 from palaestra.sweeps.carrying_out import carry_out
 from palaestra.sweeps.expanding import trials
-from palaestra.sweeps.model import load
+from palaestra.sweeps.model import Objective, load
 from palaestra.sweeps.searching import InTurn
 from palaestra.sweeps.suggesting import Suggested
 from palaestra.sweeps.there import NotOfThisSweep, There
@@ -24,6 +24,7 @@ JOB = {
     "spec": {"scheduling": {"queueName": "trainings"}},
 }
 PATIENCE_S = 60.0
+SUCCESS = Objective.SUCCESS_RATE
 
 
 @pytest.fixture
@@ -49,7 +50,9 @@ def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place,
     sweep = load(file(matrix={"trainer.steps": [100, 200]}, seeds=2))
     search = InTurn(trials(sweep), {})
     with ThreadPoolExecutor(1) as pool:
-        carried = pool.submit(carry_out, search, There(client, "s", None, print, 0.05), tmp_path, print)
+        carried = pool.submit(
+            carry_out, search, There(client, "s", None, print, 0.05), tmp_path, SUCCESS, print
+        )
         eventually(lambda: place.get(TRAINING_JOBS, "s-1") or carried.done(), PATIENCE_S)
         jobs = place.api.list(TRAINING_JOBS, place.name, labels="palaestra.dev/sweep=s")
         tell("s-0", "Succeeded", replicas=[replica(n, "Succeeded", rate=0.5 + n / 10) for n in range(2)])
@@ -70,7 +73,7 @@ def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_pat
     sweep = load(file(random=space, trials=2, optuna={"startupTrials": 1}))
     search, journal = Suggested(sweep, tmp_path), tmp_path / "optuna.journal"
     with ThreadPoolExecutor(1) as pool:
-        carried = pool.submit(carry_out, search, There(client, "s", 1, print, 0.05), tmp_path, print)
+        carried = pool.submit(carry_out, search, There(client, "s", 1, print, 0.05), tmp_path, SUCCESS, print)
         eventually(lambda: place.get(TRAINING_JOBS, "s-0") or carried.done(), PATIENCE_S)
         tell("s-0", "Running", replicas=[replica(0, "Running", rate=0.9)])
         eventually(lambda: journal.exists() and '"intermediate_value"' in journal.read_text(), PATIENCE_S)
@@ -91,7 +94,7 @@ def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_
     search = InTurn(trials(load(file(matrix={"seed": [1]}))), {})
 
     with pytest.raises(NotOfThisSweep, match="not of this sweep; give the sweep another name"):
-        carry_out(search, There(client, "s", None, print), tmp_path, print)
+        carry_out(search, There(client, "s", None, print), tmp_path, Objective.SUCCESS_RATE, print)
 
     assert place.get(TRAINING_JOBS, "s-0") == before
 

@@ -122,6 +122,20 @@ def test_a_network_of_another_python_is_refused_with_the_remedy(stored_before):
         load_policy(stored_before("3.99"))
 
 
+def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, tmp_path):
+    """Without them it would be given observations that it has never seen, or none that fit."""
+    wrapper = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 0.5}}
+    environment = {"id": "MoveToTargetEnv-v0", "wrappers": [wrapper], "frameStack": 2}
+    assert play(write_job(environment=environment, algorithm=PPO, steps=128))[0] == 0
+
+    policy = load_policy(tmp_path / "run")
+
+    made = policy.make_env(*fake_arena())
+    observation, _ = made.reset(seed=1)
+    assert observation.shape == (2 * made.unwrapped.observation_space.shape[0],)
+    assert made.action_space.contains(policy.predict(observation)[0])
+
+
 def test_a_folder_without_a_model_is_refused(tmp_path):
     """With the remedy."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):

@@ -106,6 +106,7 @@ def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
 
     assert free == [
         "spec.trainer.environment.options{}",
+        "spec.trainer.environment.wrappers[].options{}",
         "spec.trainer.algorithm.hyperparameters{}",
         "spec.trainer.algorithm.callbacks[].options{}",
         "spec.scheduling.affinity{}",

@@ -18,6 +18,9 @@ SENTENCES = [
     ({"trainer.algorithm.name": "TD4"},
      ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
      "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),
+    ({"trainer.algorithm.name": "HER"},
+     ('spec.trainer.algorithm.name: "HER" cannot be used: HER is a replay buffer; '
+     "use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer")),
     ({"trainer.robot": "Robotinoo"},
      'spec.trainer.robot: "Robotinoo" is not a robot; use Robotino, TurtleBot3Burger, EPuck or module:Class'),
     ({"trainer.algorithm.policy": "my policy"},
@@ -142,6 +145,18 @@ SENTENCES = [
      ("spec.simulators[0].start_deadline_seconds: is not a field; "
      "did you mean startDeadlineSeconds?")),
     ({"steps": 1}, "spec.steps: is not a field here; did you mean spec.trainer.steps?"),
+    # Words of other projects, with their places.
+    ({"trainer.n_timesteps": 1},
+     ("spec.trainer.n_timesteps: is not a field; write trainer.steps "
+     "(`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo)")),
+    ({"trainer.algorithm.total_timesteps": 1},
+     "spec.trainer.algorithm.total_timesteps: is not a field; write trainer.steps"),
+    ({"trainer.n_steps": 1},
+     ("spec.trainer.n_steps: is not a field; "
+     "write a hyperparameter as spec.trainer.algorithm.hyperparameters.n_steps")),
+    ({"trainer.algorithm.policy_kwargs": {}},
+     ("spec.trainer.algorithm.policy_kwargs: is not a field; "
+     "write a hyperparameter as spec.trainer.algorithm.hyperparameters.policy_kwargs")),
     ({"network": {"x": 1}}, "spec.network.x: is not a field; use egress"),
     ({"storage.x": 1},
      ("spec.storage.x: is not a field; use size, storageClassName, retain, ephemeral, "

@@ -44,6 +44,17 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
     assert read.evaluation.every_steps == 0
 
 
+def test_wrappers_and_stacked_frames_are_read_as_they_were_written(make_job):
+    """Without them, a policy would learn in another environment."""
+    wrapper = {"name": "a.b:Own", "options": {"size": 2}}
+    job = make_job(trainer={"environment": {"wrappers": [wrapper], "frameStack": 3}})
+
+    read = read_back(job).environment
+
+    assert [each.model_dump() for each in read.wrappers or ()] == [wrapper]
+    assert read.frame_stack == 3
+
+
 @pytest.mark.parametrize(
     ("written", "read"),
     [

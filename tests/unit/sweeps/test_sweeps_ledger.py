@@ -21,6 +21,18 @@ def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path
         ledger.begin(folder, sweep(random={"seed": {"low": 2, "high": 9}}, seed=2, trials=5))
 
 
+def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_from_the_first(
+    sweep, tmp_path
+) -> None:
+    """A file that is corrected must not train every trial once more."""
+    ledger.begin(tmp_path / "s", sweep(**RANDOM, trials=3))
+    ledger.begin(tmp_path / "s", sweep(**RANDOM, trials=3, objective="MeanReturn"))
+    ledger.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}))
+
+    with pytest.raises(Refused, match=r"spec\.objective: not as when the sweep"):
+        ledger.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}, objective="MeanReturn"))
+
+
 def test_a_line_that_a_crash_has_cut_spoils_no_later_one(sweep, tmp_path) -> None:
     """Later lines would be appended to it, and the sweep could never be continued."""
     folder = tmp_path / "s"

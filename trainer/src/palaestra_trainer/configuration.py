@@ -56,6 +56,18 @@ class _Section(BaseModel):
     )
 
 
+class Wrapper(_Section):
+    """A wrapper around the environment, see `environments.wrapping`.
+
+    Attributes:
+        name: its class, as `module:Class`.
+        options: keyword arguments of the class.
+    """
+
+    name: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
 class Environment(_Section):
     """The gymnasium environment to train in.
 
@@ -63,11 +75,15 @@ class Environment(_Section):
         id: name under which the environment is registered with gymnasium.
         reward: Dense gives a reward at each step, Sparse only at the end of an episode.
         options: keyword arguments of the environment.
+        wrappers: the first one is innermost; None: none.
+        frame_stack: how many of the newest observations are one; None: only the newest.
     """
 
     id: str
     reward: Reward = DEFAULT_REWARD
     options: dict[str, Any] = Field(default_factory=dict)
+    wrappers: tuple[Wrapper, ...] | None = None
+    frame_stack: Annotated[int, Field(ge=2)] | None = None
 
 
 class Normalize(_Section):
@@ -295,9 +311,15 @@ def dump(configuration: Configuration) -> str:
     return yaml.safe_dump(content, sort_keys=False)  # ASCII: YAML takes some other characters for line ends
 
 
-def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:
-    """Return the remedy for an unknown name: the most similar known name, or all of them."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+def nearest(word: str, known: Mapping[str, object] | list[str], likeness: float = 0.6) -> str:
+    """Return the remedy for an unknown name: the most similar known name, or all of them.
+
+    Args:
+        word: the unknown name.
+        known: the known names.
+        likeness: how similar a name must be, 0 to 1.
+    """
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=likeness)
     return f"did you mean {close[0]}?" if close else f"use one of {', '.join(sorted(known))}"
 
 

@@ -8,12 +8,17 @@ from typing import Any
 
 from pydantic_core import ErrorDetails
 
-from palaestra.api.fields import PATTERNS
+from palaestra.api.fields import ALGORITHM, PATTERNS
 from palaestra.api.job import TrainingJob
 from palaestra.api.paths import Path, shown
 from palaestra.api.tree import fields_of, model_at, walk
+from palaestra_protocol.elsewhere import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, OF_ZOO
 
 _LONGEST_QUOTE = 60
+_SIMILAR = 0.6
+_MISSPELLED = 0.92  # of a word of Python: every_steps is everySteps, but n_steps is not steps
+_OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))  # sections where people write words of Zoo
+_VARIABLES = "env"  # the environment variables of a container, more likely than an environment
 
 
 def sentence(path: Path, error: ErrorDetails) -> str:
@@ -38,6 +43,9 @@ def quoted(value: Any) -> str:
 
 def _unknown(path: Path, _: Any, __: dict[str, Any]) -> str:
     name = str(path[-1])
+    of_training = path[:1] == ("spec",) and path[-2:-1] in _OF_TRAINING
+    if of_training and name in ELSEWHERE and name != _VARIABLES:
+        return _elsewhere(name)
     model = model_at(TrainingJob, path[:-1])
     known = list(fields_of(model)) if model else []
     elsewhere = [
@@ -47,9 +55,17 @@ def _unknown(path: Path, _: Any, __: dict[str, Any]) -> str:
     ]
     if len(elsewhere) == 1:
         return f"is not a field here; did you mean {elsewhere[0]}?"
-    if near := difflib.get_close_matches(_camel(name), known, n=1):
+    likeness = _MISSPELLED if "_" in name else _SIMILAR
+    if near := difflib.get_close_matches(_camel(name), known, n=1, cutoff=likeness):
         return f"is not a field; did you mean {near[0]}?"
+    if of_training and "_" in name:
+        return f"is not a field; write a hyperparameter as spec.trainer.algorithm.hyperparameters.{name}"
     return f"is not a field; use {_either(known)}"
+
+
+def _elsewhere(name: str) -> str:
+    zoo = f" ({FROM_ZOO})" if name in OF_ZOO else ""
+    return f"is not a field; {ELSEWHERE[name]}{zoo}"
 
 
 def _camel(name: str) -> str:
@@ -69,6 +85,8 @@ def _no_member(path: Path, value: Any, ctx: dict[str, Any]) -> str:
 
 def _no_match(_: Path, value: Any, ctx: dict[str, Any]) -> str:
     noun, remedy = PATTERNS[ctx["pattern"]]
+    if ctx["pattern"] == ALGORITHM and (why := NO_ALGORITHM.get(str(value).lower())):
+        return f"{quoted(value)} cannot be used: {why}"
     return f"{quoted(value)} is not {noun}; {remedy}"
 
 

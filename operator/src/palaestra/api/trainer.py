@@ -48,6 +48,17 @@ class PullPolicy(StrEnum):
     NEVER = "Never"
 
 
+class EnvironmentWrapper(ApiModel):
+    """A wrapper of gymnasium or of your own, derived from gymnasium.Wrapper."""
+
+    name: Annotated[str, Field(min_length=1, max_length=256, pattern=CLASS_NAME)]
+    """Its class as `module:Class`, such as `gymnasium.wrappers:ClipAction`; the trainer must be able to
+    import the module."""
+
+    options: FreeObject = Field(default={})
+    """Keyword arguments of the class."""
+
+
 class Task(ApiModel):
     """The gymnasium environment."""
 
@@ -59,6 +70,14 @@ class Task(ApiModel):
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the environment, as in `gymnasium.make`."""
+
+    wrappers: Annotated[Listed[EnvironmentWrapper], Field(max_length=16)] | None = None
+    """Wrappers around the environment, the first one innermost. Their observations, actions and rewards are
+    those of training, evaluations and the exported policy."""
+
+    frame_stack: Annotated[int, Field(ge=2, le=64)] | None = None
+    """Number of newest observations that the policy gets as one, in the layout of Stable-Baselines3's
+    VecFrameStack, after all wrappers; absent: the newest only."""
 
 
 Bound = Annotated[float, Field(gt=0, le=1_000_000)]

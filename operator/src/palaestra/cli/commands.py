@@ -26,6 +26,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "run": Command("run", "train on this machine"),
         "sweep": Command("sweep", "train with different values and compare"),
         "export": Command("exporting", "write a policy as one file for other programs"),
+        "from-zoo": Command("from_zoo", "write a job from a file of RL-Baselines3-Zoo"),
         "plan": Command("documents", "print the objects that a job needs"),
         "world": Command("documents", "print one simulator's own world"),
         "crd": Command("documents", "print the CustomResourceDefinition"),

@@ -14,11 +14,19 @@ def job(file: Path) -> TrainingJob:
     Raises:
         PalaestraError: it cannot be read, or is wrong.
     """
+    return load(read_text(file), str(file))
+
+
+def read_text(file: Path) -> str:
+    """Return the text of a file.
+
+    Raises:
+        PalaestraError: it cannot be read, or is not UTF-8.
+    """
     try:
-        text = read(file, MOST_JOB_BYTES).decode()
+        return read(file, MOST_JOB_BYTES).decode()
     except UnicodeDecodeError:
         raise PalaestraError(f"{file}: is not UTF-8; save it as UTF-8") from None
-    return load(text, str(file))
 
 
 def read(file: Path, most_bytes: int = MOST_WORLD_BYTES) -> bytes:

@@ -21,7 +21,7 @@ from palaestra.local.files import write
 from palaestra.sweeps import expanding, ledger
 from palaestra.sweeps.carrying_out import Place, carry_out
 from palaestra.sweeps.here import Here
-from palaestra.sweeps.model import Sweep, load
+from palaestra.sweeps.model import Objective, Sweep, load
 from palaestra.sweeps.searching import InTurn, Search
 from palaestra.sweeps.table import Row, lines
 from palaestra.sweeps.there import There
@@ -36,7 +36,9 @@ SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
 trials.jsonl, table.txt and curves.png. The same command skips trials that are complete and resumes the
-others. Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
+others. Prints a line for each trial that begins, and one with its result when it has ended.
+
+Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
 SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start stays ignored.
 
 With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; a queue of the job
@@ -47,7 +49,8 @@ EXIT_CODES = """\
 exit codes:
   0    all trials are complete or pruned
   1    a trial failed, or the cluster refused; the table or the last line gives the reason
-  2    the sweep, its job, a world or this machine is not suitable; nothing was started
+  2    the sweep, its job, a world or this machine is not suitable; nothing was started, or the
+       environment reports no success and the sweep compares it: runs stop after a checkpoint
   75   interrupted after checkpoints; run the same command to resume
   130  killed by a second Ctrl-C, or with --cluster by the first; run the same command to resume
 """
@@ -89,17 +92,17 @@ def _here(options: argparse.Namespace) -> int:
         code = 0
         try:
             with _interruptible():
-                _carried_out(search, place, folder)
+                _carried_out(search, place, folder, sweep.spec.objective)
         except KeyboardInterrupt:
             code = int(ExitCode.INTERRUPTED) if place.stopped else KILLED
         shown = _shown(search, place, sweep, folder)
         return code or shown
 
 
-def _carried_out(search: Search, place: Here, folder: Path) -> None:
+def _carried_out(search: Search, place: Here, folder: Path, objective: Objective) -> None:
     """Run the trials, and end what still runs at the end."""
     try:
-        carry_out(search, place, folder, _say)
+        carry_out(search, place, folder, objective, _say)
     except KeyboardInterrupt:
         _say("interrupted; each run saves a checkpoint, and the same command resumes it")
         raise
@@ -113,7 +116,7 @@ def _there(client: Client, options: argparse.Namespace) -> int:
     default = None if sweep.spec.optuna is None else SEARCHED_AT_ONCE
     place = There(client, sweep.metadata.name, options.at_once or default, _say)
     with _begun(sweep, place, folder) as search:
-        carry_out(search, place, folder, _say)
+        carry_out(search, place, folder, sweep.spec.objective, _say)
         return _shown(search, place, sweep, folder)
 
 

@@ -23,10 +23,13 @@ from palaestra.sweeps.trial import Figures, Point, RunFigures, State
 RECORD = "sweep.yaml"
 TRIALS = "trials.jsonl"
 MUTABLE = {"trials"}
+_COMPARING = {"objective"}  # trials.jsonl has both figures; a search by Optuna has learned from one of them
 
 
 def begin(folder: Path, sweep: Sweep) -> None:
-    """Write the Sweep into its folder; one that is there must be the same, but for `trials`.
+    """Write the Sweep into its folder; one that is there must be the same.
+
+    `trials` may differ, and `objective` too unless Optuna searches.
 
     A line of `trials.jsonl` that a crash has cut is removed, so that the next one begins a line.
 
@@ -38,7 +41,8 @@ def begin(folder: Path, sweep: Sweep) -> None:
     path = folder / RECORD
     if path.exists():
         before = yaml.safe_load(path.read_bytes())
-        if changes := [field for field in _fields(before, record) if field not in MUTABLE]:
+        mutable = MUTABLE if sweep.spec.optuna else MUTABLE | _COMPARING
+        if changes := [field for field in _fields(before, record) if field not in mutable]:
             named = ", ".join(f"spec.{field}" for field in changes)
             raise Refused(
                 f"{named}: not as when the sweep in {folder} was begun; "

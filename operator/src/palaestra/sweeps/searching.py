@@ -1,6 +1,7 @@
 """The order of trials: which one comes next, and whether one is worth going on."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from palaestra.sweeps.trial import Figures, State, Trial
@@ -12,6 +13,11 @@ class Search(Protocol):
     @property
     def known(self) -> Sequence[Trial]:
         """Return all trials that are known by now, in order."""
+        ...
+
+    @property
+    def left(self) -> int:
+        """Return the number of trials that `next` has not returned yet."""
         ...
 
     def next(self) -> Trial | None:
@@ -32,17 +38,18 @@ class InTurn:
 
     def __init__(self, trials: Iterable[Trial], ended: Mapping[int, Figures]) -> None:
         self.known: Sequence[Trial] = tuple(trials)
-        self._left: Iterator[Trial] = iter(
-            [
-                trial
-                for trial in self.known
-                if not (old := ended.get(trial.number)) or old.state is State.FAILED
-            ]
+        self._left: deque[Trial] = deque(
+            trial for trial in self.known if not (old := ended.get(trial.number)) or old.state is State.FAILED
         )
+
+    @property
+    def left(self) -> int:
+        """Return the number of trials that are not begun."""
+        return len(self._left)
 
     def next(self) -> Trial | None:
         """Return the next trial."""
-        return next(self._left, None)
+        return self._left.popleft() if self._left else None
 
     def hopeless(self, trial: Trial, figures: Figures) -> bool:
         """Return False: each trial counts."""

@@ -43,10 +43,15 @@ class Suggested:
         """Return all trials that were suggested, in order."""
         return [self._known[number] for number in sorted(self._known)]
 
+    @property
+    def left(self) -> int:
+        """Return the number of trials to suggest, with those to suggest once more."""
+        waits = self._study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
+        return len(waits) + max((self._sweep.spec.trials or 0) - len(self._known), 0)
+
     def next(self) -> Trial | None:
         """Return the next trial; None after as many as the sweep wants."""
-        waits = self._study.get_trials(states=(TrialState.WAITING,))
-        if not waits and len(self._known) >= (self._sweep.spec.trials or 0):
+        if not self.left:
             return None
         asked = self._study.ask(self._space)
         number = asked.user_attrs.get(NUMBER, len(self._known))

@@ -94,6 +94,10 @@ class Figures:
         failed = (run for run in self.runs if run.ended and not run.succeeded)
         return tuple(dict.fromkeys(run.reason for run in failed if run.reason))
 
+    def lacks(self, objective: Objective) -> bool:
+        """Return whether every run was evaluated, and none has the figure that counts."""
+        return all(run.curve for run in self.runs) and bool(self.runs) and not self.values(objective)
+
     def values(self, objective: Objective) -> tuple[float, ...]:
         """Return the known results, one a seed."""
         return tuple(value for run in self.runs if (value := run.value(objective)) is not None)

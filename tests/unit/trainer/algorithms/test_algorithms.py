@@ -11,8 +11,8 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import explained_variance
 from torch import nn, optim
 
+from palaestra_protocol.elsewhere import ELSEWHERE, OF_ZOO
 from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, check, make_model
-from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
 from palaestra_trainer.algorithms.entries import OURS
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
@@ -179,6 +179,16 @@ def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
         ConfigurationError, match=r"'torch\.nn\.Tahn' is not known; did you mean Tanh\?, or write"
     ):
         check(Algorithm(name="DQN", hyperparameters={"policy_kwargs": policy}))
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
+    """TQC's signature has a bare Callable, where others have one with arguments."""
+    for schedule in ("lin_7.3e-4", [[0, 0.001], [1, 0.0001]]):
+        assert check(Algorithm(name=name, hyperparameters={"learning_rate": schedule}))
+
+    with pytest.raises(ConfigurationError, match=r"give a number or a schedule such as lin_0\.001"):
+        check(Algorithm(name=name, hyperparameters={"learning_rate": "quick"}))
 
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
@@ -405,11 +415,63 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
         "algorithm.hyperparameters.n_timesteps: is no hyperparameter here; write trainer.steps",
         "algorithm.hyperparameters.policy: is no hyperparameter here; write trainer.algorithm.policy",
         "algorithm.hyperparameters.seed: is no hyperparameter here; write spec.seed",
+        (
+            "algorithm.hyperparameters: has words of RL-Baselines3-Zoo; "
+            "`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo"
+        ),
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "word", "fact"),
+    [
+        ("A2C", "n_epochs", "A2C has no such hyperparameter, unlike PPO, RecurrentPPO; leave it out"),
+        (
+            "DQN",
+            "noise_type",
+            "DQN has no such hyperparameter, unlike SAC, TD3, DDPG, TQC, CrossQ; leave",
+        ),
+        ("PPO", "rollout_buffer_class", "is no hyperparameter here; a run has buffers of its own"),
+        ("PPO", "log_std_init", "is an argument of the policy; write it in policy_kwargs.log_std_init"),
+        ("PPO", "lr", "PPO has no such hyperparameter; write learning_rate"),
+        ("A2C", "cliprange", "A2C has no such hyperparameter; use one of"),
+        ("SAC", "save_freq", "is no hyperparameter here; write trainer.checkpoint.everySteps"),
+        (
+            "TRPO",
+            "max_steps",
+            "is no hyperparameter here; write trainer.steps, or trainer.environment.options",
+        ),
+        ("DQN", "rollout_steps", "DQN has no such hyperparameter; use one of"),
+    ],
+)
+def test_a_word_with_a_meaning_of_its_own_is_not_taken_for_a_misspelling(name, word, fact):
+    """A person who follows the suggestion would train with a number in the wrong place."""
+    with pytest.raises(ConfigurationError) as refused:
+        check(Algorithm(name=name, hyperparameters={word: 3}))
+
+    line = str(refused.value)
+    assert line.startswith(f"algorithm.hyperparameters.{word}: {fact}")
+    assert "did you mean" not in line
+
+
+def test_layers_that_policy_and_value_shared_have_their_form_of_today():
+    """Half of the examples on the web have the old one."""
+    old = {"policy_kwargs": {"net_arch": [{"pi": [8], "vf": [8]}]}}
+
+    with pytest.raises(ConfigurationError, match=r"before 1\.8, .* write \{pi: \[\.\.\.\], vf"):
+        check(Algorithm(name="PPO", hyperparameters=old))
 
 
 def test_each_argument_that_a_run_gives_itself_has_its_place():
     """Whatever a person copies from a call of Stable-Baselines3, the answer says where it goes."""
     hindsight = {"replay_buffer_class", "replay_buffer_kwargs"}  # hyperparameters where there is a buffer
 
-    assert OURS - {"self", "_init_setup_model"} - hindsight <= ELSEWHERE.keys()
+    assert OURS - {"self"} - hindsight <= ELSEWHERE.keys()
+
+
+def test_no_word_with_a_place_elsewhere_is_a_hyperparameter():
+    """Its place would never be shown, or a hyperparameter would be refused."""
+    known = {name for entry in ALGORITHMS.values() for name in entry.known}
+
+    assert known.isdisjoint(ELSEWHERE)
+    assert ELSEWHERE.keys() >= OF_ZOO

@@ -242,7 +242,10 @@ def test_its_size_is_computed_before_it_exists():
 @pytest.mark.parametrize(
     ("given", "fact"),
     [
-        ({"replay_buffer_class": "Her"}, "replay_buffer_class: 'Her' is refused; use HerReplayBuffer"),
+        (
+            {"replay_buffer_class": "Her"},
+            "replay_buffer_class: 'Her' is refused, because another buffer would store",
+        ),
         ({"replay_buffer_kwargs": {}}, "has no effect without replay_buffer_class: HerReplayBuffer"),
         ({"replay_buffer_kwargs": 4}, "replay_buffer_kwargs: 4 is refused; give a mapping"),
         ({"replay_buffer_kwargs": {"copy_info_dict": True}}, "copy_info_dict: is not an option here"),

@@ -17,6 +17,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.keeper import Keeper
 
 LAB = '''
+import sb3_contrib
 import stable_baselines3 as sb3
 import torch
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
@@ -30,6 +31,14 @@ class Careful(sb3.PPO):
     def __init__(self, *args, care: float = 0.5, **kwargs):
         self.care = care
         super().__init__(*args, **kwargs)
+
+
+class Search(sb3_contrib.ARS):
+    """ARS under another name."""
+
+
+class Masked(sb3_contrib.MaskablePPO):
+    """MaskablePPO under another name."""
 
 
 class Eager(sb3.DQN):
@@ -54,6 +63,18 @@ class OwnReplay(sb3.DQN):
     def _setup_model(self):
         super()._setup_model()
         self.replay_buffer = ReplayBuffer(10, self.observation_space, self.action_space)
+
+
+def halving(left):
+    return 0.01 * 0.5 ** (4 * (1 - left))
+
+
+def rising(left):
+    return -left
+
+
+def failing(left):
+    raise RuntimeError("no rate today")
 
 
 class Doubled(FlattenExtractor):
@@ -188,10 +209,14 @@ def test_a_run_with_a_class_of_ones_own_is_saved_and_resumed(lab, play, job, dir
 
 
 REFUSED = [
+    ("sb3_contrib:ARS", "sb3_contrib:ARS cannot be used: ARS learns from whole returns, which rows of"),
     (
-        "sb3_contrib:ARS",
-        "ARS is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
+        "my_lab:Search",
+        "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
     ),
+    ("sb3_contrib:MaskablePPO", "sb3_contrib:MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
+    ("MaskablePPO", "MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
+    ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
     ("my_lab:Doubled", "my_lab:Doubled is no subclass of BaseAlgorithm; name a class that is one"),
     ("my_lab:no_class", "my_lab:no_class is no subclass of BaseAlgorithm"),
     ("my_lab:Missing", "my_lab:Missing cannot be imported .* has no attribute 'Missing'"),
@@ -211,7 +236,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact)
 @pytest.mark.parametrize(
     ("name", "buffer"),
     [
-        ("sb3_contrib:MaskablePPO", "MaskableRolloutBuffer"),
+        ("my_lab:Masked", "MaskableRolloutBuffer"),
         ("my_lab:OwnRollouts", "Own"),
         ("my_lab:OwnReplay", "ReplayBuffer"),
     ],
@@ -373,6 +398,49 @@ def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
     )
 
     assert shown.stdout == "0.002\n"
+
+
+def test_a_schedule_may_be_a_function_of_ones_own_which_the_model_names(lab, make, tmp_path):
+    """A change of the function must reach the next attempt, and no code travels in a file."""
+    wanted = Algorithm(
+        name="PPO",
+        hyperparameters=ROLLOUTS | {"learning_rate": "my_lab:halving", "clip_range": "my_lab:halving"},
+    )
+    check(wanted)
+
+    model = make(wanted)
+    model.save(tmp_path / "model.zip")
+
+    assert (model.lr_schedule(1.0), model.lr_schedule(0.5)) == pytest.approx((0.01, 0.0025))
+    assert model.clip_range(0.75) == pytest.approx(0.005)
+    program = f"""
+        import my_lab
+        my_lab.halving = lambda left: 0.5
+        from stable_baselines3 import PPO
+        print(PPO.load({str(tmp_path / "model.zip")!r}, device="cpu").clip_range(1.0))
+    """
+    shown = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], check=True, capture_output=True, text=True, cwd=lab
+    )
+    assert shown.stdout == "0.5\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "fact"),
+    [
+        ("my_lab:rising", "my_lab:rising(1.0) is -1.0; return a finite number of 0 or more"),
+        ("my_lab:failing", "my_lab:failing(1.0) cannot be used (RuntimeError: no rate today"),
+        ("my_lab:Doubled", "my_lab:Doubled(1.0) cannot be used ("),
+        ("my_lab:none", "my_lab:none cannot be imported (AttributeError"),
+    ],
+)
+def test_a_function_that_returns_no_rate_is_refused(lab, name, fact):
+    """The first update would fail, or learn backwards, after a simulator was started."""
+    del lab
+    with pytest.raises(ConfigurationError) as refusal:
+        check(Algorithm(name="DQN", hyperparameters={"learning_rate": name}))
+
+    assert str(refusal.value).startswith(f"algorithm.hyperparameters.learning_rate: {fact}")
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.callbacks import make_callbacks
 from palaestra_trainer.run_directory import RunDirectory, read_lines
 
+SB3 = "stable_baselines3.common.callbacks"
 MODULE = """
     from stable_baselines3.common.callbacks import BaseCallback
 
@@ -246,6 +247,18 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
         ("{module}:Unfinished", {}, "{module}:Unfinished has no _on_step; add this method"),
         ("{module}:Notes", {"stopat": 1}, "options.stopat: {module}:Notes has no such argument; did you"),
         ("{module}:Demanding", {}, "options.threshold: {module}:Demanding needs this argument; set it"),
+        (
+            f"{SB3}:EvalCallback",
+            {},
+            "[0].name: stable_baselines3.common.callbacks:EvalCallback is refused: a run",
+        ),
+        (f"{SB3}:StopTrainingOnRewardThreshold", {"reward_threshold": 1}, "evaluation.stopAtSuccessRate"),
+        (f"{SB3}:StopTrainingOnNoModelImprovement", {}, "it works inside an EvalCallback only; write a"),
+        (
+            f"{SB3}:CheckpointCallback",
+            {},
+            "[0].name: a run saves checkpoints without it; set trainer.checkpoint",
+        ),
         ("{module}:Notes", {"word": ""}, "refuses its arguments (ValueError: a word is needed, in "),
     ],
 )

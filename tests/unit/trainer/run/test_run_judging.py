@@ -35,10 +35,10 @@ class Reach(gymnasium.Env):
 def job():
     """`job(task, robot)`: the configuration of a run; the task is forgotten at the end."""
 
-    def write(task, robot=None):
+    def write(task, robot=None, **more):
         gymnasium.register(id="Reach-v0", entry_point=task)
         simulator = {"name": "collect-0", "group": "collect", "index": 0, "role": "Collect"}
-        environment = Environment(id="Reach-v0")
+        environment = Environment(id="Reach-v0", **more)
         return Configuration(job="j", environment=environment, robot=robot, steps=1, simulators=[simulator])
 
     yield write
@@ -52,6 +52,21 @@ def test_the_judge_has_the_robot_of_the_job(job):
     goals = np.array([[0.0, 1.0], [0.0, 2.0]])
     assert type(judge.unwrapped.robot).__name__ == "TurtleBot3Burger"
     assert judge.unwrapped.compute_reward(goals, goals[:1], {}).tolist() == [1.0, 0.0]
+
+
+def test_a_wrapper_that_changes_rewards_is_refused_and_another_is_not(job):
+    """Rewards of other goals would be those without it, in the same batch as those with it."""
+    limit = {"name": "gymnasium.wrappers:TimeLimit", "options": {"max_episode_steps": 5}}
+    clip = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 1}}
+    limited = job(Reach, wrappers=[limit])
+    clipped = limited.model_copy(update={"environment": Environment(id="Reach-v0", wrappers=[clip])})
+
+    assert make_judge(limited).get_wrapper_attr("compute_reward")
+
+    with pytest.raises(
+        ConfigurationError, match=r"environment\.wrappers: ClipReward changes rewards, and Her"
+    ):
+        make_judge(clipped)
 
 
 def test_without_a_robot_in_the_job_the_judge_has_a_robotino(job):

@@ -21,6 +21,7 @@ from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
+from palaestra_protocol.elsewhere import NO_ALGORITHM
 from palaestra_trainer import own
 from palaestra_trainer.algorithms import her, noise
 from palaestra_trainer.algorithms.reinforce import REINFORCE
@@ -198,6 +199,8 @@ def entry_of(name: str) -> Entry:
     """
     if name in ALGORITHMS:
         return ALGORITHMS[name]
+    if why := NO_ALGORITHM.get(_plain_name(name).lower()):
+        raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if own.names_class(name):
         entry = _entry(own.class_named(name, "algorithm.name", BaseAlgorithm))
         with_valid_rows(entry.original)  # raises if rows of a fault would reach its losses
@@ -206,3 +209,9 @@ def entry_of(name: str) -> Entry:
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "
         "or name a class as module:Class"
     )
+
+
+def _plain_name(name: str) -> str:
+    """Return the name of a class of Stable-Baselines3 or sb3-contrib without its module."""
+    module, _, last = name.rpartition(":")
+    return last if module.partition(".")[0] in {"sb3_contrib", "stable_baselines3"} else name

@@ -45,7 +45,10 @@ def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
     """Yield field, fact and remedy of each wrong one of the two hyperparameters."""
     chosen, options = given.get(NAMES[0]), given.get(NAMES[1])
     if chosen not in (None, NAME):
-        yield f"{field}.{NAMES[0]}: {chosen!r} is refused; use {NAME}, or leave it out"
+        yield (
+            f"{field}.{NAMES[0]}: {chosen!r} is refused, because another buffer would store rows of broken "
+            f"simulators, and no checkpoint could keep it; use {NAME}, or leave it out"
+        )
     if options is None:
         return
     if chosen is None:

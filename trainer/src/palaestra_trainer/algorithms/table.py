@@ -14,15 +14,14 @@ from sb3_contrib import TQC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.algorithms import her, limits, noise, values
+from palaestra_trainer.algorithms import elsewhere, her, limits, noise, values
 from palaestra_trainer.algorithms.device import usable
-from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
 from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
 from palaestra_trainer.algorithms.images import with_channels_first, with_network
 from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
-from palaestra_trainer.configuration import Algorithm, Device, nearest
+from palaestra_trainer.configuration import Algorithm, Device
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
 
@@ -36,11 +35,7 @@ def check(algorithm: Algorithm) -> Entry:
     policy = values.policy_class(entry.original, named_policy(algorithm, entry))
     known = entry.known
     given = algorithm.hyperparameters
-    lines = [
-        f"{values.FIELD}.{name}: {_unknown(algorithm.name, name, known)}"
-        for name in given
-        if name not in known
-    ]
+    lines = [*elsewhere.mistakes(algorithm.name, entry, values.arguments_of(policy), given, values.FIELD)]
     plain = {name: value for name, value in given.items() if name in known and name not in her.NAMES}
     lines += list(values.mistakes(entry.original, policy, plain)) or _out_of_range(algorithm.name, plain)
     lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
@@ -53,12 +48,6 @@ def check(algorithm: Algorithm) -> Entry:
     if lines:
         raise ConfigurationError("\n".join(lines))
     return entry
-
-
-def _unknown(algorithm: str, name: str, known: list[str]) -> str:
-    if name in ELSEWHERE:
-        return f"is no hyperparameter here; {ELSEWHERE[name]}"
-    return f"{algorithm} has no such hyperparameter; {nearest(name, known)}"
 
 
 def _out_of_range(algorithm: str, given: Mapping[str, Any]) -> list[str]:

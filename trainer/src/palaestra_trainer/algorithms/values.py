@@ -1,8 +1,8 @@
 """The values of hyperparameters: checked against a signature, and converted to what it takes.
 
-A job cannot contain a schedule, a tuple or a class. Schedules are text or points, see `schedules`, and a list
-stands for a tuple. Activation functions and optimizers have their PyTorch names, and any class that a policy
-takes may be written as `module:Class`.
+A job cannot contain a schedule, a tuple or a class. Schedules are text, points or names of functions, see
+`schedules` and `own_schedules`, and a list stands for a tuple. Activation functions and optimizers have their
+PyTorch names, and any class that a policy takes may be written as `module:Class`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn, optim
 
 from palaestra_trainer import own
+from palaestra_trainer.algorithms.own_schedules import own_schedule
 from palaestra_trainer.algorithms.schedules import schedule_of
 from palaestra_trainer.algorithms.signatures import types
 from palaestra_trainer.configuration import nearest
@@ -53,10 +54,13 @@ def mistakes(
     """Yield field, fact and remedy of each value that the class or its policy does not accept."""
     known = types(cls)
     for name, value in hyperparameters.items():
-        if fact := _refused(value, known.get(name, Any)):
+        annotation = known.get(name, Any)
+        if _takes_schedule(annotation) and own.names_class(value):
+            yield from _mistakes_of_schedule(f"{FIELD}.{name}", value)
+        elif fact := _refused(value, annotation):
             yield f"{FIELD}.{name}: {fact}"
         elif name == "policy_kwargs" and value:
-            yield from _mistakes_of_policy(types(policy), value)
+            yield from _mistakes_of_policy(policy, value)
 
 
 def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,7 +70,7 @@ def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> d
         ConfigurationError: a class that they name cannot be imported.
     """
     known = types(cls)
-    chosen = {name: _as_python(value, known.get(name, Any)) for name, value in hyperparameters.items()}
+    chosen = {name: _argument(name, value, known.get(name, Any)) for name, value in hyperparameters.items()}
     policy = chosen.get("policy_kwargs") or {}
     chosen["policy_kwargs"] = {name: _class(name, value) or value for name, value in policy.items()}
     return chosen
@@ -81,8 +85,13 @@ def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None)
     return aliases[named] if named else usual
 
 
-def _mistakes_of_policy(known: Mapping[str, Any], given: Mapping[str, Any]) -> Iterator[str]:
-    names = [name for name in known if name not in _GIVEN]
+def arguments_of(policy: type[BasePolicy]) -> list[str]:
+    """Return the arguments of a policy that a job may give."""
+    return [name for name in types(policy) if name not in _GIVEN]
+
+
+def _mistakes_of_policy(policy: type[BasePolicy], given: Mapping[str, Any]) -> Iterator[str]:
+    known, names = types(policy), arguments_of(policy)
     for name, value in given.items():
         field = f"{FIELD}.policy_kwargs.{name}"
         if name not in names:
@@ -95,14 +104,30 @@ def _mistakes_of_policy(known: Mapping[str, Any], given: Mapping[str, Any]) -> I
                     f"{field}: {value!r} is not known; {nearest(_bare(str(value)), dict(CLASSES[name]))}, "
                     "or write module:Class"
                 )
+        elif name == "net_arch" and _has_shared_layers(value):
+            yield (
+                f"{field}: {value!r} is a form of Stable-Baselines3 before 1.8, where layers were shared; "
+                "write {pi: [...], vf: [...]}, or a list of numbers for both"
+            )
         elif fact := _refused(value, known[name]):
             yield f"{field}: {fact}"
+
+
+def _has_shared_layers(layers: Any) -> bool:
+    return isinstance(layers, list) and any(isinstance(layer, dict) for layer in layers)
 
 
 def _mistakes_of_class(field: str, name: str) -> Iterator[str]:
     base = BASES.get(field.rpartition(".")[2], object)
     try:
         own.class_named(name, field, base)
+    except ConfigurationError as error:
+        yield str(error)
+
+
+def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
+    try:
+        own_schedule(name, field)
     except ConfigurationError as error:
         yield str(error)
 
@@ -135,13 +160,26 @@ def _refused(value: Any, annotation: Any) -> str:
     return ""
 
 
+def _argument(name: str, value: Any, annotation: Any) -> Any:
+    if _takes_schedule(annotation) and own.names_class(value):
+        return own_schedule(value, f"{FIELD}.{name}")
+    return _as_python(value, annotation)
+
+
 def _as_python(value: Any, annotation: Any) -> Any:
-    kinds = {get_origin(kind) or kind for kind in (annotation, *get_args(annotation))}
-    if isinstance(value, list) and tuple in kinds:
+    if isinstance(value, list) and tuple in _kinds(annotation):
         return tuple(value)
-    if collections.abc.Callable in kinds and (schedule := schedule_of(value)):
+    if _takes_schedule(annotation) and (schedule := schedule_of(value)):
         return schedule
     return value
+
+
+def _takes_schedule(annotation: Any) -> bool:
+    return collections.abc.Callable in _kinds(annotation)
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    return {get_origin(kind) or kind for kind in (annotation, *get_args(annotation))}
 
 
 def _words(annotation: Any) -> str:
@@ -150,7 +188,7 @@ def _words(annotation: Any) -> str:
     if annotation in _WORDS:
         return _WORDS[annotation]
     if collections.abc.Callable in {origin, annotation}:
-        return "a schedule such as lin_0.001 or [[0, 0.001], [1, 0.0001]]"
+        return "a schedule such as lin_0.001 or [[0, 0.001], [1, 0.0001]], or module:function"
     if origin is tuple:
         return "a list of " + " and ".join(map(_words, parts))
     if origin in {list, dict}:

@@ -20,6 +20,7 @@ from gymnasium.envs.registration import (
 from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
 from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
+from palaestra_trainer.environments import wrapping
 from palaestra_trainer.environments.checking import held
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
 from palaestra_trainer.robots.base import RobotAbc, Scene
@@ -47,7 +48,7 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
             f"environment.id: {wanted.id} cannot be created ({fact_of(error)}); "
             "fix it, or change environment.options"
         ) from error
-    return held(env, wanted.id)
+    return held(wrapping.wrapped(env, wanted), wanted.id)
 
 
 def keywords(wanted: Environment) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def _checked(wanted: Environment, simulated: Mapping[str, Any]) -> dict[str, Any
     offered = {**simulated, "reward": wanted.reward}
     accepted = {name: value for name, value in offered.items() if taken.accepts(name)}
     arguments = {**accepted, **wanted.options}
-    if mistakes := list(_mistakes(wanted, taken, {*spec.kwargs, *arguments})):
+    if mistakes := [*_mistakes(wanted, taken, {*spec.kwargs, *arguments}), *wrapping.mistakes(wanted)]:
         raise ConfigurationError("\n".join(mistakes))
     return arguments
 

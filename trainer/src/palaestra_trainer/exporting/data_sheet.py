@@ -18,7 +18,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.configuration import Configuration, Environment
 from palaestra_trainer.environments.making import creator_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.acting import Acting, Normalizer
@@ -34,10 +34,11 @@ Table = list[dict[str, str]]
 def data_sheet(acting: Acting, configuration: Configuration, directory: RunDirectory) -> dict[str, Any]:
     """Return the sheet of a run's best policy, as JSON data."""
     result = measured(directory)
-    environment, tables = configuration.environment, _tables(configuration.environment.id)
+    environment = configuration.environment
+    tables = _tables(environment)
     return {
         "format": 1,
-        "environment": environment.model_dump(mode="json"),
+        "environment": environment.model_dump(mode="json", exclude_none=True),
         "algorithm": configuration.algorithm.name,
         "seed": configuration.seed,
         "steps": result.get("step"),
@@ -92,10 +93,15 @@ def _number(value: Any) -> float | str:
     return number if np.isfinite(number) else str(number)
 
 
-def _tables(name: str) -> dict[str, list[Table]]:
-    """Return the tables of an environment's docstring about observations and actions."""
+def _tables(environment: Environment) -> dict[str, list[Table]]:
+    """Return the tables of an environment's docstring about observations and actions.
+
+    Wrappers may change both, so with them there are none.
+    """
     found: dict[str, list[Table]] = {"observation": [], "action": []}
-    for heading, text in _chapters(_docstring(name)):
+    if environment.wrappers or environment.frame_stack:
+        return found
+    for heading, text in _chapters(_docstring(environment.id)):
         for topic, tables in found.items():
             if heading.lower().startswith(topic):
                 tables.extend(_read(text))

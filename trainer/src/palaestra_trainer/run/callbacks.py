@@ -8,12 +8,19 @@ callback is saved, since that would need pickling: each attempt creates the call
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import structlog
-from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+from stable_baselines3.common.callbacks import (
+    BaseCallback,
+    CallbackList,
+    CheckpointCallback,
+    EvalCallback,
+    StopTrainingOnNoModelImprovement,
+    StopTrainingOnRewardThreshold,
+)
 
 from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
@@ -23,6 +30,13 @@ from palaestra_trainer.errors import CallbackFailed, ConfigurationError, Trainer
 log = structlog.get_logger(__name__)
 
 FIELD = "algorithm.callbacks"
+# Callbacks of Stable-Baselines3 that need an EvalCallback, and the fields of a job for their work.
+_OF_EVALUATION: Mapping[type[BaseCallback], str] = {
+    EvalCallback: "a run evaluates on simulators of its own; set trainer.evaluation",
+    StopTrainingOnRewardThreshold: "a run ends at a success rate; set trainer.evaluation.stopAtSuccessRate",
+    StopTrainingOnNoModelImprovement: "it works inside an EvalCallback only; write a callback of your own",
+}
+_CHECKPOINTS = "a run saves checkpoints without it; set trainer.checkpoint.everySteps, or give its arguments"
 
 
 def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
@@ -37,7 +51,7 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
         field = f"{FIELD}[{index}]"
         try:
             cls = _class(f"{field}.name", callback.name)
-            _refuse(Arguments(cls, callback.name).mistakes(f"{field}.options", callback.options))
+            _refuse(_about_arguments(field, cls, callback))
             made.append(_Named(callback.name, _made(f"{field}.options", cls, callback)))
         except ConfigurationError as error:
             mistakes.append(str(error))
@@ -156,10 +170,19 @@ def _refuse(mistakes: Iterable[str]) -> None:
         raise ConfigurationError("\n".join(lines))
 
 
+def _about_arguments(field: str, cls: type[BaseCallback], callback: Callback) -> Iterator[str]:
+    found = list(Arguments(cls, callback.name).mistakes(f"{field}.options", callback.options))
+    if found and cls is CheckpointCallback:
+        yield f"{field}.name: {_CHECKPOINTS}"
+    yield from found
+
+
 def _class(field: str, name: str) -> type[BaseCallback]:
     if not own.names_class(name):
         raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
     cls = own.class_named(name, field, BaseCallback)
+    if cls in _OF_EVALUATION:
+        raise ConfigurationError(f"{field}: {name} is refused: {_OF_EVALUATION[cls]}")
     if inspect.isabstract(cls):
         raise ConfigurationError(f"{field}: {name} has no _on_step; add this method")
     return cls

@@ -39,4 +39,16 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
             f"environment.id: {wanted.environment.id} has no {COMPUTE_REWARD}, which HerReplayBuffer needs; "
             "add it as in gymnasium-robotics, or remove replay_buffer_class"
         )
+    _refuse_other_rewards(judge)
     return judge
+
+
+def _refuse_other_rewards(env: gymnasium.Env[Any, Any]) -> None:
+    """Refuse wrappers that change the reward of a step, since `compute_reward` returns it unchanged."""
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, gymnasium.RewardWrapper):
+            raise ConfigurationError(
+                f"environment.wrappers: {type(env).__name__} changes rewards, and HerReplayBuffer computes "
+                f"those of other goals by {COMPUTE_REWARD}, without it; remove it, or replay_buffer_class"
+            )
+        env = env.env

@@ -42,6 +42,7 @@ class Policy:
         model: the Stable-Baselines3 model, which learned from normalized observations.
         environment_id: name of the environment that it learned in.
         environment_options: keyword arguments of that environment, without robot and scene.
+        environment: that environment as the job has it, with its wrappers.
         scales: mean, variance, clip and epsilon by the key of the observation, by "" if it has none; what is
             not in it is not normalized.
     """
@@ -49,10 +50,11 @@ class Policy:
     model: BaseAlgorithm
     environment_id: str
     environment_options: dict[str, Any]
+    environment: Environment
     scales: Mapping[str, Scale]
 
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-        """Return the environment that the policy learned in, with a robot and its scene.
+        """Return the environment that the policy learned in and its wrappers, with a robot and its scene.
 
         The environment gets those of the two that its signature accepts, as in a run.
 
@@ -60,8 +62,7 @@ class Policy:
             ConfigurationError: it is not registered, or its signature does not fit.
             MissingCapability: the robot lacks one of its `needs`.
         """
-        wanted = Environment(id=self.environment_id, options=self.environment_options)
-        return make_environment(wanted, robot, scene)
+        return make_environment(self.environment, robot, scene)
 
     def predict(
         self,
@@ -105,6 +106,7 @@ def load_policy(run_or_zip: str | Path) -> Policy:
         model=_load(model, configuration),
         environment_id=environment.id,
         environment_options=keywords(environment),
+        environment=environment,
         scales=_scales(model),
     )
 

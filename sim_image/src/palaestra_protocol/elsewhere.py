@@ -1,0 +1,82 @@
+"""Words of other projects, and their places in a TrainingJob.
+
+Operator and trainer meet the same words: in a section of a job, and among its hyperparameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+_BUFFER = "a run has buffers of its own, which keep rows of broken simulators out of every loss; leave it out"
+_VECTOR = "a run makes the vector environment itself; write wrappers of one as trainer.environment.wrappers"
+_EVALUATION = "write trainer.evaluation"
+_COUNT = "write the count of a group of spec.simulators with role Collect"
+_STEPS = "write trainer.steps"
+_NORMALIZE = "write trainer.algorithm.normalize"
+
+# Words of RL-Baselines3-Zoo's files, arguments that a run itself gives to classes of Stable-Baselines3, and
+# words of its `learn`, its callbacks and other libraries for what a job has in a field.
+ELSEWHERE: Mapping[str, str] = MappingProxyType(
+    {
+        "_init_setup_model": "a run sets its model up itself; leave it out",
+        "action_noise": "write noise_type and noise_std",
+        "callback": "write trainer.algorithm.callbacks",
+        "clip_obs": "write trainer.algorithm.normalize.clipObservations",
+        "clip_reward": "write trainer.algorithm.normalize.clipRewards",
+        "device": "the trainer takes the GPU that its resources ask for; leave it out",
+        "env": "write trainer.environment",
+        "env_kwargs": "write trainer.environment.options",
+        "env_wrapper": "write trainer.environment.wrappers",
+        "eval_episodes": f"{_EVALUATION}.episodes",
+        "eval_freq": f"{_EVALUATION}.everySteps",
+        "frame_stack": "write trainer.environment.frameStack",
+        "log_interval": "the log of a run has every figure; leave it out",
+        "max_episode_steps": "write trainer.environment.options.max_episode_steps",
+        "max_steps": "write trainer.steps, or trainer.environment.options for the steps of an episode",
+        "monitor_kwargs": "a run records return, length and is_success of every episode; leave it out",
+        "n_envs": _COUNT,
+        "n_eval_episodes": f"{_EVALUATION}.episodes",
+        "n_timesteps": _STEPS,
+        "norm_obs": f"{_NORMALIZE}.observations",
+        "norm_reward": f"{_NORMALIZE}.rewards",
+        "normalize": _NORMALIZE,
+        "num_envs": _COUNT,
+        "num_timesteps": _STEPS,
+        "optimize_memory_usage": _BUFFER,
+        "policy": "write trainer.algorithm.policy",
+        "progress_bar": "palaestra run and palaestra watch show the progress; leave it out",
+        "rollout_buffer_class": _BUFFER,
+        "rollout_buffer_kwargs": _BUFFER,
+        "save_freq": "write trainer.checkpoint.everySteps",
+        "seed": "write spec.seed",
+        "tensorboard_log": "every run directory has a folder tensorboard; leave it out",
+        "timesteps": _STEPS,
+        "total_timesteps": _STEPS,
+        "vec_env_wrapper": _VECTOR,
+        "verbose": "the log of a run has every figure; leave it out",
+    }
+)
+# Of these, the words that only a file of RL-Baselines3-Zoo has.
+OF_ZOO = frozenset(
+    {
+        "callback", "env_kwargs", "env_wrapper", "frame_stack", "monitor_kwargs", "n_envs", "n_timesteps",
+        "normalize", "vec_env_wrapper",
+    }
+)  # fmt: skip
+FROM_ZOO = "`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo"
+
+_HINDSIGHT = (
+    "HER is a replay buffer; use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer"
+)
+# Algorithms of Stable-Baselines3 and sb3-contrib that a run cannot have, by their names in lower case.
+NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
+    {
+        "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",
+        "her": _HINDSIGHT,
+        "maskableppo": (
+            "MaskablePPO keeps masks of actions in a buffer that has no place for rows of broken simulators, "
+            "and evaluations would act without masks; use PPO, and let the environment ignore such actions"
+        ),
+    }
+)

@@ -1,0 +1,59 @@
+"""Python expressions are read as data, and never evaluated."""
+
+import pytest
+
+from palaestra.zoo.expressions import NotPlain, entries, value
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[1, -2.5, 'a', None, True]", [1, -2.5, "a", None, True]),
+        ("(1, {'a': [dict(b=2)]})", [1, {"a": [{"b": 2}]}]),
+        (" dict() ", {}),
+        ("nn.Tanh", "Tanh"),
+        ("torch.nn.Hardtanh", "torch.nn:Hardtanh"),
+        ("th.optim.Adam", "Adam"),
+        ("my_lab.nets.Own", "my_lab.nets:Own"),
+        ("RMSpropTFLike", "stable_baselines3.common.sb2_compat.rmsprop_tf_like:RMSpropTFLike"),
+    ],
+)
+def test_literals_and_classes_are_read(text, expected):
+    """These are all that Zoo's own files contain."""
+    assert value(text) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('true')",
+        "dict(*a)",
+        "dict(**a)",
+        "{1: 2}",
+        "{**a}",
+        "64 * 2",
+        "-'a'",
+        "not True",
+        "b'bytes'",
+        "1j",
+        "...",
+        "lambda: 1",
+        "a[0].b",
+        "Own",
+        "1 +",
+        "\0",
+        "(" * 500,
+    ],
+)
+def test_anything_else_is_refused(text):
+    """An expression that runs code could come from a stranger's file."""
+    with pytest.raises(NotPlain):
+        value(text)
+
+
+def test_an_entry_that_cannot_be_read_does_not_hide_the_others():
+    """Its fact takes the place of its value."""
+    read = dict(entries("dict(a=1, b=f(), c={'d': 2})"))
+
+    assert (read["a"], read["c"]) == (1, {"d": 2})
+    assert str(read["b"]) == "f() is neither a literal nor the name of a class"

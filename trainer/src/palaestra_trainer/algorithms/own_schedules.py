@@ -1,0 +1,44 @@
+"""Schedules of a job's author: functions of the share of the steps that is left, named as `module:function`.
+
+A model contains the name of the function, never its code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from palaestra_trainer import own
+from palaestra_trainer.errors import ConfigurationError, fact_of
+
+_TRIED = (1.0, 0.5, 0.0)  # shares of the steps that are left
+
+
+def own_schedule(name: str, field: str) -> Callable[[float], float]:
+    """Return the function that `name` names, after a few calls.
+
+    Args:
+        name: `module:function`.
+        field: field of the job, for messages.
+
+    Raises:
+        ConfigurationError: it cannot be imported, or does not return finite numbers of 0 or more.
+    """
+    schedule: Callable[[float], float] = own.object_named(name, f"{field}: {name}")
+    for left in _TRIED:
+        value = _value(schedule, left, f"{field}: {name}({left})")
+        if not (math.isfinite(value) and value >= 0):
+            raise ConfigurationError(
+                f"{field}: {name}({left}) is {value}; return a finite number of 0 or more"
+            )
+    return schedule
+
+
+def _value(schedule: Callable[[float], float], left: float, subject: str) -> float:
+    try:
+        return float(schedule(left))
+    except Exception as error:  # the author's code may raise anything
+        raise ConfigurationError(
+            f"{subject} cannot be used ({fact_of(error)}); name a function that takes the share of the steps "
+            "that is left, 1.0 to 0.0, and returns a number"
+        ) from error
