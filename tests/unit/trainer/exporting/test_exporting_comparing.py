@@ -15,6 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, CombinedExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from palaestra_trainer.configuration import Environment
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting import comparing, onnx_file, safetensors_file
 from palaestra_trainer.exporting.acting import Acting
@@ -35,7 +36,10 @@ def policy_of(cls, seen=NUMBERS, acted=FEW, scales=None, **options):
     name = "MultiInput" if isinstance(seen, spaces.Dict) else "Mlp"
     alias = f"{name}LstmPolicy" if cls is sb3_contrib.RecurrentPPO else f"{name}Policy"
     model = cls(alias, DummyVecEnv([lambda: FakeTask(seen, acted)]), **deepcopy(SMALL) | options)
-    return Policy(model=model, environment_id="", environment_options={}, scales=scales or {})
+    nowhere = Environment(id="nowhere")
+    return Policy(
+        model=model, environment_id="", environment_options={}, environment=nowhere, scales=scales or {}
+    )
 
 
 def compared(policy, file_format=onnx_file):
