@@ -12,6 +12,7 @@ import time
 
 from tests.bench import (
     abroad,
+    hostile,
     learning,
     newcomer,
     operator,
@@ -32,6 +33,7 @@ PARTS = {
     "memory": runs.measure_memory,
     "operator": operator.measure,
     "planning": operator_planning.measure,
+    "hostile": hostile.measure,
     "newcomer": newcomer.measure,
     "plain": plain.measure,
     "learning": learning.measure,

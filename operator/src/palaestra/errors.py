@@ -4,6 +4,9 @@
     ├── TrainingJobError             a TrainingJob cannot be used as it stands
     │   ├── SpecErrors               its spec is wrong: never retried
     │   └── PlanError                no plan can be made of it
+    │       ├── WorldCheckTooCostly  the check of a world takes more than its budget
+    │       ├── WorldRefused         a world is wrong
+    │       └── WorldUnchecked       a world is not checked yet: retried once it is
     ├── LocalError                   the local runner cannot go on (local.errors)
     │   ├── Refused                  the run cannot be started as asked
     │   ├── StartFailed              a container that others wait for did not start
@@ -69,3 +72,15 @@ class SpecErrors(TrainingJobError, ValueError):
 
 class PlanError(TrainingJobError, ValueError):
     """The job cannot be planned in this layout; the message is `<field>: <fact>; <remedy>`."""
+
+
+class WorldCheckTooCostly(PlanError):
+    """The check of a world takes more time or memory than its budget; retrying cannot help."""
+
+
+class WorldRefused(PlanError):
+    """A check that was done before the plan refused a world; the message is that of the check."""
+
+
+class WorldUnchecked(PlanError):
+    """A world has no verdict yet; the message is its field, and the plan succeeds or fails later."""

@@ -16,7 +16,11 @@
 A message names the place, the fact and the remedy.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+MOST_PLACES: Final = 100
+"""Places that an error of a world names; a program wrote a world with more of them."""
 
 
 class SimError(Exception):
@@ -50,7 +54,8 @@ class WorldRefusedError(WorldError):
     """A world has several mistakes; the message has one line for each kind, with all its places.
 
     Attributes:
-        errors: one for each place, in the order of the file. The other attributes are those of the first.
+        errors: one for each place, in the order of the file, at most `MOST_PLACES`. The other attributes are
+            those of the first.
     """
 
     def __init__(self, errors: tuple[WorldError, ...]) -> None:
@@ -62,7 +67,7 @@ class WorldRefusedError(WorldError):
     @property
     def summary(self) -> str:
         """Return one line, for output that shows only one."""
-        return f"{self.world}: {len(self.errors)} places are refused, the first is {self.errors[0]}"
+        return f"{self.world}: {_count(self.errors)} places are refused, the first is {self.errors[0]}"
 
     def __str__(self) -> str:
         kinds: dict[tuple[str, str], list[WorldError]] = {}
@@ -72,12 +77,20 @@ class WorldRefusedError(WorldError):
 
 
 def refusal(errors: Iterable[WorldError]) -> WorldError | None:
-    """Return one error for all errors of a world; None if there are none."""
-    by_text = {str(error): error for error in errors}  # an error in a node that is used twice counts once
+    """Return one error for all errors of a world, or for the first `MOST_PLACES`; None if there are none."""
+    by_text: dict[str, WorldError] = {}
+    for error in errors:
+        by_text[str(error)] = error  # an error in a node that is used twice counts once
+        if len(by_text) == MOST_PLACES:
+            break
     found = sorted(by_text.values(), key=lambda error: (error.line, error.column))
     if len(found) > 1:
         return WorldRefusedError(tuple(found))
     return found[0] if found else None
+
+
+def _count(errors: Sequence[WorldError]) -> str:
+    return f"{len(errors)} or more" if len(errors) == MOST_PLACES else str(len(errors))
 
 
 def _in_one_line(errors: list[WorldError]) -> str:
@@ -86,7 +99,7 @@ def _in_one_line(errors: list[WorldError]) -> str:
     if len(errors) == 1:
         return str(first)
     lines = ", ".join(map(str, dict.fromkeys(error.line for error in errors)))
-    fact = f"{first.fact} ({len(errors)} places, in lines {lines})"
+    fact = f"{first.fact} ({_count(errors)} places, in lines {lines})"
     return str(WorldError(first.world, first.line, first.column, fact, first.remedy))
 
 

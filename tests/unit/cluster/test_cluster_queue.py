@@ -94,6 +94,18 @@ def test_names_are_handed_out_in_the_order_in_which_they_came():
     assert [queue.get(0), queue.get(0), queue.get(0)] == ["a", "b", None]
 
 
+def test_a_crowd_in_one_lane_delays_no_other_lane():
+    """A tenant with a thousand jobs has one turn, as every other tenant has."""
+    queue = WorkQueue(lane=lambda key: key[0])
+    for key in ("a1", "a2", "a3", "b1", "b2", "c1"):
+        queue.add(key)
+
+    taken = [queue.get(0) for _ in range(6)]
+
+    assert taken == ["a1", "b1", "c1", "a2", "b2", "a3"]
+    assert (queue.depth, queue.get(0)) == (0, None)
+
+
 def test_a_worker_that_waits_is_woken_by_work_that_falls_due():
     """No worker polls."""
     queue = WorkQueue()

@@ -28,7 +28,7 @@ from palaestra.decide import (
     prepare,
 )
 from palaestra.observe import Objects, Polled, observe, references
-from palaestra.plan import ClusterLayout, Images
+from palaestra.plan import ClusterLayout, Images, Verdict
 from palaestra_protocol.pod.status import SimulatorStatus, Termination, TrainerStatus
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
@@ -72,6 +72,7 @@ class Scene:
         self.there: dict[tuple[str, str], dict[str, Any]] = {}
         self.denied: dict[int | None, str] = {}
         self.kueue = False
+        self.verdicts: dict[str, Verdict] | None = None  # None: the plan checks the worlds
         self.switchers: dict[str, str] = {}
         self.unadmitted: dict[str, str] = {}
         self.deleted = False
@@ -97,7 +98,8 @@ class Scene:
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
         known = {"polled": self.polled, "denied": self.denied, "switchers": self.switchers}
         objects = Objects(**deepcopy(self.objects), **known, unadmitted=self.unadmitted)
-        observed = replace(observe(job, objects), sources=sources, kueue=self.kueue)
+        asked = {"sources": sources, "kueue": self.kueue, "verdicts": self.verdicts}
+        observed = replace(observe(job, objects), **asked)
         times = Times(now=self.now, clock_s=self.clock_s, record=self.record)
         return decide(job, observed, prepare(job, observed, self.layout), times)
 

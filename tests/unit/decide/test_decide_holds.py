@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 
 from palaestra.api.status import Phase
-from palaestra.decide import Create, accept, wants_whole
+from palaestra.decide import Create, accept, prepare, wants_whole, worlds_to_check
 from palaestra.observe import Lacking, Objects, observe, references
+from palaestra.plan import Verdict
 from tests.e2e.escalations import METADATA
 
 INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
@@ -340,3 +341,58 @@ def test_a_claim_that_only_the_initial_policy_names_counts_as_there(make_scene):
     scene.settle()
 
     assert scene.settle().actions == ()
+
+
+COSTLY = "spec.simulators[0].world.inline: its check takes more than its budget"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "reason", "phase"),
+    [
+        pytest.param(None, "CheckingWorlds", Phase.PENDING, id="not yet"),
+        pytest.param(Verdict(), "Accepted", Phase.PENDING, id="fine"),
+        pytest.param(Verdict(problem="a fact"), "WorldInvalid", Phase.FAILED, id="wrong"),
+        pytest.param(Verdict(problem=COSTLY, too_costly=True), "WorldTooCostly", Phase.FAILED, id="costly"),
+    ],
+)
+def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
+    """It was checked elsewhere, so the bytes of the world do not matter here."""
+    scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "not read"}}, GROUPS[1]])
+    job = accept(scene.raw)
+    [world] = worlds_to_check(job, observe(job, Objects()), scene.layout)
+    scene.verdicts = {} if verdict is None else {world.digest: verdict}
+
+    scene.settle()
+
+    accepted = scene.status.conditions[0]
+    assert (accepted.reason, scene.status.phase) == (reason, phase)
+    assert verdict is None or not verdict.problem or accepted.message == verdict.problem
+
+
+def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
+    """Its owner could have the operator check another one as often as the ConfigMap changes."""
+    scene = make_scene(simulators=WORLD)
+    scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
+    job = accept(scene.raw)
+    sources = {each: config_map({"hall.wbt": WORLD_TEXT}) for each in references(job)}
+    observed = replace(observe(job, Objects()), sources=sources)
+    [world] = worlds_to_check(job, observed, scene.layout)
+    scene.verdicts = {world.digest: Verdict(problem=COSTLY, too_costly=True)}
+
+    scene.settle()
+
+    assert scene.status.phase is Phase.FAILED
+
+
+def test_a_job_whose_worlds_wait_is_not_read_again(make_scene):
+    """It may be large, and nothing else is decided before its worlds are checked."""
+    scene = make_scene(simulators=WORLD)
+    job = accept(scene.raw)
+    observed = replace(observe(job, Objects()), worlds_wait=True)
+
+    for lacks in Lacking:
+        assert not wants_whole(job, observed, scene.layout, lacks)
+    assert worlds_to_check(job, observed, scene.layout) == ()
+    hold = prepare(job, observed, scene.layout).hold
+    assert hold is not None
+    assert (hold.explanation.reason.value, hold.final) == ("CheckingWorlds", False)

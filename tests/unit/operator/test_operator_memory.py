@@ -4,6 +4,7 @@ import pytest
 
 from palaestra.cluster import Forbidden
 from palaestra.decide import accept
+from palaestra.operator.checking import Checking
 from palaestra.operator.denials import Denials
 from palaestra.operator.looking import Looking
 from palaestra.operator.memory import REMEMBERED, Memory
@@ -103,7 +104,8 @@ class Cluster:
 def test_nothing_stays_of_a_job_that_is_gone():
     """Whatever was remembered goes with it, so that memory holds no more than the cluster."""
     cluster, strangers, denials = Cluster(), Strangers(Cluster()), Denials()
-    looking = Looking(cluster, cluster, strangers, denials, dict)
+    checking = Checking(dict, print)
+    looking = Looking(cluster, cluster, strangers, denials, dict, checking)
     job = accept(TRAINING_JOB)
     denials.learn(KEY, UID, {0: Forbidden(403, "Forbidden", "exceeded quota")})
     strangers.meet(KEY, UID, "job-1")

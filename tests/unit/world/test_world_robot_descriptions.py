@@ -141,7 +141,8 @@ def numbers(node: Node, field: str) -> tuple[float, ...]:
 
 def within(node: Node, world: World) -> list[Node]:
     """Return a node and all that is inside it."""
-    return [inner for inner in world.walk() if node.encloses(inner)]
+    start, end = node.span
+    return [inner for inner in world.walk() if start <= inner.span[0] and inner.span[1] <= end]
 
 
 def driven(name: str) -> list[tuple[Node, Node]]:

@@ -25,6 +25,8 @@ class Reason(StrEnum):
     STATUS_UNREADABLE = "StatusUnreadable"
     WORLD_MISSING = "WorldMissing"
     WORLD_INVALID = "WorldInvalid"
+    WORLD_TOO_COSTLY = "WorldTooCostly"
+    CHECKING_WORLDS = "CheckingWorlds"
     CONFIG_MAP_NOT_FOR_JOBS = "ConfigMapNotForJobs"
     SECRET_MISSING = "SecretMissing"
     SECRET_NOT_FOR_JOBS = "SecretNotForJobs"
@@ -95,6 +97,7 @@ HELD = frozenset(
         Reason.NO_KUEUE,
         Reason.WORLD_MISSING,
         Reason.WORLD_INVALID,
+        Reason.WORLD_TOO_COSTLY,
         Reason.SECRET_MISSING,
         Reason.CLAIM_MISSING,
         Reason.CONFIG_MAP_NOT_FOR_JOBS,
@@ -159,6 +162,19 @@ ROWS: dict[Reason, Row] = {
         "{problem}",
         "a world is not a readable `.wbt` file or model of MuJoCo, or refers to other files",
         "correct the world; the operator reads a changed ConfigMap automatically",
+    ),
+    Reason.WORLD_TOO_COSTLY: Row(
+        "{problem}",
+        "the check of a world took more processor time or memory than the operator gives to one world",
+        "make the world smaller, or put it into the image and name it with `world.file`, in a new "
+        "TrainingJob",
+    ),
+    Reason.CHECKING_WORLDS: Row(
+        "the worlds of the job are checked before anything is created; the large worlds of a namespace are "
+        "checked one after the other",
+        "the operator checks large worlds in a process of its own, for one job of a namespace at a time",
+        "nothing; if it takes minutes, other jobs of the namespace come first",
+        warning=False,
     ),
     Reason.CONFIG_MAP_NOT_FOR_JOBS: Row(
         '{field}: ConfigMap {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',

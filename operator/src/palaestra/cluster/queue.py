@@ -3,6 +3,9 @@
 A name that is added while a worker has it is handed out again after that worker is done. So no change is
 missed, and two workers never work on one object. The queue holds names, not events: a worker reads the
 current state of the object.
+
+Names are in lanes, which take turns. So a thousand names of one lane delay a name of another lane only by the
+work that has begun.
 """
 
 import heapq
@@ -23,12 +26,18 @@ def _nobody(seconds: float) -> None:
     del seconds
 
 
+def _one_lane(key: Hashable) -> Hashable:
+    del key
+    return None
+
+
 class WorkQueue(Generic[Item]):
     """A deduplicating queue with delays; safe to use from several threads.
 
     Args:
         again: the wait of a name whose work failed.
         waited: called with the seconds for which a name was ready before a worker took it.
+        lane: returns the lane of a name.
         clock: a monotonic clock, in seconds.
     """
 
@@ -37,13 +46,15 @@ class WorkQueue(Generic[Item]):
         *,
         again: Backoff = RETRY,
         waited: Callable[[float], None] = _nobody,
+        lane: Callable[[Item], Hashable] = _one_lane,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._again = again
         self._waited = waited
+        self._lane = lane
         self._clock = clock
         self._changed = threading.Condition()
-        self._ready: deque[Item] = deque()
+        self._ready: dict[Hashable, deque[Item]] = {}  # by lane, that of the next turn first
         self._since: dict[Item, float] = {}  # names that wait for a worker, also if one has them now
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []
@@ -57,7 +68,7 @@ class WorkQueue(Generic[Item]):
         """Return how many names are ready for a worker."""
         with self._changed:
             self._promote(self._clock())
-            return len(self._ready)
+            return sum(map(len, self._ready.values()))
 
     @property
     def closed(self) -> bool:
@@ -116,7 +127,7 @@ class WorkQueue(Generic[Item]):
         with self._changed:
             self._working.discard(key)
             if key in self._since:
-                self._ready.append(key)
+                self._line_up(key)
                 self._changed.notify_all()
 
     def close(self) -> None:
@@ -130,10 +141,17 @@ class WorkQueue(Generic[Item]):
             return
         self._since[key] = now
         if key not in self._working:
-            self._ready.append(key)
+            self._line_up(key)
+
+    def _line_up(self, key: Item) -> None:
+        self._ready.setdefault(self._lane(key), deque()).append(key)
 
     def _take(self, now: float) -> Item:
-        key = self._ready.popleft()
+        lane = next(iter(self._ready))
+        line = self._ready.pop(lane)
+        key = line.popleft()
+        if line:
+            self._ready[lane] = line  # behind all other lanes
         self._waited(now - self._since.pop(key))
         self._working.add(key)
         return key

@@ -5,6 +5,7 @@ those that keep a job from starting; `JUDGED` in `judging` has those of a replic
 
     job = accept(raw)                                  # Refused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
+    # add the verdicts of worlds_to_check(job, observed, layout) to the observation
     planned = prepare(job, observed, layout)           # plans only what is still missing
     decision = decide(job, observed, planned, Times(now=..., clock_s=..., record=...))
     # do decision.actions, write fitted(raw, as_data(decision.status)) if write_in_s(...) is 0, then
@@ -30,7 +31,7 @@ from palaestra.decide.decision import (
     Stop,
 )
 from palaestra.decide.fitting import fitted
-from palaestra.decide.preparing import Prepared, complete, prepare, resuming, wants_whole
+from palaestra.decide.preparing import Prepared, complete, prepare, resuming, wants_whole, worlds_to_check
 from palaestra.decide.times import Record, Times
 from palaestra.decide.writing import as_data, write_in_s
 
@@ -59,5 +60,6 @@ __all__ = [
     "reject",
     "resuming",
     "wants_whole",
+    "worlds_to_check",
     "write_in_s",
 ]

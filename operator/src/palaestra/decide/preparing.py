@@ -12,11 +12,12 @@ from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.suspending import to_resume
+from palaestra.errors import WorldCheckTooCostly, WorldRefused, WorldUnchecked
 from palaestra.observe.reading import part
 from palaestra.observe.shortening import Lacking
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind
-from palaestra.plan import ClusterLayout, Images, Plan, PlanError, plan
+from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
 from palaestra_sim.errors import WorldError
 
 
@@ -71,13 +72,29 @@ def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Pre
         return Prepared(hold=hold)
     layout = _at_acceptance(job, layout)
     try:
-        planned = plan(job, layout, _worlds(job, observed), _lacking(job, observed))
+        planned = plan(
+            job, layout, _worlds(job, observed), _lacking(job, observed), verdicts=observed.verdicts
+        )
         return Prepared(plan=planned, images=layout.images)
-    except PlanError as error:
-        return Prepared(hold=_hold(Reason.INVALID_SPEC, final=True, problem=error))
-    except WorldError as error:
+    except WorldUnchecked:
+        return Prepared(hold=_hold(Reason.CHECKING_WORLDS))
+    except WorldCheckTooCostly as error:
+        return Prepared(hold=_hold(Reason.WORLD_TOO_COSTLY, final=True, problem=error))
+    except (WorldError, WorldRefused) as error:
         mendable = any(group.world.config_map for group in job.spec.simulators)
         return Prepared(hold=_hold(Reason.WORLD_INVALID, final=not mendable, problem=error))
+    except PlanError as error:
+        return Prepared(hold=_hold(Reason.INVALID_SPEC, final=True, problem=error))
+
+
+def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> tuple[GivenWorld, ...]:
+    """Return the worlds whose verdicts the plan of a job needs; none while it is not planned next."""
+    if complete(job, observed) or _held(job, observed, layout) is not None:
+        return ()
+    try:
+        return given_worlds(job, _worlds(job, observed))
+    except PlanError:  # the plan fails in the same way, whatever the verdicts
+        return ()
 
 
 def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
@@ -93,6 +110,8 @@ def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lac
     `lacks` is the part of the API server's object that `job` lacks. While a hold remains, the worlds are not
     read.
     """
+    if observed.worlds_wait:
+        return False
     if lacks is Lacking.FIELDS and resuming(job, observed):
         return True
     if lacks is None or complete(job, observed):
@@ -130,6 +149,12 @@ def _allows(allowed: tuple[str, ...], key: str) -> bool:
     """Return whether a key is among `allowed`, itself or by its domain."""
     domain, slash, _ = key.partition("/")
     return key in allowed or (bool(slash) and f"{domain}/" in allowed)
+
+
+def worlds_are_checked(job: TrainingJob, observed: Observed) -> Hold | None:
+    """The check of a large world takes seconds, and those of one namespace wait for each other."""
+    del job
+    return _hold(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
 
 
 def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -184,6 +209,7 @@ def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
 
 
 HOLDS: tuple[Check, ...] = (
+    worlds_are_checked,
     no_queue_without_kueue,
     sources_are_there,
     sources_are_for_jobs,

@@ -10,6 +10,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
+from palaestra.plan import Verdicts
 from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
@@ -325,7 +326,8 @@ class ReplicaObserved:
 class Observed:
     """The observation of a TrainingJob.
 
-    The operator adds `sources` and `kueue`, which it requests only while objects of the job are missing.
+    The operator adds `sources`, `kueue`, `verdicts` and `worlds_wait`, which it needs only while objects of
+    the job are missing.
 
     Attributes:
         replicas: one for each replica of the spec, by index.
@@ -334,6 +336,9 @@ class Observed:
         sources: the objects of `references(job)`; None: there is no such object. For a Secret the metadata is
             enough.
         kueue: whether the cluster has Kueue.
+        verdicts: the known results of the checks of the job's worlds; None: the plan checks them itself.
+        worlds_wait: the job's worlds wait for their check, or are being checked; its sources were not
+            requested.
     """
 
     replicas: tuple[ReplicaObserved, ...]
@@ -341,3 +346,5 @@ class Observed:
     edited: tuple[tuple[str, int], ...] = ()
     sources: Mapping[Source, Raw | None] = field(default_factory=dict)
     kueue: bool = False
+    verdicts: Verdicts | None = None
+    worlds_wait: bool = False

@@ -5,6 +5,8 @@
 - `caches`, `following`: the watched objects
 - `asking`, `admissions`, `hindrances`, `switchers`, `strangers`: facts that no watch reports, read on demand
 - `denials`, `memory`, `records`: facts of earlier reconciles, bounded; a restart may lose them
+- `checking`: verdicts on worlds; `turns`: whose worlds are checked next
+- `apart`, `world_program`: the process that checks large worlds
 - `definition`: the cluster's definition of TrainingJobs, compared with this release's
 - `poller`: the trainers' own reports, over the pod network
 - `schedule`: which trainer to poll next, so that silent pods delay no others

@@ -26,6 +26,7 @@ from palaestra.decide import (
     prepare,
     reject,
     wants_whole,
+    worlds_to_check,
 )
 from palaestra.objects import Key, Object
 from palaestra.observe import lacking, trimmed
@@ -119,6 +120,7 @@ class Controller:
             job, seen = self._observe(raw)
         except Refused as refused:
             return _Look(decision=reject(raw, refused, times.now))
+        seen = self._looking.with_verdicts(job, seen, worlds_to_check(job, seen.observed, self._layout))
         prepared = prepare(job, seen.observed, self._layout)
         decision = decide(job, seen.observed, prepared, times)
         return _Look(decision=decision, seen=seen, prepared=prepared)

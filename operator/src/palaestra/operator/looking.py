@@ -8,7 +8,7 @@ Some facts are needed too rarely for a watch. The operator requests them only wh
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
@@ -27,11 +27,13 @@ from palaestra.objects import Key
 from palaestra.observe import Objects, Observed, Polled, Raw, Source, SourceKind, observe, references, whole
 from palaestra.operator.admissions import Admissions
 from palaestra.operator.caches import Caches
+from palaestra.operator.checking import Checking
 from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
 from palaestra.operator.hindrances import Hindrances
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.switchers import Switchers
+from palaestra.plan import GivenWorld
 
 RECHECK_S = 10.0  # while something may be missing
 KUEUE = "kueue.x-k8s.io"
@@ -61,6 +63,7 @@ class Looking:
         strangers: Jobs of other owners that have our names.
         denials: refused creations.
         polled: returns the answers of the trainers, by the pod's uid.
+        checking: checks the worlds of jobs.
     """
 
     def __init__(
@@ -70,12 +73,14 @@ class Looking:
         strangers: Strangers,
         denials: Denials,
         polled: Callable[[], Mapping[str, Polled]],
+        checking: Checking,
     ) -> None:
         self._api = api
         self._caches = caches
         self._strangers = strangers
         self._denials = denials
         self._polled = polled
+        self._checking = checking
         self._hindrances = Hindrances(api)
         self._admissions = Admissions(api)
         self._switchers = Switchers(api)
@@ -138,13 +143,25 @@ class Looking:
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
-        for each in (self._strangers, self._denials, self._hindrances, self._admissions, self._switchers):
-            each.forget(key)
+        parts = (self._strangers, self._denials, self._hindrances, self._admissions, self._switchers)
+        for part in (*parts, self._checking):
+            part.forget(key)
+
+    def with_verdicts(self, job: TrainingJob, seen: Seen, worlds: Sequence[GivenWorld]) -> Seen:
+        """Return the observation of a job completed with the verdicts on its worlds, as far as known."""
+        key = (job.metadata.namespace, job.metadata.name)
+        if seen.observed.worlds_wait:
+            return seen
+        verdicts = self._checking.verdicts(key, worlds)
+        return replace(seen, observed=replace(seen.observed, verdicts=verdicts))
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
         """Return the observation completed by requests, and the seconds until the next ones."""
         if complete(job, observed) and not resuming(job, observed):
             return observed, None
+        key = (job.metadata.namespace, job.metadata.name)
+        if self._checking.waits(key) and not resuming(job, observed):
+            return replace(observed, worlds_wait=True), None  # the end of the check queues the job
         namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
         sources = {reference: self._source(namespace, reference) for reference in references(job)}
         kueue = queued and self._has_kueue()

@@ -16,7 +16,9 @@ from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
 from palaestra.objects import Key
 from palaestra.operator import health
 from palaestra.operator.acting import Acting
+from palaestra.operator.apart import Apart
 from palaestra.operator.caches import Caches
+from palaestra.operator.checking import Checking
 from palaestra.operator.controller import Controller
 from palaestra.operator.definition import Definition
 from palaestra.operator.denials import Denials
@@ -54,7 +56,7 @@ class Operator:
         self._options = options
         self._gate = threading.Event()
         api.on_request = metrics.request
-        self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
+        self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited, lane=_namespace)
         self._caches = Caches(api, options.namespaces, self._changed)
         self._definition = Definition(api, self._look_at_all)
         self._poller = Poller(self._trainers, self._queue.add)
@@ -62,9 +64,11 @@ class Operator:
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
         self._writer = writer = Writer(api, self._term)
         strangers, denials = Strangers(api), Denials()
+        self._apart = Apart()
+        self._checking = Checking(self._apart.check, self._queue.add)
         self._controller = Controller(
             self._caches,
-            Looking(api, self._caches, strangers, denials, self._poller.known),
+            Looking(api, self._caches, strangers, denials, self._poller.known, self._checking),
             Acting(api, writer, strangers, denials),
             Reporting(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
             _layout(options),
@@ -93,6 +97,7 @@ class Operator:
         self._definition.follow(stopping, self._options.resync_s)
         self._caches.start()
         self._workers.start()
+        self._checking.start()
         self._poller.start()
         try:
             while not stopping.is_set() and not self._caches.wait_synced(SYNC_S):
@@ -147,6 +152,8 @@ class Operator:
     def _end(self) -> None:
         """Stop in the safe order: first the writes, then the Lease, then the rest."""
         self._gate.clear()
+        self._checking.stop()
+        self._apart.stop()
         self._workers.stop(FINISH_S)
         self._leadership.stop(RELEASE_S)
         self._poller.stop(STOP_S)
@@ -176,6 +183,10 @@ def run(options: Options, metrics: Metrics | None = None) -> int:
     operator = Operator(connect(options.kubeconfig, options.context), options, metrics or Metrics())
     operator.run(stopping)
     return FAILED if broken else 0
+
+
+def _namespace(key: Key) -> str:
+    return key[0]
 
 
 def _layout(options: Options) -> ClusterLayout:

@@ -19,11 +19,13 @@ from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Pl
 from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
-from palaestra.plan.worlds import ConfigMaps, Files, named_files, source_files
+from palaestra.plan.verdicts import GivenWorld, Verdict, Verdicts
+from palaestra.plan.worlds import ConfigMaps, Files, given_worlds, named_files, source_files
 
 __all__ = [
     "ClusterLayout",
     "ConfigMaps",
+    "GivenWorld",
     "Images",
     "Layout",
     "LocalLayout",
@@ -32,6 +34,9 @@ __all__ = [
     "PlanError",
     "Ports",
     "ReplicaPlan",
+    "Verdict",
+    "Verdicts",
+    "given_worlds",
     "identified",
     "plan",
 ]
@@ -72,18 +77,23 @@ class Plan:
 
 
 def plan(
-    job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None, mounted: Mounted | None = None
+    job: TrainingJob,
+    layout: Layout,
+    config_maps: ConfigMaps | None = None,
+    mounted: Mounted | None = None,
+    verdicts: Verdicts | None = None,
 ) -> Plan:
     """Return the plan of a job that has a uid.
 
     `config_maps` holds the worlds of `configMap` sources, by name and key. `mounted` names the replicas to
-    plan; by default all of them, as if none had a Job.
+    plan; by default all of them, as if none had a Job. `verdicts` are the results of the checks of its
+    worlds; without them the worlds are checked here.
 
     Raises:
-        PlanError: the job cannot be planned in this layout.
+        PlanError: the job cannot be planned in this layout, or not yet.
         WorldError: one of its worlds is wrong.
     """
-    sources = source_files(job, config_maps or {})
+    sources = source_files(job, config_maps or {}, verdicts)
     chosen = dict.fromkeys(range(job.spec.replicas), ()) if mounted is None else mounted
     planned = {
         index: _replica_plan(Replica(job=job, index=index, layout=layout), sources, volumes)

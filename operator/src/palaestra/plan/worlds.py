@@ -1,8 +1,8 @@
 """The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
 
-Each source is parsed and checked here, once for all replicas, so that what is wrong with it is known
-before anything is created. Its sidecar alone writes the ROS names of a simulator into it; `file` sources
-lie in the image, and are left to the sidecar altogether.
+Each source is checked once for all replicas, so that a mistake in it is known before anything is created. The
+plan checks it, or the operator does before the plan and passes the verdicts. Only the sidecar writes the ROS
+names of a simulator into a world. Sources of `file` are in the image, and only the sidecar reads them.
 """
 
 from collections.abc import Mapping
@@ -10,9 +10,11 @@ from collections.abc import Mapping
 from palaestra.api import Driver, SimulatorGroup, TrainingJob, World
 from palaestra.errors import PlanError
 from palaestra.plan.replica import PlannedSimulator, Replica
+from palaestra.plan.verdicts import GivenWorld, Verdicts, require_fine
 from palaestra_sim.world import MJCF, WBT, builtin, check, generate, suffix
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
+MOST_GENERATED_BYTES = 65_536  # of the worlds that are generated here: each costs time of the operator itself
 FOLDER = "worlds"
 
 _READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
@@ -21,47 +23,85 @@ ConfigMaps = Mapping[tuple[str, str], bytes]  # (name, key) -> content
 Files = Mapping[str, bytes]  # what goes into a ConfigMap, by file name
 
 
-def source_files(job: TrainingJob, config_maps: ConfigMaps) -> Files:
+def source_files(job: TrainingJob, config_maps: ConfigMaps, verdicts: Verdicts | None = None) -> Files:
     """Return the source worlds that go into the ConfigMap of every replica, each checked.
+
+    Without `verdicts` they are checked here, in a time proportional to their bytes.
+
+    Raises:
+        PlanError: a ConfigMap is not among `config_maps`, the worlds are too big, or a verdict is missing or
+            a refusal.
+        WorldError: a world is wrong.
+    """
+    sources = _sources(job, config_maps)
+    given = _given(job, sources)
+    if verdicts is not None:
+        require_fine({world.digest: world for world in given}, verdicts)
+    else:
+        for world in given:
+            check(world.source, world.field)
+    groups = job.spec.simulators
+    return {_of_group(groups[place], source): source for place, source in sources.items()}
+
+
+def given_worlds(job: TrainingJob, config_maps: ConfigMaps) -> tuple[GivenWorld, ...]:
+    """Return the worlds of a job that have to be checked before it is planned.
+
+    Raises:
+        PlanError: as `source_files` does before it checks anything.
+    """
+    return _given(job, _sources(job, config_maps))
+
+
+def _given(job: TrainingJob, sources: Mapping[int, bytes]) -> tuple[GivenWorld, ...]:
+    """Return the worlds that the author of a job wrote, each once; those that ship pass every check."""
+    worlds: dict[bytes, GivenWorld] = {}
+    for place, source in sources.items():
+        world = job.spec.simulators[place].world
+        if world.builtin is None and source not in worlds:
+            worlds[source] = GivenWorld(field=f"spec.simulators[{place}].world.{_kind(world)}", source=source)
+    return tuple(worlds.values())
+
+
+def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
+    """Return the source worlds by the place of their groups, without those that lie in an image.
 
     Raises:
         PlanError: a ConfigMap is not among `config_maps`, or the worlds are too big.
-        WorldError: a world is wrong.
     """
-    files: dict[str, bytes] = {}
-    checked: set[bytes] = set()
+    sources: dict[int, bytes] = {}
     for place, group in enumerate(job.spec.simulators):
-        field = f"spec.simulators[{place}].world"
-        source = _source(group, field, config_maps)
+        source = _source(group, f"spec.simulators[{place}].world", config_maps)
         _require_reader(group, source, place)
-        if source is None:
-            continue
-        if group.world.builtin is None and source not in checked:  # those that ship pass every check
-            check(source, f"{field}.{_kind(group.world)}")
-            checked.add(source)
-        files[_of_group(group, source)] = source
-    if _size(files) > MOST_BYTES:
+        if source is not None:
+            sources[place] = source
+    size = sum(
+        len(_of_group(job.spec.simulators[place], each)) + len(each) for place, each in sources.items()
+    )
+    if size > MOST_BYTES:
         raise PlanError(
-            f"spec.simulators: their worlds take {_size(files)} bytes and {MOST_BYTES} fit in a "
+            f"spec.simulators: their worlds take {size} bytes and {MOST_BYTES} fit in a "
             "ConfigMap; put the worlds into the images and name them with world.file"
         )
-    return files
+    return sources
 
 
 def named_files(replica: Replica, sources: Files) -> Files:
     """Return a replica's worlds as earlier versions put them into its ConfigMap.
 
     They wrote the names in already, a world for each simulator, unless those were too big together.
-    A Job that mounts such a ConfigMap gets the same one again.
+    A Job that mounts such a ConfigMap gets the same one again, if that costs the operator little.
     """
+    given = [(simulator, _file_of(simulator.group, sources)) for simulator in replica.simulators]
+    if sum(len(source) for _, source in given if source is not None) > MOST_GENERATED_BYTES:
+        return sources
     copies: dict[str, bytes] = {}
-    for simulator in replica.simulators:
-        source = _file_of(simulator.group, sources)
+    for simulator, source in given:
         if source is not None:
             copies[f"{simulator.name}{suffix(source)}"] = generate(
                 source, simulator.identity, clock=simulator.keeps_clock
             )
-    return copies if _size(copies) <= MOST_BYTES else sources
+    return copies
 
 
 def world_path(replica: Replica, simulator: PlannedSimulator, files: Files) -> str:
@@ -126,7 +166,3 @@ def _kind(world: World) -> str:
     """Return the field that a world is given by."""
     given = {"inline": world.inline, "configMap": world.config_map, "builtin": world.builtin}
     return next((name for name, value in given.items() if value is not None), "file")
-
-
-def _size(files: Files) -> int:
-    return sum(len(name) + len(content) for name, content in files.items())

@@ -15,6 +15,7 @@ from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
+_LONGEST_GAP = 200  # bytes that are repeated between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
@@ -41,7 +42,7 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
     rows = _rows(strings, ros_name, clock=clock)
     changed = [pair for pair in zip(strings, rows, strict=True) if pair[1] != (pair[0].text,)]
     gap = _gap_before(world, strings[0])
-    separator = b" " if b"#" in gap or not gap else gap
+    separator = b" " if b"#" in gap or not gap or len(gap) > _LONGEST_GAP else gap
     return tuple(_new_row(world, token, row, separator) for token, row in changed)
 
 
@@ -52,13 +53,15 @@ def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[byt
     """
     name, synchronize = quoted(NAME + ros_name), quoted(SYNCHRONIZE)
     rows: list[list[bytes]] = []
+    named = False
     for string in strings:
         row: list[bytes] = []
         rows.append(row)
         options = _options(unquoted(string))
         for option in options:
             if option.startswith(NAME):
-                row += [] if name in chain(*rows) else [name]
+                row += [] if named else [name]
+                named = True
             elif option != CLOCK:
                 row.append(quoted(option) if len(options) > 1 else string.text)
             elif clock:

@@ -5,19 +5,21 @@ No check depends on the simulator: a world that passes once passes for all.
 """
 
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.world.reader import parse
 from palaestra_sim.world.robots import robot_name, ros_robots
 from palaestra_sim.world.source import Source
-from palaestra_sim.world.tokens import Token, unquoted
+from palaestra_sim.world.tokens import Token, glance, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _ADDRESS_FIELD = re.compile(r"(?:url|sound|texture)\Z", re.IGNORECASE)
 _ABSOLUTE = re.compile(r"[a-z][a-z0-9+.-]*://|/", re.IGNORECASE)
+_MOST_NAMED = 20  # robots that an error lists
 _ROS_REMAPPING = re.compile(r"__\w+:=")
 
 
@@ -42,8 +44,11 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
         fact = "the world has no robot"
         yield candidate.source.error(0, fact, 'add one with controller "ros" and supervisor TRUE')
         return
-    others_named = ", ".join(f'"{robot_name(robot)}" (controller "{_controller(robot)}")' for robot in others)
-    fact = f'no robot has the controller "ros": there are {others_named}'
+    named = ", ".join(
+        f'"{robot_name(robot)}" (controller "{_controller(robot)}")' for robot in islice(others, _MOST_NAMED)
+    )
+    more = f" and {len(others) - _MOST_NAMED} others" if len(others) > _MOST_NAMED else ""
+    fact = f'no robot has the controller "ros": there are {named}{more}'
     remedy = 'set controller "ros" on those to be trained, and supervisor TRUE on one'
     yield candidate.source.error(others[0].span[0], fact, remedy)
 
@@ -54,15 +59,16 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     Any DEF of that name counts, although a `USE` means the last one before it; two names make such a world
     clearer.
     """
-    containers = {
-        node.def_name: robot
-        for node in candidate.world.walk()
-        for robot in candidate.robots
-        if node.def_name is not None and node.encloses(robot)
-    }
+    starts = [robot.span[0] for robot in candidate.robots]
+    containers = {}
+    for node in candidate.world.walk():
+        # Nodes nest, so a robot that begins in a node is inside it. The last one in it gives the name.
+        last = bisect_left(starts, node.span[1]) - 1
+        if node.def_name is not None and last >= 0 and starts[last] >= node.span[0]:
+            containers[node.def_name] = candidate.robots[last]
     for node in candidate.world.walk():
         if node.uses in containers:
-            robot = robot_name(containers[node.uses])
+            robot = glance(robot_name(containers[node.uses]))
             fact = f'USE {node.uses} repeats the robot "{robot}" and its ROS name'
             yield candidate.source.error(node.span[0], fact, "write the node out, with its own name")
 

@@ -28,7 +28,7 @@ _ACCESSES = (b"field", b"hiddenField", b"vrmlField", b"unconnectedField", b"depr
 _NUMBERS = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
 _OTHERS: dict[str, tuple[type, ...]] = {"Bool": (bool,), "String": (str,), "Node": (Node, type(None))}
 _TYPES = frozenset(f"{many}F{kind}" for many in "SM" for kind in (*_NUMBERS, *_OTHERS))
-_NOT_CODE = re.compile(rb'\#(?P<comment>[^\n]*) | " (?: [^"\\\n] | \\[^\n] )* " | %[<{]', re.VERBOSE)
+_NOT_CODE = re.compile(rb'\#(?P<comment>[^\n]*) | " (?: [^"\\\n]++ | \\[^\n] )*+ "? | %[<{]', re.VERBOSE)
 _LANGUAGE = re.compile(rb"\s*template\s+language\b")
 
 

@@ -6,16 +6,16 @@ the module `proto` has the others.
 """
 
 import re
+from sys import intern
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world.source import Source
-from palaestra_sim.world.tokens import Token, tokenize, unquoted
+from palaestra_sim.world.tokens import Token, Tokens, glance, tokenize, unquoted
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
 # Four Python calls a level, so 400 of the 1000 that Python allows. An arm nests two nodes a joint.
 MAX_DEPTH = 100
 
-_GLANCE = 40  # characters of a token in an error
 _RESERVED = frozenset(
     (b"DEF", b"USE", b"IS", b"NULL", b"TRUE", b"FALSE", b"PROTO", b"EXTERNPROTO", b"IMPORTABLE")
 )
@@ -47,10 +47,12 @@ def parse_nodes(text: str, name: str) -> World:
 class Reader:
     """A position in a sequence of tokens, and the rules that move it."""
 
-    def __init__(self, source: Source, tokens: tuple[Token, ...]) -> None:
+    def __init__(self, source: Source, tokens: Tokens) -> None:
         self._source = source
         self._tokens = tokens
-        self._at = 0
+        self._coming = iter(tokens)
+        self._next = next(self._coming)
+        self._taken_up_to = 0  # the byte after the last token taken
         self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
         self._last_counts = (
             False  # of two values of one field: Webots reads both, and a world needs no second
@@ -160,7 +162,7 @@ class Reader:
 
     def _span(self, first: Token) -> tuple[int, int]:
         """Return the span from the token `first` to the last one taken."""
-        return (first.start, self._tokens[self._at - 1].end)
+        return (first.start, self._taken_up_to)
 
     def _name(self, role: str) -> str:
         """Take a name; `role` is its description for an error."""
@@ -168,23 +170,24 @@ class Reader:
         if token.kind != "word" or token.text in _RESERVED or not _NAME.fullmatch(token.text):
             fact = f"{shown(token)} where {role} should be"
             raise self._error(token, fact, "remove it or add what is missing before it")
-        return token.text.decode()
+        return intern(token.text.decode())  # a world repeats a few names
 
     def _peek(self) -> Token:
-        return self._tokens[self._at]
+        return self._next
 
     def _take(self) -> Token:
         """Return the next token and move past it, but never past the end."""
-        token = self._tokens[self._at]
+        token = self._next
         if token.kind != "end":
-            self._at += 1
+            self._taken_up_to = token.end
+            self._next = next(self._coming)
         return token
 
     def _skip(self, text: bytes) -> bool:
         """Move past the next token if it is this word or mark; return whether it was."""
-        if self._tokens[self._at].text != text:
+        if self._next.text != text:
             return False
-        self._at += 1
+        self._take()
         return True
 
     def _error(self, token: Token, fact: str, remedy: str) -> WorldError:
@@ -192,8 +195,5 @@ class Reader:
 
 
 def shown(token: Token) -> str:
-    """Return a token for an error message, shortened to `_GLANCE` characters."""
-    if token.kind == "end":
-        return "the end of the file"
-    text = token.text.decode()
-    return text if len(text) <= _GLANCE else text[:_GLANCE] + "…"
+    """Return a token for an error message, shortened."""
+    return "the end of the file" if token.kind == "end" else glance(token.text.decode())

@@ -5,13 +5,16 @@ other, so that every error of a world has its place.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from palaestra_sim.errors import WorldError
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors begin a file in UTF-8 with it
 # Webots takes blanks after the hash, as PROTOs of drones have them.
 _RELEASE = re.compile(rb"#[ \t]*VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
+_CONTINUED = bytes(range(0x80, 0xC0))  # bytes of UTF-8 that begin no character
+_BLOCK = 4096  # bytes between two marks
 _HEADER = re.compile(rb"#[ \t]*VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
 
@@ -26,6 +29,7 @@ class Source:
     name: str
     kind: str = "world"
     headless: bool = False
+    _marks: list["_Mark"] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def begin(self) -> int:
@@ -59,7 +63,35 @@ class Source:
 
     def error(self, offset: int, fact: str, remedy: str) -> WorldError:
         """Return an error at byte `offset`, for the caller to raise."""
-        line_start = self.data.rfind(b"\n", 0, offset) + 1
-        line = self.data.count(b"\n", 0, offset) + 1
-        column = len(self.data[line_start:offset].decode("utf-8", errors="replace")) + 1
-        return WorldError(self.name, line, column, fact, remedy)
+        if not self._marks:
+            self._marks.extend(_marked(self.data))
+        line, column = _after(self._marks[offset // _BLOCK], self.data, offset)
+        return WorldError(self.name, line + 1, column + 1, fact, remedy)
+
+
+class _Mark(NamedTuple):
+    """A place in a file: its offset, the lines before it, and the characters before it in its own line.
+
+    A file has a mark for each block, so that the place of an error costs no walk from the begin of the file,
+    nor of a long line.
+    """
+
+    at: int
+    line: int
+    column: int
+
+
+def _marked(data: bytes) -> list[_Mark]:
+    """Return the marks of a file, one for the begin of each block."""
+    marks = [_Mark(0, 0, 0)]
+    for at in range(_BLOCK, len(data) + 1, _BLOCK):
+        marks.append(_Mark(at, *_after(marks[-1], data, at)))
+    return marks
+
+
+def _after(mark: _Mark, data: bytes, offset: int) -> tuple[int, int]:
+    """Return line and column, from 0, of a byte behind a mark and before the next one."""
+    line = mark.line + data.count(b"\n", mark.at, offset)
+    line_start = data.rfind(b"\n", mark.at, offset) + 1
+    begins, before = (line_start, 0) if line_start else (mark.at, mark.column)
+    return line, before + len(data[begins:offset].translate(None, _CONTINUED))

@@ -6,7 +6,10 @@ other backslash stands for itself.
 """
 
 import re
-from typing import Literal, NamedTuple, cast
+from array import array
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from typing import Final, Literal, NamedTuple, overload
 
 from palaestra_sim.world.source import Source
 
@@ -23,7 +26,9 @@ _TOKEN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-_NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# Possessive, because a long number that is followed by a letter would take quadratic time otherwise.
+_NUMBER = re.compile(rb"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
+GLANCE = 40  # characters that an error shows of one text of a file
 _ESCAPE = re.compile(r'\\(["\\])')
 
 
@@ -36,27 +41,82 @@ class Token(NamedTuple):
     end: int
 
 
-def tokenize(source: Source) -> tuple[Token, ...]:
+_KINDS: Final[tuple[Kind, ...]] = ("string", "number", "word", "mark", "end")
+_PLACE_OF: Final[dict[str, int]] = {kind: place for place, kind in enumerate(_KINDS)}
+
+
+class Tokens(Sequence[Token]):
+    """The tokens of a file, of which only the places are kept: nine bytes for each.
+
+    A `Token` is made when it is asked for. All of them at once would take 150 MB for a file of 1 MB.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._kinds = bytearray()
+        self._starts = array("I")  # no file has 4 GiB
+        self._ends = array("I")
+
+    def append(self, kind: str, start: int, end: int) -> None:
+        """Add the next token."""
+        self._kinds.append(_PLACE_OF[kind])
+        self._starts.append(start)
+        self._ends.append(end)
+
+    def index_at(self, offset: int, first: int = 0) -> int:
+        """Return the index of the token at byte `offset`, or of the next one; it is `first` or larger."""
+        return bisect_left(self._starts, offset, lo=first)
+
+    def __len__(self) -> int:
+        """Return how many they are, with the one of kind `end`."""
+        return len(self._kinds)
+
+    @overload
+    def __getitem__(self, index: int) -> Token: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Token, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Token | tuple[Token, ...]:
+        """Return a token, or several as a tuple."""
+        if isinstance(index, slice):
+            return tuple(map(self._token, self._kinds[index], self._starts[index], self._ends[index]))
+        return self._token(self._kinds[index], self._starts[index], self._ends[index])
+
+    def __iter__(self) -> Iterator[Token]:
+        """Yield the tokens in order."""
+        return map(self._token, self._kinds, self._starts, self._ends)
+
+    def _token(self, kind: int, start: int, end: int) -> Token:
+        return Token(_KINDS[kind], self._data[start:end], start, end)
+
+
+def tokenize(source: Source) -> Tokens:
     """Return the tokens of a world in order, closed by an empty one of kind `end`.
 
     Raises:
         WorldError: a string is never closed, a number is malformed, or a character is not allowed.
     """
-    tokens = []
+    tokens = Tokens(source.data)
     for match in _TOKEN.finditer(source.data, source.begin):
         kind = match.lastgroup
-        if kind == "gap":
+        if kind == "gap" or kind is None:
             continue
         if kind == "stray" or (kind == "number" and not _NUMBER.fullmatch(match.group())):
             raise _misfit(source, match)
-        tokens.append(Token(cast("Kind", kind), match.group(), match.start(), match.end()))
-    tokens.append(Token("end", b"", len(source.data), len(source.data)))
-    return tuple(tokens)
+        tokens.append(kind, match.start(), match.end())
+    tokens.append("end", len(source.data), len(source.data))
+    return tokens
 
 
 def quoted(text: str) -> bytes:
     """Return `text` as a string of a world file, with its quotes."""
     return b'"' + text.replace("\\", "\\\\").replace('"', '\\"').encode() + b'"'
+
+
+def glance(text: str) -> str:
+    """Return a text of a file as an error shows it: shortened to `GLANCE` characters."""
+    return text if len(text) <= GLANCE else text[:GLANCE] + "…"
 
 
 def unquoted(token: Token) -> str:
@@ -71,7 +131,7 @@ def _misfit(source: Source, match: re.Match[bytes]) -> Exception:
         fact = "this string is not closed on its line"
         return source.error(match.start(), fact, 'add the missing "')
     if match.lastgroup == "number":
-        fact = f"{text.decode()} is neither a number nor a name"
+        fact = f"{glance(text.decode())} is neither a number nor a name"
         return source.error(match.start(), fact, "a name begins with a letter")
     fact = f"control character 0x{text[0]:02x} outside a string"
     return source.error(match.start(), fact, "remove it")

@@ -5,12 +5,11 @@ Robot or a PROTO, and find the `DEF` of a `USE`. Nothing is resolved, and every 
 its bytes.
 """
 
-from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from palaestra_sim.world.tokens import Token
+from palaestra_sim.world.tokens import Token, Tokens
 
 Item: TypeAlias = "float | bool | str | Node | Is | None"
 
@@ -74,10 +73,6 @@ class Node:
         """Return the nodes of a field, including each `USE`; () if it is absent."""
         return tuple(item for item in self._items(name) if isinstance(item, Node))
 
-    def encloses(self, other: "Node") -> bool:
-        """Return whether `other`, of the same world, is this node or is inside it."""
-        return self.span[0] <= other.span[0] and other.span[1] <= self.span[1]
-
     def _items(self, name: str) -> tuple[Item, ...]:
         value = self.fields.get(name)
         return () if value is None else value.items
@@ -94,21 +89,21 @@ class World:
     header: str
     nodes: tuple[Node, ...]
     externs: tuple[Token, ...] = field(repr=False)
-    tokens: tuple[Token, ...] = field(repr=False)
+    tokens: Tokens = field(repr=False, compare=False)
 
     def walk(self) -> Iterator[Node]:
         """Yield every node, parents before children, in source order."""
         return walk(self.nodes)
 
-    def inside(self, value: Value) -> tuple[Token, ...]:
-        """Return the tokens of a value of this world, including its brackets."""
+    def inside(self, value: Value) -> Iterator[Token]:
+        """Yield the tokens of a value of this world, including its brackets."""
         start, end = value.span
         first = self.index(start)
-        return self.tokens[first : bisect_left(self.tokens, end, lo=first, key=_start)]
+        return map(self.tokens.__getitem__, range(first, self.tokens.index_at(end, first)))
 
     def index(self, offset: int) -> int:
         """Return the index of the token at byte `offset`, or of the first one after it."""
-        return bisect_left(self.tokens, offset, key=_start)
+        return self.tokens.index_at(offset)
 
 
 def walk(nodes: Sequence[Node]) -> Iterator[Node]:
@@ -119,7 +114,3 @@ def walk(nodes: Sequence[Node]) -> Iterator[Node]:
         yield node
         inside = [item for value in node.fields.values() for item in value.items if isinstance(item, Node)]
         waiting.extend(reversed(inside))
-
-
-def _start(token: Token) -> int:
-    return token.start

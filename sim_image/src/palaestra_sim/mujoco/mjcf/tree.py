@@ -18,6 +18,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import Item, Node, Value, World
 from palaestra_sim.world.mjcf import Description
+from palaestra_sim.world.tokens import Tokens
 
 _JOINTS: Final = {1: "BallJoint", 2: "SliderJoint", 3: "HingeJoint"}  # by mjtJoint; a free body has none
 _PARAMETERS: Final = {"HingeJoint": "HingeJointParameters", "SliderJoint": "JointParameters"}
@@ -99,7 +100,8 @@ class _Builder:
             title=_value(self._description.robot),
         )
         nodes = (info, *self._children(0))
-        return World(source=self._description.source.data, header="", nodes=nodes, externs=(), tokens=())
+        data = self._description.source.data
+        return World(source=data, header="", nodes=nodes, externs=(), tokens=Tokens(data))
 
     def _children(self, body: int) -> tuple[Node, ...]:
         model = self._model.model

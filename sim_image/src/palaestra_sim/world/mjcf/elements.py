@@ -36,9 +36,11 @@ class Element:
 
     def walk(self) -> Iterator[Element]:
         """Yield the element and all inside it, parents before children."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        waiting: list[Element] = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting.extend(reversed(element.children))
 
     def named(self, *tags: str) -> Iterator[Element]:
         """Yield what is inside by a path of tags: `named("custom", "text")`."""

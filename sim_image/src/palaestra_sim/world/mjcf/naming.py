@@ -96,11 +96,14 @@ def _named(found: Description, new: str, *, clock: bool) -> bytes:
 def _arguments(present: Iterable[str], new: str, *, clock: bool) -> list[str]:
     """Return the arguments with one `--name=`, one `--synchronize`, and one `--clock` if it may stay."""
     arguments: list[str] = []
+    once = {NAME + new, SYNCHRONIZE, CLOCK}
+    written = set() if clock else {CLOCK}
     for argument in present:
         wanted = NAME + new if argument.startswith(NAME) else argument
-        once = wanted == NAME + new or wanted in {CLOCK, SYNCHRONIZE}
-        if not (once and wanted in arguments) and (wanted != CLOCK or clock):
+        if wanted not in written:
             arguments.append(wanted)
+        if wanted in once:
+            written.add(wanted)
     if NAME + new not in arguments:
         arguments.insert(0, NAME + new)
     if SYNCHRONIZE not in arguments:

@@ -1,0 +1,108 @@
+"""Worlds that cost much to check: in a process with a budget, and never at the cost of other tenants."""
+
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from palaestra.cluster import Api
+from palaestra.operator.apart import Apart
+from palaestra.plan import GivenWorld, Verdict
+from tests.bench.hostile import costly, with_world
+from tests.integration.operator.cluster import Place
+from tests.integration.operator.conftest import Start
+from tests.waiting import eventually
+
+FIELD = "spec.simulators[0].world.inline"
+FINE = GivenWorld(field=FIELD, source=costly(20_000))
+REMEDY = "make the world smaller, or put it into the image and name it with world.file"
+PARENT = """
+import sys
+from palaestra.operator.apart import Apart
+from palaestra.plan import GivenWorld
+from tests.bench.hostile import costly
+Apart(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_000_000))])
+"""
+
+
+def given(size: int) -> GivenWorld:
+    """Return a world of a size whose check costs much."""
+    return GivenWorld(field=FIELD, source=costly(size))
+
+
+def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
+    """The same as those of a check in the same process."""
+    wrong = GivenWorld(field=FIELD, source=b"#VRML_SIM R2023b utf8\n}")
+
+    found = Apart().check([FINE, wrong])
+
+    assert found[FINE.digest] == Verdict()
+    assert found[wrong.digest].problem.startswith(f"{FIELD}:2:1: }} where the type of a node should be")
+
+
+@pytest.mark.parametrize(
+    ("budget", "size", "words"),
+    [
+        pytest.param({"mebibytes": 64}, 900_000, "64 MiB of memory", id="memory"),
+        pytest.param({"seconds": 0, "mebibytes": 1024}, 5_000_000, "0 s of processor time", id="time"),
+    ],
+)
+def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, words: str) -> None:
+    """The message names the field, the budget and the remedy; worlds before it keep their verdicts."""
+    large = given(size)
+
+    found = Apart(**budget).check([FINE, large])
+
+    problem = f"{FIELD}: its check takes more than the {words} that a world has; {REMEDY}"
+    assert found == {FINE.digest: Verdict(), large.digest: Verdict(problem=problem, too_costly=True)}
+
+
+def test_a_deadline_is_no_verdict() -> None:
+    """A busy node passes it, whatever the world."""
+    assert Apart(mebibytes=1024, deadline_s=0.01).check([given(900_000)]) == {}
+
+
+def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
+    """Even if the operator is killed, as a kubelet does."""
+    folder = {"PYTHONPATH": str(Path(__file__).parents[3])}
+    with (tmp_path / "log").open("wb") as log:
+        parent = subprocess.Popen([sys.executable, "-c", PARENT], env=os.environ | folder, stderr=log)
+    children = Path(f"/proc/{parent.pid}/task")
+    child = eventually(
+        lambda: [each for path in children.glob("*/children") for each in path.read_text().split()]
+    )
+
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+
+    eventually(lambda: not Path(f"/proc/{child[0]}").exists())
+
+
+def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: Place, start: Start) -> None:
+    """Their author waits: their jobs say that the worlds are being checked, and are planned one by one."""
+    other = Place(installed, "other")
+    operator = start(f"--namespace={other.name}", "--workers=1")
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda number: place.train(f"evil-{number}", **with_world(500_000, number)), range(3)))
+    eventually(lambda: any(reason(place, number) == "CheckingWorlds" for number in range(3)))
+
+    other.train("small", **with_world(5_000))
+    other.train("large", **with_world(100_000))
+    for name in ("small", "large"):
+        eventually(lambda name=name: other.condition("Accepted", name).get("status") == "True", 60)
+    waiting = [number for number in range(3) if reason(place, number) == "CheckingWorlds"]
+
+    assert waiting != []
+    assert operator.ask("/healthz")
+    eventually(
+        lambda: all(place.condition("Accepted", f"evil-{n}").get("status") == "True" for n in range(3)), 120
+    )
+
+
+def reason(place: Place, number: int) -> str:
+    """Return the reason of a costly job's acceptance."""
+    return str(place.condition("Accepted", f"evil-{number}").get("reason", ""))
