@@ -24,10 +24,10 @@ class Authority:
     folder: Path
 
     @classmethod
-    def create(cls, folder: Path) -> "Authority":
+    def create(cls, folder: Path, *extensions: str) -> "Authority":
         """Make the authority's own key and certificate in a folder that exists."""
-        authority = cls(folder)
-        _openssl("req", "-x509", "-new", *CURVE, *DAY, "-subj", "/CN=control-plane", *_files(authority.pair))
+        authority, subject = cls(folder), ("-subj", "/CN=control-plane")
+        _openssl("req", "-x509", "-new", *CURVE, *DAY, *subject, *_added(extensions), *_files(authority.pair))
         return authority
 
     @property
@@ -37,8 +37,20 @@ class Authority:
 
     def server(self, addresses: Iterable[str]) -> Pair:
         """Make the certificate of a server with these IP addresses."""
-        names = ",".join(["DNS:localhost", *(f"IP:{address}" for address in addresses)])
-        return self._issue(self.folder / "server", "/CN=kube-apiserver", f"subjectAltName={names}")
+        return self._issue(self.folder / "server", "/CN=kube-apiserver", _named(addresses))
+
+    def bare_server(self, addresses: Iterable[str], days: int) -> Pair:
+        """Make the certificate of a server without key identifiers; -1 days: until yesterday."""
+        pair, request, extensions = (self.folder / name for name in ("bare", "request", "extensions"))
+        found = _pair(pair)
+        no_identifiers = "subjectKeyIdentifier=none\nauthorityKeyIdentifier=none\n"
+        extensions.write_text(f"{_named(addresses)}\n{no_identifiers}")
+        asked = ("-out", str(request), "-keyout", str(found.key))
+        _openssl("req", "-new", *CURVE, "-subj", "/CN=kube-apiserver", *asked)
+        signer = ("-CA", str(self.pair.certificate), "-CAkey", str(self.pair.key), "-CAcreateserial")
+        given = ("-in", str(request), "-extfile", str(extensions), "-days", str(days))
+        _openssl("x509", "-req", *given, *signer, "-out", str(found.certificate))
+        return found
 
     def client(self, user: str, group: str, folder: Path) -> Pair:
         """Make the certificate of a user with its files in a folder; an empty group adds no group."""
@@ -51,12 +63,25 @@ class Authority:
         _openssl("genrsa", "-out", str(path), "2048")
         return path
 
-    def _issue(self, path: Path, subject: str, extension: str) -> Pair:
-        pair = Pair(certificate=path.with_name(f"{path.name}.crt"), key=path.with_name(f"{path.name}.key"))
+    def _issue(self, path: Path, subject: str, *extensions: str) -> Pair:
+        pair = _pair(path)
         signer = ("-CA", str(self.pair.certificate), "-CAkey", str(self.pair.key))
-        usage = ("-addext", "keyUsage=critical,digitalSignature", "-addext", extension)
+        usage = _added(("keyUsage=critical,digitalSignature", *extensions))
         _openssl("req", "-x509", "-new", *CURVE, *DAY, *signer, "-subj", subject, *usage, *_files(pair))
         return pair
+
+
+def _pair(path: Path) -> Pair:
+    return Pair(certificate=path.with_name(f"{path.name}.crt"), key=path.with_name(f"{path.name}.key"))
+
+
+def _named(addresses: Iterable[str]) -> str:
+    names = ["DNS:localhost", *(f"IP:{address}" for address in addresses)]
+    return f"subjectAltName={','.join(names)}"
+
+
+def _added(extensions: Iterable[str]) -> list[str]:
+    return [part for extension in extensions for part in ("-addext", extension)]
 
 
 def _files(pair: Pair) -> tuple[str, ...]:

@@ -24,7 +24,8 @@
     │   ├── ServerError              the API server or its store failed (5xx)
     │   ├── TooManyRequests          the API server is busy
     │   └── Unreachable              no readable answer in time
-    │       └── ConnectionBroke      it ended before the answer did; repeat a read (cluster.transport)
+    │       ├── ConnectionBroke      it ended before the answer did; repeat a read (cluster.transport)
+    │       └── Untrusted            the server's certificate is refused
     ├── NotConfigured                no API server is named (cluster.errors)
     ├── CommandFailed                a command in a container failed (cluster.errors)
     ├── ClientError                  a command about a cluster's jobs cannot be carried out (client.errors)

@@ -1,6 +1,8 @@
 """An API server that misbehaves: real sockets, and answers that a test writes down beforehand."""
 
 import json
+import socket
+import ssl
 import struct
 import threading
 from base64 import b64encode
@@ -25,6 +27,7 @@ class Asked:
     query: dict[str, str]
     headers: dict[str, str]
     body: Any
+    lines: tuple[tuple[str, str], ...] = ()  # all headers: a name may come several times
 
     @property
     def watches(self):
@@ -66,7 +69,8 @@ class Exchange(BaseHTTPRequestHandler):
         address = urlsplit(self.path)
         length = int(self.headers.get("Content-Length") or 0)
         body = json.loads(self.rfile.read(length)) if length else None
-        asked = Asked(self.command, address.path, dict(parse_qsl(address.query)), dict(self.headers), body)
+        query, lines = dict(parse_qsl(address.query)), tuple(self.headers.items())
+        asked = Asked(self.command, address.path, query, dict(self.headers), body, lines)
         self.script.next(asked)(self)
 
     do_GET = do_POST = do_PATCH = do_DELETE = answer  # noqa: N815 - the names are http.server's
@@ -169,22 +173,26 @@ def command(*messages: bytes, ends: str = "properly") -> Answer:
 
 
 @contextmanager
-def serving() -> Iterator[tuple[str, Script]]:
-    """Serve on a free port; yields the address and the script."""
+def serving(tls: ssl.SSLContext | None = None, address: str = "127.0.0.1") -> Iterator[tuple[str, Script]]:
+    """Serve on a free port; yields the URL and the script."""
     script = Script()
     handler = type("Scripted", (Exchange,), {"script": script})
 
     class Server(ThreadingHTTPServer):
         daemon_threads = True
+        address_family = socket.AF_INET6 if ":" in address else socket.AF_INET
 
         def handle_error(self, *arguments):
             """The client left first: that is what the tests are about."""
 
-    server = Server(("127.0.0.1", 0), handler)
+    server = Server((address, 0), handler)
+    if tls is not None:  # the handshake is the exchange's, so that a client that refuses stops nobody else
+        server.socket = tls.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()
     try:
-        yield f"http://127.0.0.1:{server.server_port}", script
+        host = f"[{address}]" if ":" in address else address
+        yield f"{'https' if tls else 'http'}://{host}:{server.server_port}", script
     finally:
         script.over.set()
         with suppress(OSError):

@@ -4,13 +4,21 @@ import pytest
 from urllib3 import ProxyManager
 
 from palaestra.cluster import NotConfigured, Unreachable
-from palaestra.cluster.account import FRESH_S, account
+from palaestra.cluster.account import account
+from palaestra.cluster.tokens import FRESH_S
+from tests.control_plane.certificates import Authority
+
+
+@pytest.fixture(scope="module")
+def authority(tmp_path_factory):
+    """The certificate of an authority."""
+    return Authority.create(tmp_path_factory.mktemp("authority")).pair.certificate.read_bytes()
 
 
 @pytest.fixture
-def files(tmp_path, monkeypatch):
+def files(tmp_path, monkeypatch, authority):
     """The files and the environment of a pod; returns the folder."""
-    (tmp_path / "ca.crt").write_text("authority")
+    (tmp_path / "ca.crt").write_bytes(authority)
     (tmp_path / "token").write_text("first\n")
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "10.96.0.1")
     monkeypatch.setenv("KUBERNETES_SERVICE_PORT", "443")
@@ -72,6 +80,31 @@ def test_a_pod_without_an_account_is_refused(files, lost):
 
     with pytest.raises(NotConfigured, match=f"{lost} is missing"):
         account(files)
+
+
+def test_an_authority_that_is_none_is_refused(files):
+    """An error of ssl would end the operator without a word about the file."""
+    (files / "ca.crt").write_text("nothing")
+
+    with pytest.raises(NotConfigured, match="is no certificate"):
+        account(files)
+
+
+def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_path):
+    """Clusters renew theirs, and the operator runs on."""
+    clock = Clock()
+    access_of = account(files, clock)
+    other = tmp_path / "other"
+    other.mkdir()
+    (files / "ca.crt").write_bytes(Authority.create(other).pair.certificate.read_bytes())
+    tls = access_of.pool.connection_pool_kw["ssl_context"]
+
+    access_of.authorization()
+    before = len(tls.get_ca_certs())
+    clock.now_s += FRESH_S
+    access_of.authorization()
+
+    assert (before, len(tls.get_ca_certs())) == (1, 2)
 
 
 def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):

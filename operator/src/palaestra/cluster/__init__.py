@@ -1,11 +1,13 @@
 """The only package that connects to an API server.
 
-Requests and answers are plain JSON. The official client reads a kubeconfig and its credentials; its models
-are not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
+Requests and answers are plain JSON. The official client merges the files of a kubeconfig; its models are
+not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
 
 - `resources`: the kinds of objects and their addresses
 - `connection`: the API server and the identity to use; `access`: its address and credentials
 - `kubeconfig`, `account`: where they come from, outside a pod and in one
+- `identity`, `plugin`, `tokens`, `impersonation`: who asks, and for whom
+- `proxies`, `dialing`, `tls`: the way to the server, and whether it is the right one
 - `limits`: deadlines, and waits before the next attempt
 - `api`: one request, with a deadline
 - `transport`: the bytes of a request
@@ -37,6 +39,7 @@ from palaestra.cluster.errors import (
     ServerError,
     TooManyRequests,
     Unreachable,
+    Untrusted,
 )
 from palaestra.cluster.lease import Leadership
 from palaestra.cluster.limits import Limits
@@ -68,6 +71,7 @@ __all__ = [
     "Store",
     "TooManyRequests",
     "Unreachable",
+    "Untrusted",
     "WorkQueue",
     "connect",
     "namespace_of",

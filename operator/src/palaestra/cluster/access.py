@@ -1,13 +1,13 @@
 """The address, connections and credentials of an API server."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-from urllib.parse import urlsplit
 
 from urllib3 import PoolManager
 
-POOL = 32  # connections kept open: more than there are workers and watches
+from palaestra.cluster.proxies import Proxy
+
+Headers = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,23 +16,15 @@ class Access:
 
     Attributes:
         host: address, as `https://10.0.0.1:443`.
-        pool: connections, with the TLS settings of that server.
+        pool: connections, with the TLS settings of that server, through its proxy.
         authorization: returns the header of that name, None without one; called by one thread at a time.
             Raises Unreachable if the credentials cannot be read.
-        channel: options of a websocket to that host, including its TLS and a proxy.
+        headers: those that every request has besides: whom it acts for. A name may come several times.
+        proxy: where all connections go first, for messages.
     """
 
     host: str
     pool: PoolManager
     authorization: Callable[[], str | None]
-    channel: Mapping[str, Any]
-
-
-def channel_options(tls: Mapping[str, Any], proxy: str | None) -> dict[str, Any]:
-    """Return the options of a websocket; entries of `tls` that are None are left out."""
-    options: dict[str, Any] = {"sslopt": {name: value for name, value in tls.items() if value is not None}}
-    if proxy is not None:
-        address = urlsplit(proxy)
-        options |= {"http_proxy_host": address.hostname, "http_proxy_port": address.port}
-        options["proxy_type"] = "http"
-    return options
+    headers: Headers = ()
+    proxy: Proxy | None = None

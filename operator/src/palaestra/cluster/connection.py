@@ -3,15 +3,15 @@
 import os
 from pathlib import Path
 
+from palaestra.cluster.access import Access
 from palaestra.cluster.account import FILES, account
 from palaestra.cluster.api import Api
-from palaestra.cluster.errors import NotConfigured
+from palaestra.cluster.errors import CONFIGURE, NotConfigured
 from palaestra.cluster.limits import Limits
 from palaestra.cluster.transport import Transport
 
 OWN_NAMESPACE = FILES / "namespace"
 DEFAULT = "default"
-REMEDY = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod with a service account"
 
 
 def connect(kubeconfig: str | None = None, context: str | None = None, limits: Limits | None = None) -> Api:
@@ -26,16 +26,18 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: L
         NotConfigured: no API server is named, or its credentials cannot be read.
     """
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
-    try:
-        if files:
-            from palaestra.cluster.kubeconfig import access  # noqa: PLC0415 - 10 MiB that no pod needs
+    return Api(Transport(_access(files, context), limits or Limits()))
 
-            found = access(files, context)
-        else:
-            found = account()
+
+def _access(files: str | None, context: str | None) -> Access:
+    if files:
+        from palaestra.cluster.kubeconfig import access  # noqa: PLC0415 - 10 MiB that no pod needs
+
+        return access(files, context)
+    try:
+        return account()
     except NotConfigured as error:
-        raise NotConfigured(f"{error}; {REMEDY}") from error
-    return Api(Transport(found, limits or Limits()))
+        raise NotConfigured(f"{error}; {CONFIGURE}") from error
 
 
 def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> str:

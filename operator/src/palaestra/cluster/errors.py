@@ -12,6 +12,7 @@ ApiError                    any answer but success; `retryable` says whether it 
 ├── TooManyRequests         429, with the wait that the server asks for
 ├── ServerError             5xx, the API server or its store is in trouble
 └── Unreachable             no answer, or none that can be read
+    └── Untrusted           the server's certificate is refused: nothing was sent
 NotConfigured               no API server is named, or its credentials cannot be read
 CommandFailed               the exit code of a command in a container is not 0
 
@@ -31,6 +32,7 @@ GONE = 410
 TOO_MANY_REQUESTS = 429
 SERVER_ERROR = 500
 DEFAULT_RETRY_AFTER_S = 1.0
+CONFIGURE = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod with a service account"
 
 
 class NotConfigured(PalaestraError, ValueError):
@@ -123,6 +125,20 @@ class Unreachable(ApiError):
     """No answer in time, or an unreadable one; whether a write took place is unknown."""
 
     retryable = True
+
+
+class Untrusted(Unreachable):
+    """The server's certificate is refused, so nothing was sent.
+
+    Attributes:
+        fact: which server, and what is wrong with its certificate.
+        remedy: what a person does about it.
+    """
+
+    def __init__(self, fact: str, remedy: str) -> None:
+        super().__init__(0, "Untrusted", f"{fact}; {remedy}")
+        self.fact = fact
+        self.remedy = remedy
 
 
 class CommandFailed(PalaestraError):

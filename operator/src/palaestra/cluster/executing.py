@@ -7,10 +7,12 @@ result on a stream of its own. Without a result the output is incomplete.
 import json
 import time
 from collections.abc import Iterator, Mapping
+from socket import socket
 from typing import Any
 
 import websocket
 
+from palaestra.cluster.access import Headers
 from palaestra.cluster.errors import SERVER_ERROR, ApiError, CommandFailed, Unreachable, from_status
 
 PROTOCOLS = ["v5.channel.k8s.io", "v4.channel.k8s.io"]
@@ -20,23 +22,29 @@ EXIT_CODE = "ExitCode"
 UNKNOWN_CODE = -1
 
 
-def open_socket(
-    url: str, headers: Mapping[str, str], options: Mapping[str, Any], wait_s: float
-) -> websocket.WebSocket:
+def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -> websocket.WebSocket:
     """Return the socket of a running command, which the caller closes; a read waits `wait_s` at most.
+
+    Args:
+        connection: to the API server, with TLS and through a proxy where there is one.
+        url: of the command.
+        headers: of the request.
+        wait_s: until the command runs.
 
     Raises:
         ApiError: the API server refuses, or cannot be reached.
     """
+    connection.settimeout(wait_s)
     try:
         return websocket.create_connection(
             url.replace("http", "ws", 1),
+            socket=connection,
             timeout=wait_s,
-            header=[f"{name}: {value}" for name, value in headers.items()],
+            header=[f"{name}: {value}" for name, value in headers],
             subprotocols=PROTOCOLS,
             suppress_origin=True,
             skip_utf8_validation=True,
-            **options,
+            redirect_limit=0,  # credentials go to no other server
         )
     except websocket.WebSocketBadStatusException as error:
         raise from_status(error.status_code, _decoded(error.resp_body)) from error
@@ -44,11 +52,11 @@ def open_socket(
         raise Unreachable(0, "Unreachable", f"{url.partition('?')[0]}: no answer ({error})") from error
 
 
-def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
+def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
     """Yield the command's standard output until it has succeeded.
 
     Args:
-        socket: from `open_socket`; closed at the end.
+        command: from `open_socket`; closed at the end.
         deadline: on the monotonic clock, for all of it.
 
     Raises:
@@ -59,7 +67,7 @@ def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
     said = bytearray()
     try:
         while True:
-            stream, content = _message(socket, deadline)
+            stream, content = _message(command, deadline)
             if stream == STDOUT:
                 yield content
             elif stream == STDERR:
@@ -69,17 +77,19 @@ def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                     raise failure
                 return
     finally:
-        # No closing handshake: a peer that is gone would not answer it.
-        socket.shutdown()
+        # No closing handshake: a peer that is gone would not answer it. The library closes no TLS within TLS.
+        if command.sock is not None:
+            command.sock.close()
+        command.shutdown()
 
 
-def _message(socket: websocket.WebSocket, deadline: float) -> tuple[int, bytes]:
+def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]:
     left_s = deadline - time.monotonic()
     if left_s <= 0:
         raise Unreachable(0, "Timeout", "the command did not end in time")
-    socket.settimeout(left_s)
+    command.settimeout(left_s)
     try:
-        opcode, frame = socket.recv_data_frame(control_frame=True)
+        opcode, frame = command.recv_data_frame(control_frame=True)
     except websocket.WebSocketTimeoutException as error:
         raise Unreachable(0, "Timeout", "the command did not end in time") from error
     except (websocket.WebSocketException, OSError) as error:

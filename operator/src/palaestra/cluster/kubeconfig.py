@@ -1,50 +1,79 @@
-"""A kubeconfig, read by the official client, which supports every kind of credentials that kubectl does.
+"""A kubeconfig, understood as kubectl does.
 
-This module is imported only if a kubeconfig is used, because the client needs 10 MiB of memory.
+The official client merges the files and knows auth-providers. It ignores `as` and passes over the errors of
+plugins, so the rest is read here. This module is imported only if a kubeconfig is used, because the client
+needs 10 MiB of memory.
 """
 
+import base64
+import logging
+import os
+import re
 import ssl
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import yaml
 from kubernetes.client.configuration import Configuration
-from kubernetes.client.rest import RESTClientObject
-from kubernetes.config import ConfigException, list_kube_config_contexts, load_kube_config
+from kubernetes.client.exceptions import OpenApiException
+from kubernetes.config import ConfigException
+from kubernetes.config.kube_config import ConfigNode, KubeConfigLoader, KubeConfigMerger
+from urllib3.exceptions import InsecureRequestWarning, LocationParseError
+from urllib3.util import parse_url
 
-from palaestra.cluster.access import POOL, Access, channel_options
-from palaestra.cluster.errors import NotConfigured, Unreachable
+from palaestra.cluster.access import Access
+from palaestra.cluster.dialing import connections
+from palaestra.cluster.errors import CONFIGURE, NotConfigured, Unreachable
+from palaestra.cluster.identity import PROVIDER, Authorization, authorization
+from palaestra.cluster.impersonation import impersonation
+from palaestra.cluster.proxies import Proxy, proxy_named, proxy_of_environment
+from palaestra.cluster.tls import add_identity, verification
 
-WRONG = (ConfigException, OSError, ValueError, TypeError, KeyError, yaml.YAMLError)
+WRONG = (ConfigException, OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError)
+CURRENT = "current-context"
+SERVER, PROXY, INSECURE, NAME = "server", "proxy-url", "insecure-skip-tls-verify", "tls-server-name"
+AUTHORITY, CERTIFICATE, KEY = "certificate-authority", "client-certificate", "client-key"
+OIDC = "oidc"
+CLUSTER_EXTENSION = "client.authentication.k8s.io/exec"
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A part of a kubeconfig, and the folder of its file, in which relative paths begin."""
+
+    content: Mapping[str, Any]
+    folder: Path
+
+    def bytes_of(self, field: str) -> bytes | None:
+        """Return what a field holds, or the file that it names; `-data` comes first, as for kubectl."""
+        given, path = self.content.get(f"{field}-data"), self.content.get(field)
+        if given:
+            try:
+                return base64.b64decode(str(given), validate=True)
+            except ValueError as error:
+                raise NotConfigured(f"{field}-data is no base64 ({error}); copy it anew") from error
+        return (self.folder / str(path)).read_bytes() if path else None
 
 
 def access(files: str, context: str | None) -> Access:
     """Return the access of a context in a kubeconfig; None is the current context.
 
     Raises:
-        NotConfigured: it cannot be read, or names no API server.
+        NotConfigured: it cannot be read, or something in it is wrong.
     """
-    configuration = Configuration()
-    configuration.connection_pool_maxsize = POOL
-    configuration.keep_alive = True  # the kernel finds peers that are gone, also behind silent proxies
     try:
-        load_kube_config(files, context=context, client_configuration=configuration)
+        merger, config = _merged(files)
+        name = context or str(config[CURRENT])
+        chosen = config["contexts"].get_with_name(name)["context"]
+        cluster = _entry(config["clusters"].get_with_name(chosen["cluster"])["cluster"])
+        user = _user(config, chosen)
+        return _access(files, merger, name, cluster, user)
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
-    host = configuration.host.rstrip("/")
-
-    def authorization() -> str | None:
-        try:
-            settings = configuration.auth_settings()  # reads a token again, or runs a plugin
-        except (ConfigException, OSError) as error:
-            raise Unreachable(0, "NoCredentials", f"credentials for {host}: {error}") from error
-        return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
-
-    return Access(
-        host=host,
-        pool=RESTClientObject(configuration).pool_manager,
-        authorization=authorization,
-        channel=channel_options(_tls(configuration), configuration.proxy),
-    )
 
 
 def namespace(files: str, context: str | None) -> str | None:
@@ -54,31 +83,160 @@ def namespace(files: str, context: str | None) -> str | None:
         NotConfigured: it has no such context, or cannot be read.
     """
     try:
-        contexts: Any = list_kube_config_contexts(files)
+        _, config = _merged(files)
+        name = context or config[CURRENT]
+        chosen = config["contexts"].get_with_name(name, safe=True)
+        found = chosen["context"].safe_get("namespace") if chosen is not None else None
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
-    known, current = contexts
-    chosen = next((entry for entry in known if entry["name"] == context), None) if context else current
     if chosen is None:
-        raise NotConfigured(
-            f"--context: {files} has no {context!r}; `kubectl config get-contexts` names them"
-        )
-    found = chosen["context"].get("namespace")
+        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` names them")
     return str(found) if found else None
 
 
-def _fact(files: str, error: Exception) -> str:
-    return f"{files}: {' '.join(str(error).split())}"  # YAML's mistakes come on several lines
+def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
+    """Return the kubeconfig's files, and the one ConfigNode of all; the first current context decides."""
+    merger = KubeConfigMerger(files)
+    config = merger.config
+    if config is None:
+        raise ConfigException("the file is missing")
+    names = (content.get(CURRENT) for content in merger.config_files.values())
+    if name := next(filter(None, names), None):
+        config.value[CURRENT] = name
+    return merger, config
 
 
-def _tls(configuration: Configuration) -> dict[str, Any]:
-    """Return the TLS settings of the client's configuration as options of the websocket library."""
-    verified = configuration.verify_ssl
-    return {
-        "cert_reqs": ssl.CERT_REQUIRED if verified else ssl.CERT_NONE,
-        "check_hostname": verified and configuration.assert_hostname is not False,
-        "ca_certs": configuration.ssl_ca_cert,
-        "certfile": configuration.cert_file,
-        "keyfile": configuration.key_file,
-        "server_hostname": configuration.tls_server_name,
+def _entry(node: ConfigNode) -> _Entry:
+    if not isinstance(node.value, Mapping):
+        raise ConfigException(f"{node.name} has no fields")
+    return _Entry(node.value, Path(node.path or "").absolute().parent)
+
+
+def _user(config: ConfigNode, chosen: ConfigNode) -> _Entry:
+    """Return the user of a context; without fields if none is named, or the named one is missing."""
+    name = chosen.safe_get("user")
+    found = config["users"].get_with_name(name, safe=True) if name and config.safe_get("users") else None
+    if found is None or not found.safe_get("user"):
+        return _Entry({}, Path())
+    return _entry(found["user"])
+
+
+def _access(files: str, merger: KubeConfigMerger, context: str, cluster: _Entry, user: _Entry) -> Access:
+    authority, insecure = cluster.bytes_of(AUTHORITY), cluster.content.get(INSECURE) is True
+    if authority and insecure:
+        raise NotConfigured(f"{INSECURE} and {AUTHORITY} exclude each other; remove one")
+    tls = _verification(authority, user, insecure=insecure)
+    host = _host(cluster, secure=bool(authority or insecure))
+    proxy = _proxy(cluster, host)
+    found = Access(
+        host=host,
+        pool=connections(tls, proxy, cluster.content.get(NAME) or None),
+        authorization=_authorization(merger, context, user, cluster, tls),
+        headers=impersonation(user.content),
+        proxy=proxy,
+    )
+    if insecure:
+        _warn(files, host, proxy)
+    return found
+
+
+def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> ssl.SSLContext:
+    try:
+        pem = authority.decode("ascii", "ignore") if authority else None  # comments may have other letters
+        found = verification(pem=pem, verified=not insecure)
+    except (OSError, ValueError) as error:
+        raise NotConfigured(f"{AUTHORITY} is no certificate in PEM ({error}); copy it anew") from error
+    certificate, key = user.bytes_of(CERTIFICATE), user.bytes_of(KEY)
+    if certificate and key:
+        try:
+            add_identity(found, certificate, key)
+        except OSError as error:
+            raise NotConfigured(
+                f"{CERTIFICATE} and {KEY} cannot be used together ({error}); copy both anew"
+            ) from error
+    elif certificate or key:
+        missing = KEY if certificate else CERTIFICATE
+        raise NotConfigured(f"{missing} is missing; {CERTIFICATE} and {KEY} belong together")
+    return found
+
+
+def _host(cluster: _Entry, *, secure: bool) -> str:
+    """Return the server's address; without a scheme TLS is used where there are settings for it."""
+    text = str(cluster.content.get(SERVER) or "").strip().rstrip("/")
+    if text and "://" not in text:
+        text = f"{'https' if secure else 'http'}://{text}"
+    try:
+        url = parse_url(text)
+    except LocationParseError:
+        url = parse_url("")
+    if url.scheme not in ("http", "https") or not url.host:
+        raise NotConfigured(f"{SERVER}: {text!r} is no address; write https://HOST:PORT")
+    return text
+
+
+def _proxy(cluster: _Entry, host: str) -> Proxy | None:
+    """Return the proxy of a cluster: its own, whatever NO_PROXY says, or the environment's."""
+    named = cluster.content.get(PROXY)
+    return proxy_named(str(named), PROXY) if named else proxy_of_environment(host, os.environ)
+
+
+def _authorization(
+    merger: KubeConfigMerger, context: str, user: _Entry, cluster: _Entry, tls: ssl.SSLContext
+) -> Authorization:
+    own = authorization(user.content, user.folder, _told_to_plugins(cluster), tls)
+    provider = user.content.get(PROVIDER)
+    if not provider or own() is not None:
+        return own
+    return _of_provider(merger, context, provider)
+
+
+def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, Any]) -> Authorization:
+    if (name := provider.get("name")) != OIDC:
+        raise NotConfigured(f"{PROVIDER}: {name!r} is not known any more; use a plugin under `exec`")
+    configuration = Configuration()
+    base: Any = None  # each file's own folder
+    loader = KubeConfigLoader(
+        merger.config, active_context=context, config_base_path=base, config_persister=merger.save_changes
+    )
+    loader.load_and_set(configuration)
+
+    def header() -> str | None:
+        try:
+            settings = configuration.auth_settings()  # asks for a token again if it has expired
+        except (*WRONG, OpenApiException) as error:
+            raise Unreachable(0, "NoCredentials", f"{PROVIDER} gave no token ({error})") from error
+        return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
+
+    return header
+
+
+def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
+    """Return what a plugin with `provideClusterInfo` learns."""
+    authority = cluster.bytes_of(AUTHORITY)
+    told = {
+        name: cluster.content[name] for name in (SERVER, NAME, INSECURE, PROXY) if cluster.content.get(name)
     }
+    if authority:
+        told[f"{AUTHORITY}-data"] = base64.b64encode(authority).decode()
+    for extension in cluster.content.get("extensions") or ():
+        if extension.get("name") == CLUSTER_EXTENSION:
+            told["config"] = extension.get("extension")
+    return told
+
+
+def _warn(files: str, host: str, proxy: Proxy | None) -> None:
+    """Warn once, in place of urllib3, which warns at every request."""
+    log.warning(
+        "%s: %s is set, so the certificate of %s is not verified: others may read your credentials",
+        files,
+        INSECURE,
+        host,
+    )
+    first = parse_url(proxy.address if proxy else host).host or ""
+    said = re.escape(f"Unverified HTTPS request is being made to host '{first.strip('[]')}'")
+    warnings.filterwarnings("ignore", message=said, category=InsecureRequestWarning)
+
+
+def _fact(files: str, error: Exception) -> str:
+    said = " ".join(str(error).split())  # YAML's mistakes come on several lines
+    return f"{files}: {said}" if isinstance(error, NotConfigured) else f"{files}: {said}; {CONFIGURE}"

@@ -9,15 +9,18 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from socket import socket
 from typing import Any
 from urllib.parse import urlencode
 
-from urllib3 import BaseHTTPResponse, Timeout
+from urllib3 import BaseHTTPResponse, HTTPHeaderDict, Timeout
 from urllib3.exceptions import HTTPError, ProtocolError
 
-from palaestra.cluster.access import Access
-from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, from_status
+from palaestra.cluster.access import Access, Headers
+from palaestra.cluster.dialing import dialed
+from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, Untrusted, from_status
 from palaestra.cluster.limits import Limits
+from palaestra.cluster.tls import refused_certificate
 
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
@@ -135,20 +138,30 @@ class Transport:
 
         started, code = time.monotonic(), 0
         try:
-            headers = {"User-Agent": "palaestra", **self._authorization()}
-            address, options = self.host + call.address, self._access.channel
-            socket = executing.open_socket(address, headers, options, self.limits.call_s)
+            headers = (("User-Agent", "palaestra"), *self._authorization(), *self._access.headers)
+            command = executing.open_socket(
+                self._dial(f"{call.method} {self.host}{call.path}"),
+                self.host + call.address,
+                headers,
+                self.limits.call_s,
+            )
             code = SWITCHED
         except ApiError as error:
             code = error.code
             raise
         finally:
             self.on_request(call.verb, call.plural, code, time.monotonic() - started)
-        return executing.output(socket, deadline)
+        return executing.output(command, deadline)
 
     def close(self) -> None:
         """Close all idle connections."""
         self._pool.clear()
+
+    def _dial(self, what: str) -> socket:
+        try:
+            return dialed(self._pool, self.host, self.limits.connect_s)
+        except (HTTPError, OSError) as error:
+            raise self._unreachable(error, what) from error
 
     def _opened(self, call: Call, timeout: Timeout) -> BaseHTTPResponse:
         response = self._send(call, timeout)
@@ -188,9 +201,11 @@ class Transport:
         return _decoded(_body(response, deadline), f"{call.method} {self.host}{call.path}")
 
     def _send(self, call: Call, timeout: Timeout) -> BaseHTTPResponse:
-        headers = {"Accept": call.accept, "User-Agent": "palaestra", **self._authorization()}
+        headers = HTTPHeaderDict({"Accept": call.accept, "User-Agent": "palaestra"})
         if call.body is not None:
             headers["Content-Type"] = call.media_type
+        for name, value in (*self._authorization(), *self._access.headers):
+            headers.add(name, value.encode().decode("latin-1"))  # as which the library sends what it is given
         try:
             return self._pool.request(
                 call.method,
@@ -203,12 +218,23 @@ class Transport:
                 preload_content=False,
             )
         except (HTTPError, OSError) as error:
-            raise _unreachable(error, f"{call.method} {self.host}{call.path}") from error
+            raise self._unreachable(error, f"{call.method} {self.host}{call.path}") from error
 
-    def _authorization(self) -> dict[str, str]:
+    def _authorization(self) -> Headers:
         with self._credentials:  # one thread reads the token or runs the plugin, for all that wait
             header = self._access.authorization()
-        return {} if header is None else {"Authorization": header}
+        return () if header is None else (("Authorization", header),)
+
+    def _unreachable(self, error: Exception, what: str) -> Unreachable:
+        """Return the error for a request that got no answer; it names the proxy, where there is one."""
+        if (refused := refused_certificate(error)) is not None:
+            fact, remedy = refused
+            return Untrusted(f"{self.host}{self._by_way}: {fact}", remedy)
+        return _unreachable(error, f"{what}{self._by_way}")
+
+    @property
+    def _by_way(self) -> str:
+        return f" by way of the proxy {self._access.proxy.address}" if self._access.proxy else ""
 
     def _refusal(self, response: BaseHTTPResponse, deadline: float) -> ApiError:
         retry_after = response.headers.get("Retry-After")

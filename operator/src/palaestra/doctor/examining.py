@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from palaestra.cluster import ApiError, Forbidden
+from palaestra.cluster import ApiError, Forbidden, Untrusted
 from palaestra.doctor.finding import Check, Finding, Site, Verdict, unknown, wrong
 from palaestra.doctor.installation import images, leads, metrics, operator_rights, runs
 from palaestra.doctor.platform import answers, definition, namespace, nodes, sidecars, storage
@@ -47,5 +47,7 @@ def _findings(what: str, check: Check, site: Site) -> Iterator[Finding]:
         yield from check(site)
     except Forbidden as error:
         yield unknown(what, f"you have no permission: {error.message}", "ask a cluster administrator")
+    except Untrusted as error:
+        yield wrong(what, error.fact, error.remedy)
     except ApiError as error:
         yield wrong(what, str(error), "check the API server and the connection to it")

@@ -1,0 +1,75 @@
+"""Connections to an API server, directly or through a proxy: a pool of them, and one for a websocket."""
+
+import socket
+import ssl
+from typing import Any
+
+from urllib3 import PoolManager, ProxyManager
+from urllib3.contrib.socks import SOCKSProxyManager
+from urllib3.util import make_headers
+
+from palaestra.cluster.proxies import Proxy
+
+POOL = 32  # connections kept open: more than there are workers and watches
+# The kernel finds peers that are gone, also behind silent proxies.
+KEPT_ALIVE = (
+    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),  # as urllib3 has it, whose default these options replace
+    (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 30),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 30),
+    (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 9),
+)
+
+
+def connections(
+    context: ssl.SSLContext, proxy: Proxy | None = None, server_name: str | None = None
+) -> PoolManager:
+    """Return connections with these TLS settings, through a proxy where one is named.
+
+    Args:
+        context: verifies the server, and a proxy that is connected to by TLS.
+        proxy: where all connections go first.
+        server_name: the name that the server's certificate must have; None: its host's.
+    """
+    options: dict[str, Any] = {
+        "maxsize": POOL,
+        "socket_options": KEPT_ALIVE,
+        "ssl_context": context,
+        "server_hostname": server_name,
+    }
+    if proxy is None:
+        return PoolManager(**options)
+    if proxy.socks:
+        return _through_socks(proxy, options)
+    asking = make_headers(proxy_basic_auth=f"{proxy.user}:{proxy.password or ''}") if proxy.user else None
+    return ProxyManager(proxy.address, proxy_headers=asking, proxy_ssl_context=context, **options)
+
+
+def _through_socks(proxy: Proxy, options: dict[str, Any]) -> PoolManager:
+    manager = SOCKSProxyManager(proxy.address, proxy.user, proxy.password, **options)
+    its = manager.connection_pool_kw["_socks_options"]
+    its["proxy_host"] = its["proxy_host"].strip("[]")  # of IPv6 addresses
+    return manager
+
+
+def dialed(pool: PoolManager, server: str, wait_s: float) -> socket.socket:
+    """Return a new connection to a server that no other request uses, TLS included; the caller closes it.
+
+    Raises:
+        urllib3.exceptions.HTTPError, OSError: no connection stands in `wait_s` seconds.
+    """
+    target = pool.connection_from_url(server)
+    first = target.proxy or target
+    # mypy knows only a protocol of the classes, which has no `sock`.
+    connection: Any = target.ConnectionCls(
+        host=first.host or "", port=first.port, timeout=wait_s, **target.conn_kw
+    )
+    if target.proxy is not None:
+        connection.set_tunnel(target.host, target.port, target.proxy_headers, target.proxy.scheme)
+    try:
+        connection.connect()
+    except BaseException:
+        connection.close()
+        raise
+    found: socket.socket = connection.sock
+    return found

@@ -1,0 +1,49 @@
+"""Whom the requests of a kubeconfig's user act for: `as` and its companions, as headers.
+
+Source of the names and of the escapes: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
+"""
+
+import string
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.cluster.access import Headers
+from palaestra.cluster.errors import NotConfigured
+
+USER, UID, GROUPS, EXTRA = "as", "as-uid", "as-groups", "as-user-extra"
+_LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").encode())  # RFC 7230, without %
+
+
+def impersonation(user: Mapping[str, Any]) -> Headers:
+    """Return the headers of a kubeconfig's user; none if it acts for itself.
+
+    Raises:
+        NotConfigured: a value has another type, or nobody is named in `as`.
+    """
+    groups, extra = user.get(GROUPS) or [], user.get(EXTRA) or {}
+    if not isinstance(groups, list):
+        raise NotConfigured(f"{GROUPS}: {groups!r} is no list; write a list of groups")
+    if not isinstance(extra, Mapping) or not all(isinstance(values, list) for values in extra.values()):
+        raise NotConfigured(f"{EXTRA}: {extra!r} is not usable; write a list of texts under each key")
+    name, uid = user.get(USER) or "", user.get(UID) or ""
+    if not name:
+        if groups or extra or uid:
+            raise NotConfigured(f"{USER} is missing beside {GROUPS}, {UID} or {EXTRA}; name the user there")
+        return ()
+    found = [("Impersonate-User", _text(name, USER))]
+    found += [("Impersonate-Uid", _text(uid, UID))] if uid else []
+    found += [("Impersonate-Group", _text(group, GROUPS)) for group in groups]
+    for key, values in extra.items():
+        header = f"Impersonate-Extra-{_escaped(_text(key, EXTRA))}"
+        found += [(header, _text(value, EXTRA)) for value in values]
+    return tuple(found)
+
+
+def _text(value: object, field: str) -> str:
+    if not isinstance(value, str) or not value.isprintable():
+        raise NotConfigured(f"{field}: {value!r} is no text of one line; write it as text, in quotes")
+    return value
+
+
+def _escaped(key: str) -> str:
+    return "".join(chr(byte) if byte in _LEGAL else f"%{byte:02X}" for byte in key.encode())

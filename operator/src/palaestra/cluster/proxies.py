@@ -1,0 +1,138 @@
+"""Which proxy a connection takes, by the environment's variables and a kubeconfig, as kubectl reads them.
+
+Source of the rules: golang.org/x/net/http/httpproxy, which kubectl uses for the environment.
+"""
+
+import ipaddress
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from urllib3.exceptions import LocationParseError
+from urllib3.util import Url, parse_url
+
+from palaestra.cluster.errors import NotConfigured
+from palaestra_protocol.masking import masked
+
+PORTS = {"http": 80, "https": 443, "socks4": 1080, "socks4a": 1080, "socks5": 1080, "socks5h": 1080}
+SOCKS = "socks"
+REMEDY = "write http://HOST:PORT, https://HOST:PORT or socks5://HOST:PORT"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proxy:
+    """A proxy for all connections to one server.
+
+    Attributes:
+        address: `http://proxy:3128`, without credentials.
+        user: the name to give there; None without one.
+        password: of that user.
+    """
+
+    address: str
+    user: str | None = None
+    password: str | None = None
+
+    @property
+    def socks(self) -> bool:
+        """Whether it speaks SOCKS; others are asked with CONNECT."""
+        return self.address.startswith(SOCKS)
+
+
+def proxy_named(text: str, where: str) -> Proxy:
+    """Return the proxy that a text names; without a scheme it is an HTTP proxy, as for curl.
+
+    Names are resolved by SOCKS5 proxies, because kubectl leaves that to them.
+
+    Raises:
+        NotConfigured: it is no address, or the scheme is unknown; the message begins with `where`.
+    """
+    text = text if "://" in text else f"http://{text}"
+    url = _parsed(text)
+    if url is None or not url.host or url.scheme not in PORTS:
+        raise NotConfigured(f"{where}: {masked(text)} is no proxy; {REMEDY}")
+    scheme = "socks5h" if url.scheme == "socks5" else url.scheme
+    user, password = url.auth_decoded
+    address = f"{scheme}://{url.host}:{url.port or PORTS[scheme]}"
+    return Proxy(address=address, user=user or None, password=password)
+
+
+def proxy_of_environment(server: str, environment: Mapping[str, str]) -> Proxy | None:
+    """Return the proxy that the environment names for a server's address; None: connect directly.
+
+    Raises:
+        NotConfigured: the variable names no proxy.
+    """
+    url = _parsed(server)
+    if url is None or not url.host:
+        return None
+    names = ("HTTPS_PROXY", "https_proxy") if url.scheme == "https" else ("HTTP_PROXY", "http_proxy")
+    name = next((name for name in names if environment.get(name)), None)
+    exceptions = environment.get("NO_PROXY") or environment.get("no_proxy") or ""
+    port = url.port or PORTS.get(url.scheme or "", 0)
+    if name is None or connects_directly(url.host.strip("[]"), port, exceptions):
+        return None
+    return proxy_named(environment[name].strip(), name)
+
+
+def connects_directly(host: str, port: int, exceptions: str) -> bool:
+    """Return whether no proxy is used: for this machine itself, and for what NO_PROXY names.
+
+    Args:
+        host: a name or an address, the latter without brackets.
+        port: of the connection.
+        exceptions: the text of NO_PROXY: names with their subdomains, addresses, networks, each with a port
+            or without one, separated by commas; `*` is everything.
+    """
+    host = host.lower().rstrip(".")
+    address = _address(host)
+    if host == "localhost" or (address is not None and address.is_loopback):
+        return True
+    entries = (entry.strip().lower() for entry in exceptions.split(","))
+    return any(_covers(entry, host, address, port) for entry in entries if entry)
+
+
+def _covers(
+    entry: str, host: str, address: ipaddress.IPv4Address | ipaddress.IPv6Address | None, port: int
+) -> bool:
+    if entry == "*":
+        return True
+    if "/" in entry:
+        return address is not None and _in_network(address, entry)
+    name, its_port = _split(entry)
+    if not name or its_port not in ("", str(port)):
+        return False
+    its_address = _address(name)
+    if address is not None or its_address is not None:
+        return address == its_address
+    if name.startswith(("*.", ".")):  # only its subdomains
+        return host.endswith(name.removeprefix("*"))
+    return host == name or host.endswith(f".{name}")
+
+
+def _split(entry: str) -> tuple[str, str]:
+    """Return name and port of an entry, "" without a port."""
+    if _address(entry.strip("[]")) is not None:
+        return entry.strip("[]"), ""
+    name, colon, port = entry.rpartition(":")
+    return (name.strip("[]"), port) if colon else (entry, "")
+
+
+def _in_network(address: ipaddress.IPv4Address | ipaddress.IPv6Address, network: str) -> bool:
+    try:
+        return address in ipaddress.ip_network(network, strict=False)
+    except ValueError:
+        return False
+
+
+def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    try:
+        return ipaddress.ip_address(text)
+    except ValueError:
+        return None
+
+
+def _parsed(text: str) -> Url | None:
+    try:
+        return parse_url(text)
+    except LocationParseError:
+        return None

@@ -1,0 +1,40 @@
+"""A token in a file, which somebody replaces before it expires."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from palaestra.cluster.errors import Unreachable
+
+FRESH_S = 60.0  # a kubelet replaces a token minutes before it expires
+
+
+class Token:
+    """The token in a file, read again every minute."""
+
+    def __init__(self, file: Path, clock: Callable[[], float]) -> None:
+        self._file = file
+        self._clock = clock
+        self._text = ""
+        self._read_at = float("-inf")
+
+    def __call__(self) -> str:
+        """Return the header `Authorization` with the token.
+
+        Raises:
+            Unreachable: the token cannot be read.
+        """
+        if self._clock() - self._read_at >= FRESH_S:
+            self._text = text_of(self._file)
+            if not self._text.isprintable() or not self._text:
+                fact = "is not one line" if self._text else "is missing or empty"
+                raise Unreachable(0, "NoCredentials", f"{self._file} {fact}")
+            self._read_at = self._clock()
+        return f"Bearer {self._text}"
+
+
+def text_of(file: Path) -> str:
+    """Return the text of a file without the space around it; "" if it cannot be read."""
+    try:
+        return file.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""

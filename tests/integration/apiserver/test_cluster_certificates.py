@@ -1,0 +1,182 @@
+"""The certificate of an API server: what kubectl takes is taken, and what it refuses is refused."""
+
+import json
+import socket
+import ssl
+from types import SimpleNamespace
+
+import pytest
+
+from palaestra.cluster import Api, Limits, Untrusted, account, connect
+from palaestra.cluster.transport import Transport
+from palaestra.doctor import examining
+from tests.control_plane.certificates import Authority
+from tests.integration.apiserver.conftest import write_kubeconfig
+from tests.integration.apiserver.server import command, reply, serving
+
+# An authority without key identifiers, as EKS made them in 2019, and one with them and without a key usage,
+# as MicroK8s makes them.
+KINDS = {"EKS": ("subjectKeyIdentifier=none", "authorityKeyIdentifier=none"), "MicroK8s": ()}
+WORKED = b'\x03{"status": "Success"}'
+
+
+@pytest.fixture(autouse=True)
+def strict(monkeypatch):
+    """Let every new context ask for the extensions that Python 3.13 asks for, on each Python."""
+    usual = ssl.create_default_context
+
+    def strictly(*arguments, **options):
+        context = usual(*arguments, **options)
+        context.verify_flags |= ssl.VERIFY_X509_STRICT
+        return context
+
+    monkeypatch.setattr(ssl, "create_default_context", strictly)
+    return strictly
+
+
+def shown(pair):
+    """Return what a server shows its certificate with."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(pair.certificate, pair.key)
+    return context
+
+
+@pytest.fixture(scope="module")
+def authorities(tmp_path_factory):
+    """Return an authority of each kind."""
+    made = {}
+    for name, extensions in KINDS.items():
+        made[name] = Authority.create(tmp_path_factory.mktemp(name), *extensions)
+    return made
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def lenient(request, authorities):
+    """A server whose authority lacks extensions."""
+    authority = authorities[request.param]
+    pair = (
+        authority.bare_server(["127.0.0.1"], 1) if KINDS[request.param] else authority.server(["127.0.0.1"])
+    )
+    with serving(shown(pair)) as (address, script):
+        yield SimpleNamespace(address=address, script=script, authority=authority.pair.certificate)
+
+
+def kubeconfig_of(path, address, **cluster):
+    """Write a kubeconfig for a server with these fields of the cluster."""
+    file = write_kubeconfig(path / "kubeconfig", address, {"token": "my-token"})
+    content = json.loads((path / "kubeconfig").read_text())
+    content["clusters"][0]["cluster"] |= cluster
+    (path / "kubeconfig").write_text(json.dumps(content))
+    return file
+
+
+def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
+    """So that the other tests mean something on every Python."""
+    context = strict(cafile=lenient.authority)
+    assert context.verify_flags & ssl.VERIFY_X509_STRICT
+    host, port = lenient.address.removeprefix("https://").split(":")
+
+    with (
+        pytest.raises(ssl.SSLCertVerificationError),
+        socket.create_connection((host, int(port)), timeout=10) as connection,
+    ):
+        context.wrap_socket(connection, server_hostname=host)
+
+
+def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path):
+    """Requests and commands alike: kubectl asks for no such extensions."""
+    lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"}), command(b"\x01hello", WORKED)]
+    file = kubeconfig_of(tmp_path, lenient.address, **{"certificate-authority": str(lenient.authority)})
+
+    api = connect(file)
+
+    assert api.version() == "v1.36.4"
+    assert b"".join(api.execute("robots", "pod", "trainer", ["ls"], within_s=10)) == b"hello"
+    api.close()
+
+
+def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path, monkeypatch):
+    """The operator would never become ready otherwise."""
+    lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
+    (tmp_path / "ca.crt").write_bytes(lenient.authority.read_bytes())
+    (tmp_path / "token").write_text("of-the-pod")
+    host, port = lenient.address.removeprefix("https://").split(":")
+    monkeypatch.setenv("KUBERNETES_SERVICE_HOST", host)
+    monkeypatch.setenv("KUBERNETES_SERVICE_PORT", port)
+
+    api = Api(Transport(account.account(tmp_path), Limits()))
+
+    assert api.version() == "v1.36.4"
+    api.close()
+
+
+@pytest.fixture(scope="module")
+def wrong(authorities, tmp_path_factory):
+    """Servers with a certificate that is wrong in one way; the address and authority to ask each with."""
+    good = authorities["MicroK8s"]
+    other = Authority.create(tmp_path_factory.mktemp("other"))
+    with (
+        serving(shown(good.server(["127.0.0.9"]))) as (misnamed, first),
+        serving(shown(other.server(["127.0.0.1"]))) as (foreign, second),
+        serving(shown(good.bare_server(["127.0.0.1"], -1))) as (expired, third),
+    ):
+        for script in (first, second, third):
+            script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
+        ca = str(good.pair.certificate)
+        yield {"name": (misnamed, ca), "authority": (foreign, ca), "dates": (expired, ca)}
+
+
+@pytest.mark.parametrize(
+    ("way", "fact", "remedy"),
+    [
+        ("name", "is for another name", "tls-server-name"),
+        ("authority", "is not from the trusted authority", "certificate authority"),
+        ("dates", "has expired", "clock"),
+    ],
+)
+def test_what_is_wrong_with_a_certificate_is_named(wrong, tmp_path, way, fact, remedy):
+    """By requests, commands and the doctor; no credentials are sent."""
+    address, authority = wrong[way]
+    api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
+
+    with pytest.raises(Untrusted, match=f"{address}: the server's certificate {fact}.*{remedy}"):
+        api.version()
+    with pytest.raises(Untrusted, match=fact):
+        list(api.execute("robots", "pod", "trainer", ["ls"], within_s=10))
+    api.close()
+
+
+def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
+    """`check the connection` would mislead: the connection stands."""
+    address, authority = wrong["name"]
+    api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
+
+    finding = next(iter(examining.examine(SimpleNamespace(api=api, namespace="robots"))))
+
+    assert "is for another name" in finding.fact
+    assert "tls-server-name" in finding.remedy
+    api.close()
+
+
+def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
+    """`tls-server-name`, which the remedy names."""
+    address, authority = wrong["name"]
+    settings = {"certificate-authority": authority, "tls-server-name": "localhost"}
+    api = connect(kubeconfig_of(tmp_path, address, **settings))
+
+    assert api.version() == "v1.36.4"
+    api.close()
+
+
+def test_an_unverified_server_is_warned_of_once(wrong, tmp_path, caplog):
+    """`insecure-skip-tls-verify`: other warnings would be errors here."""
+    address, _ = wrong["dates"]
+    file = kubeconfig_of(tmp_path, address, **{"insecure-skip-tls-verify": True})
+    api = connect(file)
+
+    assert api.version() == api.version() == "v1.36.4"
+    api.close()
+    (warned,) = (record.getMessage() for record in caplog.records)
+    assert warned.startswith(
+        f"{file}: insecure-skip-tls-verify is set, so the certificate of {address} is not"
+    )
