@@ -242,7 +242,7 @@ class Scene:
             _merge(
                 next(it for it in self.objects["jobs"] if it["metadata"]["name"] == action.job), action.patch
             )
-        if isinstance(action, Replace) and not self.budget:
+        if isinstance(action, Replace) and not (self.budget or action.ended):
             self._evict(action.uid)
 
     def _evict(self, uid: str) -> None:

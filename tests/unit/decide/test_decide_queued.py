@@ -8,7 +8,7 @@ from palaestra.api.status import Phase
 SHORT = "insufficient unused quota for cpu in flavor any-machine, 425m more needed"
 WAITS = "waits in queue robots for Kueue"
 TAKEN = f"{WAITS}, which took it back"
-AGAIN = "; it goes on from the last checkpoint"
+AGAIN = "; it continues when it is admitted again"
 
 
 @pytest.fixture

@@ -36,11 +36,12 @@ def test_every_planned_container_is_read_in_order():
 
 
 def test_probes_are_those_of_the_plan():
-    """A startup probe for the master, liveness for the others, on loopback."""
+    """A startup probe for master and trainer, liveness for sidecars and trainer, on loopback."""
     pod = read_pod(template(), "pod-1")
 
     assert pod.init[0].startup.command[0] == "bash"
     assert pod.init[1].liveness.url == "http://127.0.0.1:7200/healthz"
+    assert pod.main.startup.url == pod.main.liveness.url
     assert pod.main.liveness.url == "http://127.0.0.1:9090/healthz"
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import pytest
 
 from palaestra.api.status import PodReference, ReplicaStatus
-from palaestra.observe import JobEnd, Objects, Polled, observe, trimmed
+from palaestra.observe import JobEnd, Objects, Polled, last_hindrance, observe, trimmed
 from palaestra_protocol.pod.status import TrainerStatus
 
 NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
@@ -230,3 +230,15 @@ def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, ra
     runs = look(pods=[raw_pod], events=events).replicas[0]
 
     assert (waits.unmounted, runs.unmounted) == ("last", "")
+
+
+def test_the_event_about_the_probe_is_read_and_not_one_about_another_container():
+    """After the trainer the kubelet ends the other containers, and writes that too."""
+    probe = {"reason": "Killing", "message": "Container trainer failed startup probe, will be restarted"}
+    other = {"reason": "Killing", "message": "Stopping container sim-collect-0"}
+    events = [
+        {**probe, "lastTimestamp": "2026-01-31T12:00:00Z"},
+        {**other, "lastTimestamp": "2026-01-31T12:00:09Z"},
+    ]
+
+    assert last_hindrance(events, "u")["message"] == probe["message"]

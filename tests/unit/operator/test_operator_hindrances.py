@@ -248,3 +248,40 @@ def test_who_is_in_the_cache_is_no_stranger(server):
 
     assert strangers.among(KEY, UID, {"job-0"}) == []
     assert strangers.among(KEY, UID, ()) == []
+
+
+def ended(code, uid="p", created="2026-01-31T12:00:00Z", **status):
+    """Return a pod of the Job whose trainer ended with this exit code."""
+    state = {"terminated": {"exitCode": code, "reason": "Error"}}
+    raw = pod("Failed")
+    raw["metadata"] |= {"uid": uid, "creationTimestamp": created}
+    raw["spec"] = {"containers": [{"name": "trainer"}]}
+    raw["status"] |= {"containerStatuses": [{"name": "trainer", "state": state}], **status}
+    return raw
+
+
+def asked_about(jobs, pods):
+    """Return the uids and selectors of the events that are requested."""
+    hindrances = Hindrances(Server(), lambda: 0.0)
+    return {*hindrances.of(KEY, UID, jobs, pods).facts, *hindrances.known(KEY, UID)}
+
+
+@pytest.mark.parametrize("code", [75, 137, 143])
+def test_the_signal_that_ended_the_newest_pod_is_asked_about(code):
+    """Only the kubelet's event reports that a probe failed."""
+    older = ended(code, uid="older", created="2026-01-31T11:00:00Z")
+
+    assert [each for each in asked_about([job()], [ended(code), older]) if each[1] == "reason=Killing"] == [
+        ("p", "reason=Killing")
+    ]
+
+
+TAKEN = [{"type": "DisruptionTarget", "status": "True", "reason": "Preempted"}]
+
+
+@pytest.mark.parametrize(
+    ("code", "status"), [(1, {}), (75, {"reason": "Evicted"}), (75, {"conditions": TAKEN})]
+)
+def test_an_end_that_the_pod_explains_is_not_asked_about(code, status):
+    """Each request costs the API server a list of events."""
+    assert not [each for each in asked_about([job()], [ended(code, **status)]) if each[0] == "p"]

@@ -32,11 +32,40 @@ def test_the_ros_master_starts_first_and_the_trainer_last(in_cluster):
     assert names == ["ros-master", "sim-collect-0", "sim-collect-1", "sim-evaluate-0", "trainer"]
 
 
-def test_only_the_ros_master_has_a_startup_probe(in_cluster):
-    """Several of them may block the trainer for ever (Kubernetes issue 132826)."""
+def test_no_sidecar_of_a_simulator_has_a_startup_probe(in_cluster):
+    """If the first start of a sidecar with one fails, no trainer starts (Kubernetes issue 132826)."""
     probed = [name for name, each in containers(in_cluster()).items() if "startupProbe" in each]
 
-    assert probed == ["ros-master"]
+    assert probed == ["ros-master", "trainer"]
+
+
+@pytest.mark.parametrize(("spec", "seconds"), [({}, 21_600), ({"startTimeoutSeconds": 605}, 605)])
+def test_a_start_may_take_as_long_as_the_first_step(in_cluster, spec, seconds):
+    """A trainer imports PyTorch for minutes on a busy node; a probe of two minutes ended it each time."""
+    planned = containers(in_cluster(**spec))
+
+    for name in ("ros-master", "trainer"):
+        probe = planned[name]["startupProbe"]
+        each_s = max(probe["periodSeconds"], probe["timeoutSeconds"])
+        assert 0 <= probe["failureThreshold"] * each_s - seconds < each_s
+    assert "initialDelaySeconds" not in planned["trainer"]["livenessProbe"]
+
+
+def test_a_start_on_a_laptop_has_ten_minutes(on_laptop):
+    """A person waits for it; a ROS master that hangs must not keep the terminal for six hours."""
+    planned = containers(on_laptop())
+
+    assert planned["ros-master"]["startupProbe"]["failureThreshold"] == 60
+    assert planned["trainer"]["startupProbe"]["failureThreshold"] == 60
+
+
+@pytest.mark.parametrize(("deadline", "timeout", "delay"), [(300, 21_600, 300), (300, 60, 60)])
+def test_a_sidecar_may_start_as_long_as_its_simulator(in_cluster, deadline, timeout, delay):
+    """The trainer counts a start that takes longer as failed."""
+    groups = [{**group, "startDeadlineSeconds": deadline} for group in TWO_GROUPS]
+    planned = containers(in_cluster(simulators=groups, startTimeoutSeconds=timeout))
+
+    assert planned["sim-collect-0"]["livenessProbe"]["initialDelaySeconds"] == delay
 
 
 def test_sidecars_are_restarted_and_the_trainer_is_not(in_cluster):
@@ -115,7 +144,7 @@ def test_the_jobs_own_program_replaces_the_loop_and_need_not_serve_health(in_clu
     trainer = containers(in_cluster(trainer={"command": ["python", "mine.py"]}))["trainer"]
 
     assert trainer["command"] == ["python", "mine.py"]
-    assert "livenessProbe" not in trainer
+    assert not {"livenessProbe", "startupProbe"} & set(trainer)
 
 
 def test_images_are_the_jobs_or_the_releases(in_cluster):

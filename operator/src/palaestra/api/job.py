@@ -135,7 +135,10 @@ class Spec(ApiModel):
     """Seconds that a replica may wait for its first step, for example for an image or a node. After that
     it fails with the reason for which it waited. Absent: 21,600. Time in a queue, suspended time, and time in
     which the trainer and its simulators run are not counted. After the first step, only
-    `activeDeadlineSeconds` limits a wait. `palaestra run` ignores this field."""
+    `activeDeadlineSeconds` limits a wait. In each pod, the ROS master and the trainer may also take that long
+    from the start of their containers to their first answer, by the value with which the replica's Job was
+    created. `palaestra run` uses the field only for that answer, and allows at most
+    600."""
 
     no_progress_limit: Annotated[int, Field(ge=0, le=100)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}

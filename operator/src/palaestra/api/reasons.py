@@ -45,6 +45,7 @@ class Reason(StrEnum):
     TRAINING = "Training"
     DISRUPTED = "Disrupted"
     INTERRUPTED = "Interrupted"
+    PROBE_FAILED = "ProbeFailed"
     TRAINER_FAILED = "TrainerFailed"
     RETRYING = "Retrying"
     UNSCHEDULABLE = "Unschedulable"
@@ -256,29 +257,35 @@ ROWS: dict[Reason, Row] = {
         "set `spec.suspend: false`; if another field manager suspended the Job, resume it there",
         warning=False,
     ),
-    Reason.RESUMED: Row(
-        "resumes from the last checkpoint", "the replica is no longer suspended", "nothing", warning=False
-    ),
+    Reason.RESUMED: Row("{what}", "the replica is no longer suspended", "nothing", warning=False),
     Reason.STARTING: Row(
         "{what}",
-        "the objects exist and no trainer runs yet",
+        "the objects exist and no trainer has answered yet",
         "nothing; if it takes minutes, run `kubectl describe pod`",
         warning=False,
     ),
     Reason.TRAINING: Row("{what}", "at least one trainer runs", "nothing", warning=False),
     Reason.DISRUPTED: Row(
-        "pod {pod} was disrupted ({words}); the next pod resumes from the last checkpoint",
+        "pod {pod} was disrupted ({words}); {next_pod}",
         "an eviction, a preemption, a drain, a lost node or a deletion ended the pod; "
         "it does not count against `backoffLimit`",
         "nothing; if it recurs, use non-preemptible nodes",
         warning=False,
     ),
     Reason.INTERRUPTED: Row(
-        "the trainer of pod {pod} stopped at a checkpoint ({how}); the next pod resumes from there",
+        "the trainer of pod {pod} was interrupted ({how}); {next_pod}",
         "the trainer received an unexplained signal, or lost the ROS master; "
         "it does not count against `backoffLimit`",
         "nothing; if it recurs, read `lastAttempt.log` in the status",
         warning=False,
+    ),
+    Reason.PROBE_FAILED: Row(
+        "the kubelet ended the trainer of pod {pod}, because its {probe} probe failed ({how}); "
+        "give it more CPU with spec.trainer.resources, or use a node with less load; {next_pod}",
+        "the trainer did not answer the kubelet for a minute, or not once within `startTimeoutSeconds` after "
+        "its start; it counts against `backoffLimit`",
+        "raise `spec.trainer.resources.limits.cpu`, request more CPU, or run fewer jobs on the node; "
+        "for a slow start raise `startTimeoutSeconds`, in a new TrainingJob",
     ),
     Reason.TRAINER_FAILED: Row(
         "{how}",
@@ -286,7 +293,7 @@ ROWS: dict[Reason, Row] = {
         "read `lastAttempt.log` in the status",
     ),
     Reason.RETRYING: Row(
-        "pod {pod} failed: {how}; the next pod resumes from the last checkpoint",
+        "pod {pod} failed: {how}; {next_pod}",
         "a pod failed and counts against `backoffLimit`",
         "read the last lines of the trainer's log in `lastAttempt.log` in the status",
     ),

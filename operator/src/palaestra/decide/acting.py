@@ -80,7 +80,7 @@ def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
 
 
 def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Replace]:
-    """Yield a replacement for each pod that no kubelet repairs, unless the pod is being deleted."""
+    """Yield a replacement for each pod that counts as one, unless the pod is being deleted."""
     for seen, replica in zip(observed.replicas, decided, strict=True):
         why = replica.course.replace
         if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
@@ -96,6 +96,7 @@ def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Re
             reason=why.reason,
             message=why.message,
             marked=marked,
+            ended=seen.pod.ended,
             basis=_basis(seen.job, seen.pods),
         )
 

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from palaestra.api.reasons import Reason
+from palaestra.decide.checkpoints import next_pod
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
 from palaestra.decide.situation import Situation, explain
 from palaestra.decide.suspending import ended_by_suspension, suspended_by
-from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, storage_eviction
+from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, probe_failed, storage_eviction
 from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode, Termination
@@ -20,7 +21,7 @@ from palaestra_protocol.pod.terms import SILENT
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
 GONE = "its pod is gone; no last word"
-TAKEN, AGAIN = ", which took it back", "; it goes on from the last checkpoint"
+TAKEN, AGAIN = ", which took it back", "; it continues when it is admitted again"
 _HUNG = "SimulatorHung"  # how a last word begins
 
 
@@ -90,7 +91,7 @@ def disrupted(attempt: Attempt) -> Explanation | None:
     """The cluster interrupted the pod, by a condition of the pod."""
     if attempt.pod is None or not attempt.pod.disruption:
         return None
-    return explain(Reason.DISRUPTED, pod=attempt.name, words=attempt.pod.disruption)
+    return _disrupted(attempt, attempt.pod.disruption)
 
 
 def gone(attempt: Attempt) -> Explanation | None:
@@ -105,7 +106,7 @@ def gone(attempt: Attempt) -> Explanation | None:
         return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
     if after.suspension > before.suspension:
         return paused(attempt.situation)
-    return explain(Reason.DISRUPTED, pod=attempt.name, words=GONE)
+    return _disrupted(attempt, GONE)
 
 
 def deleted(attempt: Attempt) -> Explanation | None:
@@ -120,14 +121,26 @@ def deleted(attempt: Attempt) -> Explanation | None:
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # the Job counts it so
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
-    return explain(Reason.DISRUPTED, pod=attempt.name, words="it was deleted")
+    return _disrupted(attempt, "it was deleted")
+
+
+def ended_by_probe(attempt: Attempt) -> Explanation | None:
+    """The kubelet ended the trainer, because a probe failed; the cluster reports that for the newest pod."""
+    known, newest = attempt.situation.old.last_attempt, attempt.situation.seen.pod
+    if attempt.pod is None or attempt.code not in BY_SIGNAL:
+        return None
+    if newest is not None and newest.uid == attempt.pod.uid and attempt.situation.seen.probe:
+        return probe_failed(attempt.situation, attempt.pod)
+    kept = known is not None and (known.attempt, known.reason) == (attempt.number, Reason.PROBE_FAILED)
+    return Explanation(reason=Reason.PROBE_FAILED, message=known.message) if known and kept else None
 
 
 def interrupted(attempt: Attempt) -> Explanation | None:
-    """The trainer saved a checkpoint and stopped for an unknown reason."""
+    """The trainer was interrupted for an unknown reason."""
     if attempt.code != ExitCode.INTERRUPTED or attempt.pod is None:
         return None
-    return explain(Reason.INTERRUPTED, pod=attempt.name, how=how_it_failed(attempt.situation, attempt.pod))
+    how, begins = how_it_failed(attempt.situation, attempt.pod), next_pod(attempt.situation)
+    return explain(Reason.INTERRUPTED, pod=attempt.name, how=how, next_pod=begins)
 
 
 def configuration_refused(attempt: Attempt) -> Explanation | None:
@@ -197,6 +210,7 @@ ENDS: tuple[EndCheck, ...] = (
     disrupted,
     gone,
     deleted,
+    ended_by_probe,
     interrupted,
     *CAUSES,
 )
@@ -239,6 +253,10 @@ def success(word: Termination | None) -> str:
     if (interval := word.success_interval) is not None:
         rate += f" ({interval.low:.2f} to {interval.high:.2f}, {interval.episodes} episodes)"
     return f"the training is complete: {word.step} steps{rate}"
+
+
+def _disrupted(attempt: Attempt, words: str) -> Explanation:
+    return explain(Reason.DISRUPTED, pod=attempt.name, words=words, next_pod=next_pod(attempt.situation))
 
 
 def _of_code(attempt: Attempt, code: ExitCode, reason: Reason) -> Explanation | None:

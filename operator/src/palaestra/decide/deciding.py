@@ -62,7 +62,7 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     return Decision(
         status=status,
         actions=todo,
-        events=(*of_change(job.status, status), *of_actions(todo), *edits(job, observed)),
+        events=(*of_change(job.status, status), *of_actions(todo, status.replicas), *edits(job, observed)),
         wake_after_s=first_of(waits_s),
         record=_record(job, decided, status, times),
     )

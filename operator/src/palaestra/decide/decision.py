@@ -68,6 +68,7 @@ class Replace:
     Attributes:
         times: pods of the replica that were replaced this way, including this one.
         marked: whether the Job has the mark already.
+        ended: whether the pod has ended, so that the mark is all.
     """
 
     job: str
@@ -78,6 +79,7 @@ class Replace:
     reason: Reason
     message: str
     marked: bool = False
+    ended: bool = False
     basis: Basis = field(default=Basis(), compare=False)
 
     @property

@@ -42,8 +42,9 @@ def of_change(old: Status, new: Status) -> Iterator[Happening]:
         yield from _of_condition(old, new, kind)
 
 
-def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
+def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()) -> Iterator[Happening]:
     """Yield an event for each action; the objects of a replica have one together."""
+    saved = {replica.index for replica in replicas if replica.last_checkpoint is not None}
     created: dict[int | None, list[str]] = {}
     for action in actions:
         match action:
@@ -52,7 +53,8 @@ def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
             case Stop(reason=reason, message=message, replica=replica):
                 yield happening(reason, message, replica)
             case SetSuspend(suspend=False, replica=replica):
-                yield happening(Reason.RESUMED, say(Reason.RESUMED), replica)
+                what = "resumes from the last checkpoint" if replica in saved else "continues"
+                yield happening(Reason.RESUMED, say(Reason.RESUMED, what=what), replica)
             case Discard() | Replace() | SetSuspend():  # the replica's end, or its reason, has an event
                 continue
             case Delete():

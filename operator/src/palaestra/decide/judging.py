@@ -5,7 +5,7 @@ return how long it still waits. The class of a check that holds decides what fol
 
 - ended: the first one that holds is how the replica ended, and the others are ignored.
 - final: the first one that holds stops the replica for good, by a mark on its Job.
-- counted: the operator replaces the pod, at most `backoffLimit` times.
+- counted: the operator replaces the pod, or its Job does, at most `backoffLimit` times.
 - waiting: the status shows its reason; nothing is ended or counted.
 - shown: the status shows the state of the replica.
 """
@@ -171,6 +171,7 @@ JUDGED: tuple[tuple[Kind, Check], ...] = (
     (Kind.WAITING, troubles.container_refused),
     (Kind.COUNTED, replacing.trainer_never_started),
     (Kind.COUNTED, replacing.stalled),
+    (Kind.COUNTED, replacing.ended_by_probe),
     (Kind.WAITING, troubles.sidecar_out_of_memory),
     (Kind.WAITING, troubles.sidecar_crash_loops),
     (Kind.WAITING, troubles.simulator_not_up),

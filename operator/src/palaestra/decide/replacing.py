@@ -3,15 +3,19 @@
 An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. The operator counts it
 in an annotation of the Job, the mark, before it evicts. If it is killed between the two writes, it finds the
 mark of a running pod after its restart, and evicts again.
+
+A trainer that a failed probe interrupted ends with 75, which its Job does not count either. Its pod gets the
+mark too; it has ended, so nothing is evicted.
 """
 
 from dataclasses import replace
 
 from palaestra.api.reasons import Reason
+from palaestra.decide.counting import failed_by_itself
 from palaestra.decide.progress import standstill
 from palaestra.decide.situation import Check, Finding, Situation, after, explain, found
 from palaestra.decide.times import Wait
-from palaestra.decide.troubles import mark_of
+from palaestra.decide.troubles import mark_of, probe_failed
 from palaestra.observe.pods import dropped
 
 STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
@@ -59,6 +63,16 @@ def stalled(situation: Situation) -> Finding | None:
     )
 
 
+def ended_by_probe(situation: Situation) -> Finding | None:
+    """The kubelet ended the trainer, because a probe failed, and its Job does not count that."""
+    pod = situation.seen.pod
+    if pod is None or not pod.ended or not situation.seen.probe:
+        return None
+    if failed_by_itself(pod) or mark_of(situation, pod) is not None:
+        return None
+    return Finding(explanation=probe_failed(situation, pod))
+
+
 def replaced_too_often(situation: Situation) -> Finding | None:
     """A pod has to be replaced, but as many were replaced as `backoffLimit` allows."""
     job = situation.seen.job
@@ -69,4 +83,4 @@ def replaced_too_often(situation: Situation) -> Finding | None:
     return min(causes, key=lambda cause: cause.left_s, default=None)
 
 
-REPLACED: tuple[Check, ...] = (restart_policy_dropped, trainer_never_started, stalled)
+REPLACED: tuple[Check, ...] = (restart_policy_dropped, trainer_never_started, stalled, ended_by_probe)

@@ -8,6 +8,7 @@ from palaestra.decide.attempts import AGAIN, paused
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import Finding, Situation, explain, found
 from palaestra.decide.suspending import ended_by_suspension, unheeded
+from palaestra.observe.views import PodView
 
 UNASKED = "; why that takes long was not asked, as too many others wait"
 DESCRIBE = "; `kubectl describe` shows it"
@@ -60,7 +61,7 @@ def trainer_has_ended(situation: Situation) -> Finding | None:
 
 
 def trains(situation: Situation) -> Finding | None:
-    """The trainer runs."""
+    """The trainer runs and has answered."""
     if not runs(situation):
         return None
     if situation.seen.polled is not None and not situation.trains:
@@ -81,10 +82,22 @@ def starts(situation: Situation) -> Finding | None:
         what = "its pod is about to be created"
     else:
         what = "its last pod has ended" if situation.seen.pod.ended else "its containers start"
+        if situation.pod is not None and _in_trainer(situation.pod):
+            what = "its trainer starts, and has not answered yet"
     return found(Reason.STARTING, what=what + (UNASKED + DESCRIBE if situation.seen.unasked else ""))
 
 
 def runs(situation: Situation) -> bool:
-    """Return whether the trainer's container runs, in a pod of the replica's Job."""
-    trainer = situation.pod.trainer if situation.pod is not None and situation.seen.job is not None else None
-    return trainer is not None and trainer.running_since is not None
+    """Return whether the trainer runs, in a pod of the replica's Job, and has answered once.
+
+    The kubelet reports the first answer to its startup probe. A program of the job's own has no such probe,
+    nor has a pod of an earlier release.
+    """
+    pod = situation.pod if situation.seen.job is not None else None
+    if pod is None or pod.trainer is None or not _in_trainer(pod):
+        return False
+    return pod.trainer.started or situation.seen.polled is not None
+
+
+def _in_trainer(pod: PodView) -> bool:
+    return pod.trainer is not None and pod.trainer.running_since is not None

@@ -5,7 +5,7 @@ from palaestra.api.status import PodReference
 from palaestra.decide.counting import lives
 from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved, Suspended
 
-BY_SPEC = "spec.suspend; set it to false to go on from the last checkpoint"
+BY_SPEC = "spec.suspend; set it to false to continue"
 SOMEBODY = "somebody else"  # where no field manager is known
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
+from palaestra.decide.checkpoints import next_pod
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
@@ -150,8 +151,10 @@ def pod_was_taken(situation: Situation) -> Finding | None:
     if ended_by_suspension(situation.seen, pod):  # and resumed: the next pod is on its way
         return None
     if pod.disruption or pod.gone_by is not None:
-        return found(Reason.DISRUPTED, pod=pod.name, words=pod.disruption or "it was deleted")
-    return found(Reason.INTERRUPTED, pod=pod.name, how=how_it_failed(situation, pod))
+        words = pod.disruption or "it was deleted"
+        return found(Reason.DISRUPTED, pod=pod.name, words=words, next_pod=next_pod(situation))
+    how = how_it_failed(situation, pod)
+    return found(Reason.INTERRUPTED, pod=pod.name, how=how, next_pod=next_pod(situation))
 
 
 def volume_is_full(situation: Situation) -> Finding | None:
@@ -168,7 +171,8 @@ def pod_failed(situation: Situation) -> Finding | None:
     pod = situation.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
         return None
-    return found(Reason.RETRYING, pod=pod.name, how=how_it_failed(situation, pod))
+    how = how_it_failed(situation, pod)
+    return found(Reason.RETRYING, pod=pod.name, how=how, next_pod=next_pod(situation))
 
 
 def no_other_comes(situation: Situation, pod: PodView) -> bool:
@@ -192,6 +196,13 @@ def mark_of(situation: Situation, pod: PodView) -> Explanation | None:
     if mark is None or mark.pod != pod.uid:
         return None
     return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
+
+
+def probe_failed(situation: Situation, pod: PodView) -> Explanation:
+    """Return the reason for a trainer that the kubelet ended, because a probe failed."""
+    code, probe, begins = exit_code(pod), situation.seen.probe, next_pod(situation)
+    how = f"exit code {code}"
+    return explain(Reason.PROBE_FAILED, pod=pod.name, probe=probe, how=how, next_pod=begins)
 
 
 def _not_up(
@@ -244,6 +255,11 @@ def how_it_failed(situation: Situation, pod: PodView) -> str:
     if trainer is not None and killed_for_memory(trainer):
         return "the trainer was killed because it ran out of memory"
     code = exit_code(pod)
+    newest = situation.seen.pod is not None and situation.seen.pod.uid == pod.uid
+    if newest and situation.seen.probe:
+        return (
+            f"exit code {code}, the kubelet ended the trainer because its {situation.seen.probe} probe failed"
+        )
     if word is not None and word.reason:
         return f"exit code {code}, {word.reason}"
     if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:

@@ -9,6 +9,7 @@ that cannot be read counts as absent.
 """
 
 from palaestra.observe.observing import last_hindrance, observe
+from palaestra.observe.pods import was_signalled
 from palaestra.observe.shortening import Lacking, lacking
 from palaestra.observe.sources import references
 from palaestra.observe.trim import trimmed, whole
@@ -57,6 +58,7 @@ __all__ = [
     "observe",
     "references",
     "trimmed",
+    "was_signalled",
     "whole",
     "why_not_admitted",
 ]

@@ -1,5 +1,6 @@
 """Sort the objects of a job by replica, and make values of them."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator
 from datetime import datetime
 from typing import Any
@@ -20,10 +21,12 @@ from palaestra.observe.views import (
     Raw,
     ReplicaObserved,
 )
-from palaestra.plan.replica import REPLICA_LABEL, UID_LABEL
+from palaestra.plan.replica import REPLICA_LABEL, TRAINER, UID_LABEL
 from palaestra_protocol.pod.status import ProtocolError, Termination
 
 UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's events, and a controller's
+KILLING = "Killing"  # a kubelet's event: why it ends a container
+_PROBE = re.compile(rf"Container {TRAINER} failed (liveness|startup) probe\b")
 
 
 def observe(job: TrainingJob, objects: Objects) -> Observed:
@@ -71,6 +74,7 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
         unmounted=_unmounted(newest, objects) if newest else "",
+        probe=_probe(newest, objects) if newest else "",
         unadmitted=objects.unadmitted.get(ours.uid) if ours else None,
         unasked=not objects.unasked.isdisjoint({ours.uid if ours else "", newest.uid if newest else ""}),
         switcher=one_line(objects.switchers.get(ours.uid) or "", MOST_NAME) if ours else "",
@@ -149,15 +153,33 @@ def _unmounted(newest: PodView, objects: Objects) -> str:
     return text(last, "message")
 
 
+def _probe(newest: PodView, objects: Objects) -> str:
+    """Return the probe for which the kubelet ended a pod's trainer; "" if no event reports one."""
+    last = _last_event(objects, newest.uid, {KILLING})
+    failed = _PROBE.match(text(last, "message")) if last is not None else None
+    return failed[1] if failed is not None else ""
+
+
 def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
     """Return the last event about what the object with this uid lacks, with only the fields read here."""
-    found = (raw for raw in events if text(raw, "reason") in {"FailedCreate", *UNMOUNTED})
+    found = (raw for raw in events if _is_read(raw))
     last = max(found, key=_when, default=None)
     if last is None:
         return None
     at = _when(last).isoformat()
     words = {"reason": text(last, "reason"), "message": text(last, "message"), "lastTimestamp": at}
     return {"involvedObject": {"uid": uid}, **words}
+
+
+def _is_read(event: Raw) -> bool:
+    """Return whether an event is one of those that this module reads.
+
+    A kubelet also writes that it ends the other containers, after the trainer.
+    """
+    reason = text(event, "reason")
+    return reason in {"FailedCreate", *UNMOUNTED} or (
+        reason == KILLING and _PROBE.match(text(event, "message")) is not None
+    )
 
 
 def _last_event(objects: Objects, uid: str, reasons: Collection[str]) -> Raw | None:

@@ -6,11 +6,13 @@ from typing import Any
 from palaestra.observe.reading import condition, count, holds, part, parts, text, time
 from palaestra.observe.views import ContainerKind, ContainerView, Exit, PodView, Raw
 from palaestra.plan.pod import GRACE_S
+from palaestra_protocol.pod.status import ExitCode
 
 MOST_MESSAGE = 4096  # of a termination message: Kubernetes cuts it there
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # stands for a time that cannot be read
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
+BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes of a trainer
 SIDECARS = ("sim-", "ros-master")  # names of the containers that have to be restarted
 
 
@@ -46,6 +48,14 @@ def dropped(view: PodView) -> tuple[str, ...]:
         for container in view.containers
         if container.kind is ContainerKind.INIT and container.name.startswith(SIDECARS)
     )
+
+
+def was_signalled(raw: Raw) -> bool:
+    """Return whether a signal ended the trainer of a pod, and nothing in the pod shows the cause."""
+    view = pod_view(raw)
+    ended = view.trainer.exit if view.phase == "Failed" and view.trainer is not None else None
+    shown = view.disruption or view.reason or view.gone_by is not None
+    return ended is not None and ended.code in BY_SIGNAL and ended.reason != "OOMKilled" and not shown
 
 
 def claims(spec: dict[str, Any]) -> frozenset[str]:

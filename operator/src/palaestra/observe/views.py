@@ -52,7 +52,8 @@ class Objects:
     Attributes:
         jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
             a Job of another owner that has one of our names is among `jobs` too.
-        events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
+        events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
+            about trainers that the kubelet ended.
         unadmitted: by a Job's uid, why Kueue has not admitted it; absent if that was not requested.
         unasked: uids of Jobs and pods that lack something, and about which the operator sends no request.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
@@ -289,6 +290,8 @@ class ReplicaObserved:
         denied: why an object of the replica could not be created; "": it could.
         unmounted: why the newest pod's volumes are not mounted, in the cluster's words; "": they are, or no
             event has a reason.
+        probe: the failed probe, "liveness" or "startup", for which the kubelet ended the newest pod's
+            trainer; "": none, or no event reports it.
         unadmitted: why Kueue has not admitted the Job; "": it has, or gives no reason; None: not asked yet.
         unasked: its pod, the pod's volumes or Kueue's admission are missing, and the operator sends no
             request about it.
@@ -307,6 +310,7 @@ class ReplicaObserved:
     refused: CreateFailure | None = None
     denied: str = ""
     unmounted: str = ""
+    probe: str = ""
     unadmitted: str | None = None
     unasked: bool = False
     switcher: str = ""

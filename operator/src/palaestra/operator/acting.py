@@ -141,14 +141,15 @@ class Acting:
         self._writer.merge(JOBS, key[0], action.job, patch, action.basis.version)
 
     def _replace(self, key: Key, action: Replace) -> None:
-        """Mark the Job, then evict the pod.
+        """Mark the Job, then evict the pod if it still runs.
 
         Raises:
             ApiError: the mark was not written, or a disruption budget allows no eviction now.
         """
         if not action.marked:
             self._patch(key, action)
-        self._writer.evict(key[0], action.pod, action.uid)
+        if not action.ended:
+            self._writer.evict(key[0], action.pod, action.uid)
         log.info("replaced", job=key, name=action.pod, reason=action.reason)
 
 

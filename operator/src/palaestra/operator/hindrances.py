@@ -1,7 +1,8 @@
-"""Why the pods of a Job cannot be created or cannot start: a quota, a webhook, a volume that is not mounted.
+"""Why the pods of a Job cannot be created, cannot start or were ended: a quota, a volume, a failed probe.
 
 Only events report this, and a watch of all events in a cluster is expensive. So the operator lists them
-(`palaestra.operator.asking`) if a Job that should have a pod has none, or if a pod waits for its volumes.
+(`palaestra.operator.asking`) if a Job that should have a pod has none, if a pod waits for its volumes, or if
+a signal ended a trainer and the pod does not show why.
 """
 
 import time
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
 from palaestra.objects import Key, Object
-from palaestra.observe import last_hindrance
+from palaestra.observe import last_hindrance, was_signalled
 from palaestra.observe.reading import holds, owners
 from palaestra.operator.asking import Answers, Asking
 
@@ -18,7 +19,7 @@ Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events w
 
 
 class Hindrances(Asking[Lacking, Object]):
-    """The last event about each Job without a pod and each pod without its volumes.
+    """The last event about each Job without a pod, pod without its volumes, and trainer ended by a signal.
 
     Args:
         api: the cluster.
@@ -66,6 +67,20 @@ def _lacking(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Lacking
     for pod in pods:
         if _wants_volumes(pod):
             yield pod["metadata"]["uid"], "type=Warning"
+    for pod in _newest_of(jobs, pods):
+        if was_signalled(pod):
+            yield pod["metadata"]["uid"], "reason=Killing"
+
+
+def _newest_of(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
+    """Yield the newest pod of each Job that has not ended; the status keeps the end of an older pod."""
+    for job in jobs:
+        if holds(job, "Complete") or holds(job, "Failed"):
+            continue
+        own = (pod for pod in pods if job["metadata"]["uid"] in owners(pod))
+        newest = max(own, key=lambda pod: pod["metadata"].get("creationTimestamp", ""), default=None)
+        if newest is not None:
+            yield newest
 
 
 def _wants_volumes(pod: Object) -> bool:

@@ -1,5 +1,6 @@
 """The containers of a replica's pod: the ROS master, a sidecar for each simulator, the trainer."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +17,7 @@ from palaestra.plan.worlds import world_path
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
+PERIOD_S = 10  # of a probe; the ROS master's waits as long in one try
 BUILT_IN = "palaestra-train"  # the program of a job without a command
 SECURITY = {
     "allowPrivilegeEscalation": False,
@@ -43,8 +45,8 @@ def ros_master(replica: Replica) -> Container:
         "startupProbe": {
             "exec": {"command": probe},
             "periodSeconds": 1,
-            "timeoutSeconds": 10,
-            "failureThreshold": 6,
+            "timeoutSeconds": PERIOD_S,
+            "failureThreshold": _tries(replica),
         },
         **_common(replica, ROS_MASTER, planned.resources(Resources(), planned.ROS_MASTER), ()),
     }
@@ -70,7 +72,12 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
         "command": [program],
         "args": _arguments(replica, simulator, world_path(replica, simulator, worlds)),
         "ports": [_port(f"sim-{simulator.place}", ports.health[simulator.place])],
-        "livenessProbe": _healthz(ports.health[simulator.place], initialDelaySeconds=10),
+        # Without a startup probe: if the first start of a sidecar with one fails, kubelets before 1.34.3
+        # never start the trainer (Kubernetes issue 132826).
+        "livenessProbe": {
+            "initialDelaySeconds": min(group.start_deadline_seconds, _start_s(replica)),
+            **_alive(ports.health[simulator.place]),
+        },
         **common,
     }
 
@@ -105,8 +112,9 @@ def trainer(replica: Replica) -> Container:
         **_common(replica, TRAINER, planned.resources(spec.resources, planned.TRAINER), spec.env),
     }
     if not spec.command:  # a program of the job's own need not serve anything
-        # Importing PyTorch takes a busy node half a minute, before anything can answer.
-        container["livenessProbe"] = _healthz(port, initialDelaySeconds=60)
+        # Importing PyTorch takes a busy node minutes, before anything can answer.
+        container["startupProbe"] = {**_healthz(port), "failureThreshold": _tries(replica)}
+        container["livenessProbe"] = _alive(port)
     return container
 
 
@@ -224,12 +232,25 @@ def _port(name: str, number: int) -> dict[str, Any]:
     return {"name": name, "containerPort": number, "protocol": "TCP"}
 
 
-def _healthz(port: int, **timing: int) -> dict[str, Any]:
-    """Return a liveness probe that bears a minute of a busy node."""
+def _healthz(port: int) -> dict[str, Any]:
+    """Return a probe that asks a container whether it is alive."""
     return {
         "httpGet": {"path": "/healthz", "port": port},
-        "periodSeconds": 10,
+        "periodSeconds": PERIOD_S,
         "timeoutSeconds": 5,
-        "failureThreshold": 6,
-        **timing,
     }
+
+
+def _alive(port: int) -> dict[str, Any]:
+    """Return a liveness probe that bears a minute of a busy node."""
+    return {**_healthz(port), "failureThreshold": 6}
+
+
+def _tries(replica: Replica) -> int:
+    """Return how often a startup probe may fail: for as long as the replica may wait for its first step."""
+    return math.ceil(_start_s(replica) / PERIOD_S)
+
+
+def _start_s(replica: Replica) -> int:
+    allowed, bound = replica.job.spec.start_timeout_s, replica.layout.longest_start_s
+    return allowed if bound is None else min(allowed, bound)

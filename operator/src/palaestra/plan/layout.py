@@ -85,6 +85,11 @@ class Layout(Protocol):
         ...
 
     @property
+    def longest_start_s(self) -> int | None:
+        """The seconds to which the start of a container is bounded here; None: only as the job bounds it."""
+        ...
+
+    @property
     def operator_namespace(self) -> str | None:
         """Where the operator runs, whose pods may ask the trainers; None: no pod has a network."""
         ...
@@ -123,6 +128,7 @@ class ClusterLayout:
     images: Images
     ports: Ports = Ports()
     health_host: str = "0.0.0.0"
+    longest_start_s: None = None
     operator_namespace: str = "palaestra-system"
     monitoring_namespace: str = "monitoring"
     node_selector: Mapping[str, str] = field(default_factory=dict)
@@ -159,6 +165,7 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     health_host: str = "127.0.0.1"
+    longest_start_s: int = 600  # a person waits for it, and nothing is pulled or mounted
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,23 @@
+"""What the next pod of a replica begins with, in words."""
+
+from palaestra.decide.situation import Situation
+
+RESUMES = "the next pod resumes from the last checkpoint"
+BEGINS = "the next pod starts the run again, because no checkpoint was reported"
+
+
+def next_pod(situation: Situation) -> str:
+    """Return the beginning of a replica's next pod; a run without a reported checkpoint does not resume.
+
+    A program of the job's own need not report its checkpoints; a reported step is all that is known then.
+    """
+    return RESUMES if has_checkpoint(situation) else BEGINS
+
+
+def has_checkpoint(situation: Situation) -> bool:
+    """Return whether an attempt of the replica has reported a checkpoint."""
+    seen = situation.seen
+    polled = seen.polled.status.last_checkpoint if seen.polled is not None else None
+    words = (word.last_checkpoint for word in seen.terminations.values())
+    own = situation.job.spec.trainer.command and situation.counted.furthest_step
+    return bool(situation.old.last_checkpoint or polled or any(words) or own)
