@@ -72,6 +72,7 @@ class Reason(StrEnum):
     DIVERGED = "Diverged"
     NO_PROGRESS = "NoProgress"
     JOB_FAILED = "JobFailed"
+    KEPT_ALIVE = "KeptAlive"
     SUCCEEDED = "Succeeded"
     SOME_REPLICAS_FAILED = "SomeReplicasFailed"
     EXPIRED = "Expired"
@@ -123,6 +124,7 @@ WAITING = (
     Reason.SIDECAR_CRASH_LOOP,
     Reason.SIMULATOR_START_DEADLINE,
     Reason.TRAINER_NOT_STARTED,
+    Reason.KEPT_ALIVE,
 )
 
 
@@ -445,6 +447,13 @@ ROWS: dict[Reason, Row] = {
         "the Job failed: {words}",
         "Kubernetes or another controller ended the replica's Job; the message quotes the Job",
         "run `kubectl describe job`",
+    ),
+    Reason.KEPT_ALIVE: Row(
+        "the trainer of pod {pod} has ended, and container {containers} keeps the pod alive; the operator "
+        "ends the pod {seconds} s after the trainer; inject native sidecars, or none",
+        "a mesh or an agent has added a container to the pod, and it does not end with the trainer; "
+        "the result is the trainer's",
+        "inject native sidecars or none: see [install](install.md#containers-that-others-add)",
     ),
     Reason.SUCCEEDED: Row(
         "{what}", "the training is complete", "fetch `model.zip` from the run directory", warning=False

@@ -107,8 +107,8 @@ class Restarts(Reported):
 
     operator: Count | None = None
     """Pods that the operator replaced because the kubelet does not recover them: `TrainerNotStarted`,
-    `RestartPolicyDropped`, `Stalled`; and pods whose trainer a failed probe interrupted: `ProbeFailed`. At
-    most `backoffLimit`; absent: none."""
+    `RestartPolicyDropped`, `Stalled`; pods whose trainer a failed probe interrupted: `ProbeFailed`; and pods
+    that a container of others kept alive. At most `backoffLimit`; absent: none."""
 
 
 class PodReference(Reported):

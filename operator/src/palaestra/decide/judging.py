@@ -17,7 +17,7 @@ from enum import StrEnum
 from palaestra.api.lines import one_line
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.status import Phase
-from palaestra.decide import final, outcomes, replacing, standing, troubles
+from palaestra.decide import final, outcomes, outliving, replacing, standing, troubles
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import STARTING, Check, Finding, Situation, Verdict, after
 from palaestra.decide.times import Trouble, Wait
@@ -146,9 +146,11 @@ JUDGED: tuple[tuple[Kind, Check], ...] = (
     (Kind.ENDED, outcomes.ended_by_others),
     (Kind.ENDED, outcomes.job_is_complete),
     (Kind.ENDED, outcomes.stopped),
+    (Kind.ENDED, outcomes.trainer_was_done),
     (Kind.ENDED, outcomes.would_end_the_same),
     (Kind.ENDED, outcomes.backoff_limit_spent),
     (Kind.ENDED, outcomes.job_failed),
+    (Kind.FINAL, outliving.trainer_is_done),
     (Kind.FINAL, final.active_deadline),
     (Kind.FINAL, final.cannot_be_planned),
     (Kind.FINAL, final.image_name_is_invalid),
@@ -172,6 +174,8 @@ JUDGED: tuple[tuple[Kind, Check], ...] = (
     (Kind.COUNTED, replacing.trainer_never_started),
     (Kind.COUNTED, replacing.stalled),
     (Kind.COUNTED, replacing.ended_by_probe),
+    (Kind.COUNTED, outliving.pod_outlives_trainer),
+    (Kind.WAITING, outliving.kept_alive),
     (Kind.WAITING, troubles.sidecar_out_of_memory),
     (Kind.WAITING, troubles.sidecar_crash_loops),
     (Kind.WAITING, troubles.simulator_not_up),

@@ -11,6 +11,7 @@ from palaestra.decide.counting import newer_pods
 from palaestra.decide.situation import Situation
 from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import ContainerView, PodView
+from palaestra.plan.replica import TRAINER
 
 OUT_OF_MEMORY = "OOMKilled"
 MOST_CONTAINERS = 64  # the limit of the status field
@@ -36,7 +37,8 @@ def memory_kills(situation: Situation) -> tuple[MemoryKills, ...]:
     for pod in (*named, *newer_pods(situation.old, situation.seen.pods)):
         for container in pod.containers:
             before = kills.get(container.name)
-            if killed_for_memory(container) and not _known(before, pod, container):
+            ours = container.simulates or container.name == TRAINER
+            if ours and killed_for_memory(container) and not _known(before, pod, container):
                 kills[container.name] = _one_more(before, pod, container, situation.now)
     return tuple(kills.values())[:MOST_CONTAINERS]
 

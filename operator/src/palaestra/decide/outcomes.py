@@ -10,12 +10,14 @@ from dataclasses import replace
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide.attempts import CAUSES, Attempt, ended_silently, first, of_pod, stop_of, success
+from palaestra.decide.attempts import why as why_of
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code
 from palaestra.decide.situation import Finding, Situation, after, explain
 from palaestra.decide.times import Wait
 from palaestra.decide.troubles import how_it_failed
 from palaestra.observe.views import JobEnd, JobView, PodView
+from palaestra_protocol.pod.status import ExitCode
 
 LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is seen too
 _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
@@ -43,7 +45,21 @@ def stopped(situation: Situation) -> Finding | None:
     """The operator stopped it; the mark on the Job has the reason."""
     job = situation.seen.job
     why = stop_of(job) if job is not None else None
-    return None if job is None or why is None else _ended(situation, job, why)
+    return None if job is None or why is None else _with_phase(_ended(situation, job, why))
+
+
+def trainer_was_done(situation: Situation) -> Finding | None:
+    """The Job has failed, but its trainer was done: a container of others has failed."""
+    job, pod = situation.seen.job, situation.seen.pod
+    if job is None or job.end is not JobEnd.FAILED or pod is None or exit_code(pod) != ExitCode.DONE:
+        return None
+    return _with_phase(_ended(situation, job, why_of(of_pod(situation, pod, situation.counted.attempt))))
+
+
+def _with_phase(end: Finding) -> Finding:
+    """Return an end with the phase of its reason."""
+    done = end.explanation.reason is Reason.SUCCEEDED
+    return replace(end, phase=Phase.SUCCEEDED if done else Phase.FAILED)
 
 
 def would_end_the_same(situation: Situation) -> Finding | None:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.counting import failed_by_itself
+from palaestra.decide.outliving import pod_outlives_trainer
 from palaestra.decide.progress import standstill
 from palaestra.decide.situation import Check, Finding, Situation, after, explain, found
 from palaestra.decide.times import Wait
@@ -83,4 +84,10 @@ def replaced_too_often(situation: Situation) -> Finding | None:
     return min(causes, key=lambda cause: cause.left_s, default=None)
 
 
-REPLACED: tuple[Check, ...] = (restart_policy_dropped, trainer_never_started, stalled, ended_by_probe)
+REPLACED: tuple[Check, ...] = (
+    restart_policy_dropped,
+    trainer_never_started,
+    stalled,
+    ended_by_probe,
+    pod_outlives_trainer,
+)

@@ -106,7 +106,9 @@ def container_refused(situation: Situation) -> Finding | None:
 
 def sidecar_out_of_memory(situation: Situation) -> Finding | None:
     """A sidecar was killed for its memory; the kubelet starts it again."""
-    stuck = next((container for container in crashing(situation.pod) if killed_for_memory(container)), None)
+    stuck = next(
+        (each for each in crashing(situation.pod) if each.simulates and killed_for_memory(each)), None
+    )
     return None if stuck is None else Finding(explanation=of_crash(situation, stuck))
 
 
@@ -240,7 +242,7 @@ def full_volume(word: Termination | None) -> Explanation | None:
 
 def of_crash(situation: Situation, container: ContainerView) -> Explanation:
     """Return the reason for a sidecar that crashed."""
-    if killed_for_memory(container):
+    if container.simulates and killed_for_memory(container):
         times, limit = kills_of(situation, container.name), limit_of(container.memory_limit)
         return explain(Reason.SIMULATOR_OUT_OF_MEMORY, container=container.name, limit=limit, times=times)
     times = max(container.restarts, 1)

@@ -13,7 +13,6 @@ BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # stands for a time that cannot be
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
 BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes of a trainer
-SIDECARS = ("sim-", "ros-master")  # names of the containers that have to be restarted
 
 
 def pod_view(raw: Raw) -> PodView:
@@ -46,7 +45,7 @@ def dropped(view: PodView) -> tuple[str, ...]:
     return tuple(
         container.name
         for container in view.containers
-        if container.kind is ContainerKind.INIT and container.name.startswith(SIDECARS)
+        if container.kind is ContainerKind.INIT and container.simulates
     )
 
 

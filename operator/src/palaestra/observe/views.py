@@ -12,7 +12,10 @@ from typing import Any
 
 from palaestra.plan import Verdicts
 from palaestra.plan.pod import GRACE_S
+from palaestra.plan.replica import ROS_MASTER, TRAINER
 from palaestra_protocol.pod.status import Termination, TrainerStatus
+
+SIDECARS = ("sim-", ROS_MASTER)  # beginnings of the names of the plan's sidecars
 
 Raw = Mapping[str, Any]  # an object as untrusted JSON
 
@@ -119,6 +122,11 @@ class ContainerView:
     memory_limit: str = ""
 
     @property
+    def simulates(self) -> bool:
+        """Return whether it is the ROS master or a simulator's sidecar, by its name."""
+        return self.name.startswith(SIDECARS)
+
+    @property
     def ended_run(self) -> int:
         """Return the number, from 0, of the container's run that `exit` ended."""
         return self.restarts if self.running_since is None else max(self.restarts - 1, 0)
@@ -140,7 +148,7 @@ class PodView:
         gone_by: the end of its grace period after a deletion; None if it was not deleted. It is a time of the
             API server, so it is not compared with our clocks.
         grace_s: seconds between its deletion and `gone_by`.
-        containers: in the order in which they start, the trainer last.
+        containers: in the order in which they start.
         claims: names of the PersistentVolumeClaims that it mounts.
     """
 
@@ -169,14 +177,28 @@ class PodView:
 
     @property
     def trainer(self) -> ContainerView | None:
-        """Return its main container; None if the pod has none."""
-        return next(
-            (container for container in self.containers if container.kind is ContainerKind.MAIN), None
+        """Return the trainer's container; None if the pod has none.
+
+        A mesh or an agent may add containers to a pod, also before the trainer.
+        """
+        return next((container for container in self._main if container.name == TRAINER), None)
+
+    @property
+    def keeping(self) -> tuple[str, ...]:
+        """Return the containers of others that keep the pod from ending with its trainer."""
+        return tuple(
+            container.name
+            for container in self._main
+            if container.name != TRAINER and (container.running_since is not None or container.exit is None)
         )
 
     @property
+    def _main(self) -> tuple[ContainerView, ...]:
+        return tuple(container for container in self.containers if container.kind is ContainerKind.MAIN)
+
+    @property
     def sidecars(self) -> tuple[ContainerView, ...]:
-        """Return the ROS master's container and those of the simulators."""
+        """Return the native sidecars: the ROS master, those of the simulators, and those of others."""
         return tuple(container for container in self.containers if container.kind is ContainerKind.SIDECAR)
 
 

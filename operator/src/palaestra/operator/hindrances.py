@@ -1,8 +1,8 @@
 """Why the pods of a Job cannot be created, cannot start or were ended: a quota, a volume, a failed probe.
 
 Only events report this, and a watch of all events in a cluster is expensive. So the operator lists them
-(`palaestra.operator.asking`) if a Job that should have a pod has none, if a pod waits for its volumes, or if
-a signal ended a trainer and the pod does not show why.
+(`palaestra.operator.asking`) if a Job that should have a pod has none, or if a pod waits for its volumes. It
+also does so if a signal ended a trainer and the pod does not show why.
 """
 
 import time
