@@ -255,6 +255,19 @@ def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_i
     assert f"`kubectl get workloads -n {place.name}`" in line
 
 
+@pytest.mark.parametrize("command", ["suspend", "resume"])
+def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tell, command):
+    """`kubectl wait --for=condition=Suspended` would wait for ever."""
+    place.train("a")
+    tell("a", "Succeeded")
+
+    code, out, [line] = typed(command, "a")
+
+    assert (code, out) == (1, [])
+    assert line.startswith("job a: has ended (Succeeded), so it cannot be ")
+    assert not place.get(TRAINING_JOBS, "a")["spec"].get("suspend")
+
+
 def test_delete_says_what_stays(typed, place):
     """A run may be worth more than the job."""
     uid = place.train("a")["metadata"]["uid"]

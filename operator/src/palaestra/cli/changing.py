@@ -11,11 +11,11 @@ from palaestra_protocol.numbers import seconds
 
 SUSPEND = """\
 Sets spec.suspend of TrainingJobs to true: the pods save a checkpoint and are deleted. Refuses a job with a
-queue, because Kueue suspends and resumes it.
+queue, because Kueue suspends and resumes it, and a job that has ended.
 """
 RESUME = """\
 Sets spec.suspend of TrainingJobs to false: they resume from their checkpoints. Refuses a job with a queue,
-because Kueue suspends and resumes it.
+because Kueue suspends and resumes it, and a job that has ended.
 """
 DELETE = """\
 Deletes TrainingJobs with their pods and waits until they are deleted. The claims with their runs stay unless

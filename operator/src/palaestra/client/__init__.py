@@ -16,6 +16,7 @@ from palaestra.client.client import Client
 from palaestra.client.errors import (
     ClientError,
     EndedOtherwise,
+    HasEnded,
     NoPod,
     NoSuchJob,
     NoSuchNamespace,
@@ -32,6 +33,7 @@ __all__ = [
     "ClientError",
     "EndedOtherwise",
     "Happening",
+    "HasEnded",
     "NoPod",
     "NoSuchJob",
     "NoSuchNamespace",

@@ -9,7 +9,7 @@ from typing import Literal, Self
 from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.status import TERMINAL, PodReference
 from palaestra.client.asking import asked
-from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob, QueueDecides
+from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, QueueDecides
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
@@ -219,6 +219,7 @@ class Client:
 
     def suspend(self, name: str) -> TrainingJob:
         """Suspend a job: its pods save a checkpoint and are deleted; raises the same errors as `resume`."""
+        _check_running(self.get(name), "suspended")
         try:
             return self._suspended(name, suspend=True)
         except Invalid as error:
@@ -230,8 +231,10 @@ class Client:
 
         Raises:
             NoSuchJob: no job has this name.
+            HasEnded: the job has ended; nothing was changed.
             QueueDecides: the job is in a Kueue queue.
         """
+        _check_running(self.get(name), "resumed")
         job = self._suspended(name, suspend=False)
         _check_queue(job)
         return job
@@ -300,6 +303,16 @@ def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
     layout = ClusterLayout(images=Images.of_release(version("palaestra")))
     simulators = Replica(job=job, index=replica, layout=layout).simulators
     return (TRAINER, ROS_MASTER, *(simulator.container for simulator in simulators))
+
+
+def _check_running(job: TrainingJob, verb: str) -> None:
+    """Return if the job has not ended.
+
+    Raises:
+        HasEnded: it has.
+    """
+    if job.status.phase in TERMINAL:
+        raise HasEnded.of(job.metadata.name, job.status.phase.value, verb)
 
 
 def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:

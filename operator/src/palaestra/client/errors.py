@@ -5,6 +5,7 @@
     ├── NoSuchNamespace     the namespace does not exist
     ├── NoSuchJob           the TrainingJob does not exist, or was deleted meanwhile
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
+    ├── HasEnded            the job has ended, so it is neither suspended nor resumed
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
     ├── NoPod               a replica has no pod or no such container, so no log
@@ -68,6 +69,18 @@ class QueueDecides(ClientError):
             f"job {name}: Kueue decides when it runs, because it is in queue {queue}; to stop it, delete "
             "it, or set spec.active of its Workloads to false "
             f"(`kubectl get workloads -n {namespace}` lists them)"
+        )
+
+
+class HasEnded(ClientError):
+    """The job has ended, so it is neither suspended nor resumed; retrying cannot help."""
+
+    @classmethod
+    def of(cls, name: str, phase: str, verb: str) -> Self:
+        """Return the error about a job that ended in this phase; `verb` is what was requested."""
+        return cls(
+            f"job {name}: has ended ({phase}), so it cannot be {verb}; create a new job, and continue this "
+            "run with spec.storage.resumeFrom"
         )
 
 
