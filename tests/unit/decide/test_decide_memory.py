@@ -138,3 +138,22 @@ def test_the_trainers_kills_are_counted_too(training):
     assert told(decision)[0].startswith(
         "the trainer ran out of memory and was killed (limit 1Gi, 1 so far); "
     )
+
+
+def test_a_spent_budget_names_the_memory_that_its_simulators_lacked(training, last_word):
+    """If the kernel kills one process, the trainer sees only a simulator that has died."""
+    scene, pod = training()
+    for each in pod["spec"]["initContainers"]:
+        each["resources"] = {"limits": {"memory": "150Mi"}}
+    scene.end(pod, 80, last_word(reason="SimulatorBudgetSpent: collect-0: 11 restarts (dead 10)"))
+    scene.container(pod, "sim-collect-0", code=137, reason="OOMKilled")
+    scene.end_job("Failed", reason="PodFailurePolicy")
+
+    scene.settle()
+
+    for told in (scene.replica(), scene.replica().last_attempt):
+        assert told.reason == "SimulatorBudgetSpent"
+        assert told.message.endswith(
+            "(dead 10); sim-collect-0 ran out of memory and was killed (limit 150Mi); "
+            "raise spec.simulators[].resources.limits.memory"
+        )

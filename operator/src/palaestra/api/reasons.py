@@ -270,7 +270,7 @@ ROWS: dict[Reason, Row] = {
     Reason.DISRUPTED: Row(
         "pod {pod} was disrupted ({words}); {next_pod}",
         "an eviction, a preemption, a drain, a lost node or a deletion ended the pod; "
-        "it does not count against `backoffLimit`",
+        "it does not count against `backoffLimit`, unless the trainer had no time to save (`TrainerFailed`)",
         "nothing; if it recurs, use non-preemptible nodes",
         warning=False,
     ),
@@ -423,10 +423,11 @@ ROWS: dict[Reason, Row] = {
         "correct the field that the message names, in a new TrainingJob",
     ),
     Reason.SIMULATOR_BUDGET_SPENT: Row(
-        "the simulators failed too often (exit code 80): {words}",
+        "the simulators failed too often (exit code 80): {words}{memory}",
         "a simulator had more than `restart.limit` faults within `restart.withinSeconds`; "
         "the replica is not retried",
-        "read `lastAttempt.faults` in the status; if these faults are acceptable, raise `restart.limit`",
+        "if the message names memory, raise `spec.simulators[].resources.limits.memory`; otherwise read "
+        "`lastAttempt.faults` in the status; if these faults are acceptable, raise `restart.limit`",
     ),
     Reason.DIVERGED: Row(
         "the learner diverged (exit code 81): {words}",

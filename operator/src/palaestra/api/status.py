@@ -93,7 +93,8 @@ class Restarts(Reported):
     """
 
     trainer: Count = 0
-    """Pods replaced because the trainer failed; these count against `backoffLimit`."""
+    """Pods replaced because the trainer failed; these count against `backoffLimit`. A deletion that leaves
+    the trainer no time to save, such as `kubectl delete pod --force`, counts here too."""
 
     simulator: Count = 0
     """Restarts of simulators after a fault, over all attempts."""

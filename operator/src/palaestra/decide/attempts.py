@@ -10,7 +10,7 @@ from palaestra.api.reasons import Reason
 from palaestra.decide.checkpoints import next_pod
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, failed_by_itself
-from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
+from palaestra.decide.memory import killed_for_memory, kills_of, limit_of, memory_kills
 from palaestra.decide.situation import Situation, explain
 from palaestra.decide.suspending import ended_by_suspension, suspended_by
 from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, probe_failed, storage_eviction
@@ -150,7 +150,9 @@ def configuration_refused(attempt: Attempt) -> Explanation | None:
 
 def simulator_budget_spent(attempt: Attempt) -> Explanation | None:
     """The trainer gave up on a simulator."""
-    return _of_code(attempt, ExitCode.FAULT_BUDGET, Reason.SIMULATOR_BUDGET_SPENT)
+    if attempt.code != ExitCode.FAULT_BUDGET:
+        return None
+    return explain(Reason.SIMULATOR_BUDGET_SPENT, words=attempt.words, memory=_memory(attempt))
 
 
 def diverged(attempt: Attempt) -> Explanation | None:
@@ -257,6 +259,18 @@ def success(word: Termination | None) -> str:
 
 def _disrupted(attempt: Attempt, words: str) -> Explanation:
     return explain(Reason.DISRUPTED, pod=attempt.name, words=words, next_pod=next_pod(attempt.situation))
+
+
+def _memory(attempt: Attempt) -> str:
+    """Return which simulators of the attempt ran out of memory, with the remedy; "" if none did."""
+    uid = attempt.pod.uid if attempt.pod is not None else None
+    killed = [
+        f"{kill.container} ran out of memory and was killed ({limit_of(kill.limit)})"
+        for kill in memory_kills(attempt.situation)
+        if uid is not None and kill.pod == uid and kill.container != TRAINER
+    ]
+    remedy = "; raise spec.simulators[].resources.limits.memory"
+    return f"; {', '.join(killed)}{remedy}" if killed else ""
 
 
 def _of_code(attempt: Attempt, code: ExitCode, reason: Reason) -> Explanation | None:
