@@ -209,3 +209,67 @@ def test_rubbish_is_refused(data) -> None:
 
     assert problems is not None
     assert well_told(problems), problems
+
+
+# As Kubernetes' own API has it (core/v1, Affinity).
+EXPRESSIONS = st.lists(
+    st.fixed_dictionaries(
+        {"key": NAMES, "operator": st.just("In"), "values": st.lists(NAMES, min_size=1, max_size=2)}
+    ),
+    min_size=1,
+    max_size=2,
+)
+SELECTORS = st.fixed_dictionaries(
+    {}, optional={"matchLabels": st.dictionaries(NAMES, NAMES), "matchExpressions": EXPRESSIONS}
+)
+POD_TERMS = st.fixed_dictionaries(
+    {"topologyKey": NAMES, "labelSelector": SELECTORS},
+    optional={"namespaceSelector": SELECTORS, "namespaces": st.lists(NAMES, max_size=2)},
+)
+NODE_TERMS = st.fixed_dictionaries({}, optional={"matchExpressions": EXPRESSIONS, "matchFields": EXPRESSIONS})
+
+
+def preferring(field: str, terms: st.SearchStrategy[dict]) -> st.SearchStrategy[list[dict]]:
+    """Return lists of preferences, each with its weight."""
+    return st.lists(
+        st.fixed_dictionaries({"weight": st.integers(1, 100), field: terms}), min_size=1, max_size=2
+    )
+
+
+def near(terms: st.SearchStrategy[dict]) -> st.SearchStrategy[dict]:
+    """Return affinities between pods."""
+    return st.fixed_dictionaries(
+        {"preferredDuringSchedulingIgnoredDuringExecution": preferring("podAffinityTerm", terms)},
+        optional={"requiredDuringSchedulingIgnoredDuringExecution": st.lists(terms, max_size=2)},
+    )
+
+
+AFFINITIES = st.fixed_dictionaries(
+    {"podAntiAffinity": near(POD_TERMS)},
+    optional={
+        "podAffinity": near(POD_TERMS),
+        "nodeAffinity": st.fixed_dictionaries(
+            {
+                "preferredDuringSchedulingIgnoredDuringExecution": preferring("preference", NODE_TERMS),
+                "requiredDuringSchedulingIgnoredDuringExecution": st.fixed_dictionaries(
+                    {"nodeSelectorTerms": st.lists(NODE_TERMS, min_size=1, max_size=2)}
+                ),
+            }
+        ),
+    },
+)
+
+
+@given(AFFINITIES)
+def test_any_affinity_of_a_pod_is_accepted(affinity):
+    """The API server takes it, so a refusal by the operator would come after `kubectl apply`."""
+    job = validate(
+        {
+            "apiVersion": "palaestra.dev/v1alpha1",
+            "kind": "TrainingJob",
+            "metadata": {"name": "spread"},
+            "spec": {"scheduling": {"affinity": affinity}},
+        }
+    )
+
+    assert job.spec.scheduling.affinity == affinity

@@ -1,5 +1,7 @@
 """Each kind of mistake in a field, and the sentence that its author reads."""
 
+import json
+
 import pytest
 
 from palaestra.api import validate
@@ -119,8 +121,8 @@ SENTENCES = [
      "spec.scheduling.nodeSelector: has more than 32 entries; remove some"),
     ({"scheduling.podAnnotations": {"note": LONG}},
      "spec.scheduling.podAnnotations.note: is longer than 1024 characters; shorten it"),
-    ({"trainer.environment.options": {"a": [[[[[[[[[]]]]]]]]]}},
-     "spec.trainer.environment.options: is nested deeper than 8; flatten it"),
+    ({"trainer.environment.options": {"a": json.loads("[" * 17 + "]" * 17)}},
+     "spec.trainer.environment.options: is nested deeper than 16; flatten it"),
     ({"trainer.environment.options": {"a": list(range(1000))}},
      "spec.trainer.environment.options: contains more than 1000 values; shorten it"),
     ({"trainer.environment.options": {"a": "x" * 5000}},

@@ -190,7 +190,7 @@ Quantity = Annotated[
 ]
 Quantities = Annotated[dict[Annotated[str, Field(max_length=317)], Quantity], Field(max_length=16)]
 
-_DEEPEST = 8
+_DEEPEST = 16  # the affinity of a pod is nested 9 deep
 _LONGEST_TEXT = 4096
 _MOST_VALUES = 1000
 
@@ -198,7 +198,7 @@ _MOST_VALUES = 1000
 def _plain(value: object, depth: int) -> int:
     """Return the number of values in `value`; raise an error for one that JSON cannot represent."""
     if depth > _DEEPEST:
-        raise PydanticCustomError("free", "is nested deeper than 8; flatten it")
+        raise PydanticCustomError("free", f"is nested deeper than {_DEEPEST}; flatten it")
     if isinstance(value, dict):
         if not all(isinstance(key, str) for key in value):
             raise PydanticCustomError("free", "has a key that is not text; quote it")
