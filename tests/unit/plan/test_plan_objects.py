@@ -260,3 +260,40 @@ def test_seeds_of_replicas_differ(in_cluster):
     ]
 
     assert seeds == [7, 8, 9]
+
+
+LONG = "quadruped-blind-locomotion-rough-terrain-ppo-a"
+
+
+def claims_of(planned):
+    """Return the names of the claims of a plan, and check that its Jobs mount them."""
+    names = [each.claim["metadata"]["name"] for each in planned.replicas.values()]
+    for name, each in zip(names, planned.replicas.values(), strict=True):
+        volumes = each.job["spec"]["template"]["spec"]["volumes"]
+        assert {"claimName": name} in [volume.get("persistentVolumeClaim") for volume in volumes]
+    return names
+
+
+def test_no_name_of_a_claim_is_longer_than_a_label(make_job):
+    """Provisioners put it into labels and tags of 63 characters; 46 for the job left 85."""
+    names = claims_of(plan(make_job(LONG, replicas=12), LAYOUT))
+    others = claims_of(plan(make_job(LONG, uid="1" * 36, replicas=12), LAYOUT))
+
+    assert max(map(len, names)) <= 63
+    assert len({*names, *others}) == 24
+    assert names[0].startswith("quadruped-blind-locomotion-rough-terrain-ppo")
+
+
+def test_a_claim_of_an_earlier_release_is_found_again(make_job):
+    """A run that began on it would silently begin again on another one."""
+    job = make_job(LONG)
+    before = f"{LONG}-0-{job.metadata.uid}"
+
+    assert claims_of(plan(job, LAYOUT, mounted={0: [before]})) == [before]
+
+
+def test_a_short_name_of_a_claim_has_the_whole_uid(make_job):
+    """Nothing that is deployed changes its name."""
+    job = make_job("walk")
+
+    assert claims_of(plan(job, LAYOUT)) == [f"walk-0-{job.metadata.uid}"]

@@ -10,6 +10,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.job import KIND
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
+from palaestra.plan.claim import claim_name
 
 MADE_FOR_REPLICAS = {"Job", "Pod", "PersistentVolumeClaim", "ConfigMap"}
 
@@ -59,9 +60,12 @@ def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
     kind, name, uid = about.get("kind"), about.get("name", ""), about.get("uid")
     if kind == KIND:
         return name == job.metadata.name and uid in {None, job.metadata.uid}
-    # The pods of a Job end in five characters of Kubernetes' choice, claims and ConfigMaps in a uid.
+    # The pods of a Job end in five characters of Kubernetes' choice, ConfigMaps and most claims in a uid.
     replica = rf"{re.escape(job.metadata.name)}-[0-9]+(-[a-z0-9]{{5}}|-{re.escape(job.metadata.uid or '')})?"
-    return kind in MADE_FOR_REPLICAS and re.fullmatch(replica, name) is not None
+    claims = (
+        claim_name(job.metadata.name, index, job.metadata.uid or "") for index in range(job.spec.replicas)
+    )
+    return kind in MADE_FOR_REPLICAS and (re.fullmatch(replica, name) is not None or name in claims)
 
 
 def _read(event: Mapping[str, Any]) -> Happening:

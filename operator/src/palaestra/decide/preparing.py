@@ -18,6 +18,7 @@ from palaestra.observe.shortening import Lacking
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind
 from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
+from palaestra.plan.claim import former_name
 from palaestra_sim.errors import WorldError
 
 
@@ -229,14 +230,23 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
 
 
 def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
-    """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts."""
+    """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts.
+
+    A replica without a Job keeps the claim of an earlier release.
+    """
     named = {source.name for source in references(job) if source.kind is SourceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     return {
-        replica.index: replica.job.volumes if replica.job is not None else frozenset()
+        replica.index: replica.job.volumes
+        if replica.job is not None
+        else there & {_former(job, replica.index)}
         for replica in unfinished(job, observed)
         if replica.job is None or not replica.job.volumes <= there
     }
+
+
+def _former(job: TrainingJob, index: int) -> str:
+    return former_name(job.metadata.name, index, job.metadata.uid or "")
 
 
 def resuming(job: TrainingJob, observed: Observed) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from palaestra.api import TrainingJob
 from palaestra.errors import PlanError
 from palaestra.objects import Object
-from palaestra.plan.claim import claim
+from palaestra.plan.claim import claim, claim_of
 from palaestra.plan.config_map import config_map
 from palaestra.plan.job import job as replica_job
 from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Places, Ports
@@ -41,7 +41,9 @@ __all__ = [
     "plan",
 ]
 
-Mounted = Mapping[int, Collection[str]]  # replica -> names of the volumes that its Job mounts; none: no Job
+Mounted = Mapping[
+    int, Collection[str]
+]  # replica -> names of the volumes that its Job mounts, or of its claim
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +98,9 @@ def plan(
     sources = source_files(job, config_maps or {}, verdicts)
     chosen = dict.fromkeys(range(job.spec.replicas), ()) if mounted is None else mounted
     planned = {
-        index: _replica_plan(Replica(job=job, index=index, layout=layout), sources, volumes)
+        index: _replica_plan(
+            Replica(job=job, index=index, layout=layout, volumes=frozenset(volumes)), sources
+        )
         for index, volumes in chosen.items()
     }
     return Plan(network_policy=network_policy(job, layout), replicas=planned)
@@ -108,10 +112,11 @@ def identified(job: TrainingJob, uid: str) -> TrainingJob:
     return job.model_copy(update={"metadata": metadata})
 
 
-def _replica_plan(replica: Replica, sources: Files, volumes: Collection[str]) -> ReplicaPlan:
+def _replica_plan(replica: Replica, sources: Files) -> ReplicaPlan:
     worlds = sources
     configured = config_map(replica, worlds)
-    if volumes and configured["metadata"]["name"] not in volumes:  # its Job is of an earlier version
+    mounted = replica.volumes - {claim_of(replica)}
+    if mounted and configured["metadata"]["name"] not in mounted:  # its Job is of an earlier version
         worlds = named_files(replica, sources)
         configured = config_map(replica, worlds)
     template = pod_template(replica, configured, worlds)

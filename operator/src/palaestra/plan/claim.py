@@ -3,6 +3,7 @@
 And the claim with the policy that the run begins with, if the job names one.
 """
 
+from hashlib import sha256
 from typing import Any
 
 from palaestra.api.storage import Retain
@@ -10,12 +11,14 @@ from palaestra.errors import PlanError
 from palaestra.plan.replica import TRAINER, Replica
 
 INITIAL = "initial-policy"
+LONGEST_NAME = 63  # of a label's value and of a cloud's tag, into which provisioners put the name of a claim
+DIGITS = 12  # hexadecimal, of a name that would be longer
 
 
 def claim(replica: Replica) -> dict[str, Any] | None:
     """Return the replica's own PersistentVolumeClaim, or None when the job wants none.
 
-    Its name has the job's uid: a job that is deleted and made again starts anew, beside the old run.
+    Its name depends on the job's uid: a job that is deleted and made again starts anew, beside the old run.
     It has no owner, so that it outlives the job, unless the job says `retain: Delete`.
     """
     storage = replica.job.spec.storage
@@ -30,7 +33,7 @@ def claim(replica: Replica) -> dict[str, Any] | None:
     return {
         "apiVersion": "v1",
         "kind": "PersistentVolumeClaim",
-        "metadata": replica.metadata(_name(replica), owned=storage.retain is Retain.DELETE),
+        "metadata": replica.metadata(claim_of(replica), owned=storage.retain is Retain.DELETE),
         "spec": spec,
     }
 
@@ -40,7 +43,7 @@ def run_volume(replica: Replica) -> dict[str, Any]:
     storage = replica.job.spec.storage
     if storage.ephemeral:
         return {"name": "run", "emptyDir": {"sizeLimit": storage.size}}
-    name = storage.existing_claim or _name(replica)
+    name = storage.existing_claim or claim_of(replica)
     return {"name": "run", "persistentVolumeClaim": {"claimName": name}}
 
 
@@ -75,5 +78,25 @@ def initial_path(replica: Replica) -> str | None:
     return f"{places.volume if initial_volume(replica) is None else places.initial}/{initial.path}"
 
 
-def _name(replica: Replica) -> str:
-    return f"{replica.name}-{replica.uid}"
+def claim_name(job: str, index: int, uid: str) -> str:
+    """Return the name of the claim of a job's replica: `<job>-<replica>-<uid>`.
+
+    If that is too long, the job's name is cut, and a hash over all of it takes the place of the uid.
+    """
+    whole = former_name(job, index, uid)
+    if len(whole) <= LONGEST_NAME:
+        return whole
+    end = f"-{index}-{sha256(whole.encode()).hexdigest()[:DIGITS]}"
+    return f"{job[: LONGEST_NAME - len(end)].rstrip('-.')}{end}"
+
+
+def former_name(job: str, index: int, uid: str) -> str:
+    """Return the name that an earlier release gave to the claim of a replica, of any length."""
+    return f"{job}-{index}-{uid}"
+
+
+def claim_of(replica: Replica) -> str:
+    """Return the name of the replica's claim; one of an earlier release keeps its name."""
+    parts = (replica.job.metadata.name, replica.index, replica.uid)
+    before = former_name(*parts)
+    return before if before in replica.volumes else claim_name(*parts)

@@ -67,11 +67,12 @@ def owner(job: TrainingJob) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replica:
-    """One replica of a job in a layout."""
+    """One replica of a job in a layout; `volumes` are those that its Job mounts, or its claim, by name."""
 
     job: TrainingJob
     index: int
     layout: Layout
+    volumes: frozenset[str] = frozenset()
 
     @property
     def uid(self) -> str:
