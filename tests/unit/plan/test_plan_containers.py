@@ -290,7 +290,7 @@ def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
     sizes = {
         volume["name"]: volume["emptyDir"]["sizeLimit"]
         for volume in spec["volumes"]
-        if volume["name"].startswith("memory-")
+        if volume["name"].startswith("memory-sim-")
     }
 
     assert sizes == {"memory-sim-collect-0": "256Mi", "memory-sim-evaluate-0": "128Mi"}
@@ -312,3 +312,16 @@ def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
 
     assert threads >= 1
     assert 0 <= threads * 1000 - millis < 1000
+
+
+@pytest.mark.parametrize(
+    ("limits", "size"), [({"memory": "6Gi"}, {"sizeLimit": "6Gi"}), ({"cpu": "2"}, None)]
+)
+def test_the_trainer_shares_memory_within_its_limit(in_cluster, limits, size):
+    """Workers of a DataLoader or an AsyncVectorEnv need more than the 64 MiB of a container runtime."""
+    planned = in_cluster(trainer={"resources": {"limits": limits}})
+    volumes = planned.replicas[0].job["spec"]["template"]["spec"]["volumes"]
+    mounts = {each["mountPath"]: each["name"] for each in containers(planned)["trainer"]["volumeMounts"]}
+
+    [volume] = [each["emptyDir"] for each in volumes if each["name"] == mounts["/dev/shm"]]
+    assert volume == {"medium": "Memory", **(size or {"sizeLimit": "2Gi"})}

@@ -138,7 +138,7 @@ def install_sidecar(replica: Replica) -> Container | None:
 
 
 def shared_memory(container: str) -> str:
-    """Return the name of the volume that a simulator's container has for shared memory."""
+    """Return the name of the volume that a simulator's or the trainer's container has for shared memory."""
     return f"memory-{container}"
 
 
@@ -187,7 +187,7 @@ def _mounts(replica: Replica, container: str, places: Places) -> list[dict[str, 
         mounts.append({"name": "run", "mountPath": places.volume})
         if initial_volume(replica) is not None:
             mounts.append({"name": INITIAL, "mountPath": places.initial, "readOnly": True})
-    elif container != ROS_MASTER and places.shared_memory is not None:
+    if container != ROS_MASTER and places.shared_memory is not None:
         mounts.append({"name": shared_memory(container), "mountPath": places.shared_memory})
     return mounts
 

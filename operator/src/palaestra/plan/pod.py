@@ -6,7 +6,7 @@ from typing import Any
 from palaestra.plan.claim import INITIAL, initial_volume, run_volume
 from palaestra.plan.config_map import config_volume
 from palaestra.plan.containers import install_sidecar, ros_master, shared_memory, sidecar, trainer
-from palaestra.plan.replica import Replica
+from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 USER = 65532  # uid, gid and fsGroup of everything in the pod
@@ -48,7 +48,7 @@ def pod_template(
                 config_volume(config_map),
                 run_volume(replica),
                 *([initial] if initial else []),
-                *_empty_volumes([*init, main], _sizes(replica)),
+                *_empty_volumes([*init, main], _sizes(replica, main)),
             ],
         },
     }
@@ -75,15 +75,21 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
     return fields
 
 
-def _sizes(replica: Replica) -> dict[str, str]:
-    """Return the size of each simulator's shared memory by the name of its volume."""
-    return {
+def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str | None]:
+    """Return the size of each container's shared memory by the name of its volume.
+
+    The trainer's own memory limit bounds what it shares with its workers; None: it has no limit.
+    """
+    whole = {shared_memory(TRAINER): main["resources"].get("limits", {}).get("memory")}
+    return whole | {
         shared_memory(simulator.container): twice(MEMORY_SIZE) if simulator.group.standby else MEMORY_SIZE
         for simulator in replica.simulators
     }
 
 
-def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
+def _empty_volumes(
+    containers: list[dict[str, Any]], memory: Mapping[str, str | None]
+) -> list[dict[str, Any]]:
     """Return an empty volume for every mount that has no other: each container has its own."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [
@@ -92,7 +98,8 @@ def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) 
     ]
 
 
-def _empty(name: str, memory: Mapping[str, str]) -> dict[str, Any]:
+def _empty(name: str, memory: Mapping[str, str | None]) -> dict[str, Any]:
     if name in memory:
-        return {"medium": "Memory", "sizeLimit": memory[name]}
+        size = memory[name]
+        return {"medium": "Memory", **({} if size is None else {"sizeLimit": size})}
     return {"sizeLimit": SCRATCH_SIZE}
