@@ -30,6 +30,7 @@
     ├── CommandFailed                a command in a container failed (cluster.errors)
     ├── ClientError                  a command about a cluster's jobs cannot be carried out (client.errors)
     │   ├── EndedOtherwise           the job ended in another way than awaited
+    │   ├── HasEnded                 the job has ended, so it is neither suspended nor resumed
     │   ├── NoPod                    a replica has no pod or container to read
     │   ├── NoSuchJob                no such TrainingJob
     │   ├── NoSuchNamespace          no such namespace

@@ -198,7 +198,7 @@ _MOST_VALUES = 1000
 def _plain(value: object, depth: int) -> int:
     """Return the number of values in `value`; raise an error for one that JSON cannot represent."""
     if depth > _DEEPEST:
-        raise PydanticCustomError("free", f"is nested deeper than {_DEEPEST}; flatten it")
+        raise PydanticCustomError("free", "is nested deeper than {most}; flatten it", {"most": _DEEPEST})
     if isinstance(value, dict):
         if not all(isinstance(key, str) for key in value):
             raise PydanticCustomError("free", "has a key that is not text; quote it")

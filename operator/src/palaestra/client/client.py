@@ -311,8 +311,9 @@ def _check_running(job: TrainingJob, verb: str) -> None:
     Raises:
         HasEnded: it has.
     """
-    if job.status.phase in TERMINAL:
-        raise HasEnded.of(job.metadata.name, job.status.phase.value, verb)
+    phase = job.status.phase
+    if phase is not None and phase in TERMINAL:
+        raise HasEnded.of(job.metadata.name, phase.value, verb)
 
 
 def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:

@@ -4,7 +4,7 @@ A replica with all its objects is not planned at all, so a later change of its w
 release, has no effect on it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
@@ -237,16 +237,17 @@ def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str
     named = {source.name for source in references(job) if source.kind is SourceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     return {
-        replica.index: replica.job.volumes
-        if replica.job is not None
-        else there & {_former(job, replica.index)}
+        replica.index: _mounted(job, replica, there)
         for replica in unfinished(job, observed)
         if replica.job is None or not replica.job.volumes <= there
     }
 
 
-def _former(job: TrainingJob, index: int) -> str:
-    return former_name(job.metadata.name, index, job.metadata.uid or "")
+def _mounted(job: TrainingJob, replica: ReplicaObserved, there: Collection[str]) -> frozenset[str]:
+    if replica.job is not None:
+        return replica.job.volumes
+    former = former_name(job.metadata.name, replica.index, job.metadata.uid or "")
+    return frozenset({former}).intersection(there)
 
 
 def resuming(job: TrainingJob, observed: Observed) -> bool:
