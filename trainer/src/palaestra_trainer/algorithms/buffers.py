@@ -7,7 +7,7 @@ and the fault is no penalty.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -193,3 +193,13 @@ class ValidRolloutBuffer(RolloutBuffer):
 
 class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):
     """The same for observations that are a Dict."""
+
+
+def batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
+    """Yield `rows` in parts of `size`; a single last row joins the part before it.
+
+    The deviation of a single advantage is NaN.
+    """
+    for start in range(0, max(len(rows) - 1, 1), size):
+        is_last = start + size >= len(rows) - 1
+        yield rows[start:] if is_last else rows[start : start + size]

@@ -81,7 +81,7 @@ RANGES_OF_POLICY: Mapping[str, Range] = {
     "n_quantiles": COUNT,
 }
 # Batch normalization, or a deviation of advantages, of a single row is none.
-LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2}
+LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2, "MaskablePPO": 2}
 
 
 def out_of_range(algorithm: str, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
