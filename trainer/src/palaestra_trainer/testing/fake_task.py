@@ -100,6 +100,15 @@ class MaskedTask(FakeTask):
     def action_masks(self) -> np.ndarray:
         """Return which choices the next step allows: one of each number of the action, and half of the rest."""
         self._live()
+        return self._allowed()
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take a step, unless the action is forbidden."""
+        if not allows(self._allowed(), self.action_space, action):
+            raise AssertionError(f"action {action} is forbidden in step {self._length + 1}")
+        return super().step(action)
+
+    def _allowed(self) -> np.ndarray:
         generator = np.random.default_rng(self._past)
         masks = []
         for choices in choices_of(self.action_space):
@@ -107,10 +116,3 @@ class MaskedTask(FakeTask):
             mask[generator.integers(choices)] = True
             masks.append(mask)
         return np.concatenate(masks)
-
-    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take a step, unless the action is forbidden."""
-        self._live()
-        if not allows(self.action_masks(), self.action_space, action):
-            raise AssertionError(f"action {action} is forbidden in step {self._length}")
-        return super().step(action)
