@@ -182,13 +182,16 @@ class ValidRolloutBuffer(RolloutBuffer):
         super().compute_returns_and_advantage(last_values, dones)
 
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
-        """Yield minibatches of valid rows in random order; the last one may be smaller."""
+        """Yield minibatches of valid rows in random order."""
         if not self.generator_ready:
             next(super().get(1))  # flattens the rows of all members into one column
         rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))
-        size = batch_size or max(len(rows), 1)
-        for start in range(0, len(rows), size):
-            yield self._get_samples(rows[start : start + size])
+        for batch in self._parts(rows, batch_size or max(len(rows), 1)):
+            yield self._get_samples(batch)
+
+    def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
+        """Yield `rows` in parts of `size`; the last one may be smaller."""
+        return (rows[start : start + size] for start in range(0, len(rows), size))
 
 
 class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):

@@ -56,7 +56,9 @@ def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
     try:
         mask = np.asarray(given)
     except ValueError as error:
-        raise _wrong(env, f"one array of {sum(choices)} truth values", "lists of different lengths") from error
+        raise _wrong(
+            env, f"one array of {sum(choices)} truth values", "lists of different lengths"
+        ) from error
     if mask.size != sum(choices):
         came = f"an array of shape {mask.shape}"
         raise _wrong(env, f"{sum(choices)} truth values, one for each choice of {env.action_space}", came)

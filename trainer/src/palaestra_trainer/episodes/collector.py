@@ -21,10 +21,10 @@ from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
 from palaestra_trainer.copies import copied
+from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.position import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
-from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.errors import Diverged, SimulatorFault
 from palaestra_trainer.infos import HIDDEN, OURS, TRUNCATED, of_environment
 from palaestra_trainer.simulators.keeper import Keeper

@@ -19,10 +19,10 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.copies import copied
+from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
-from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
 from palaestra_trainer.errors import fact_of
 from palaestra_trainer.infos import is_valid
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle

@@ -2,7 +2,7 @@
 
 It does everything that `Policy.predict` does around the network: channels of images, normalization, and the
 bounds of actions. A recurrent policy takes its state as inputs and returns the next; zeros begin an episode.
-A policy of MaskablePPO takes masks as a further input, in the layout of `palaestra_trainer.environments.masks`.
+A policy of MaskablePPO takes masks as a further input, as `palaestra_trainer.environments.masks` says.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def drawn_masks(acting: Acting, count: int) -> np.ndarray:
     generator = np.random.default_rng(0)
     parts = []
     for choices in acting.choices:
-        part = generator.random((count, choices)) < 0.5
+        part = generator.integers(2, size=(count, choices)).astype(np.bool_)
         part[np.arange(count), generator.integers(choices, size=count)] = True
         parts.append(part)
     return np.concatenate(parts, axis=1)

@@ -98,7 +98,7 @@ class MaskedTask(FakeTask):
     """
 
     def action_masks(self) -> np.ndarray:
-        """Return which choices the next step allows: one of each number of the action, and half of the rest."""
+        """Return which choices the next step allows: at least one of each number of the action."""
         self._live()
         return self._allowed()
 
@@ -112,7 +112,7 @@ class MaskedTask(FakeTask):
         generator = np.random.default_rng(self._past)
         masks = []
         for choices in choices_of(self.action_space):
-            mask = generator.random(choices) < 0.5
+            mask = generator.integers(2, size=choices).astype(np.bool_)
             mask[generator.integers(choices)] = True
             masks.append(mask)
         return np.concatenate(masks)
