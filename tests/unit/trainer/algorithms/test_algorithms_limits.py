@@ -117,3 +117,10 @@ def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):
 def test_a_frequency_in_episodes_fits_one_simulator():
     """Stable-Baselines3 allows it there."""
     assert not refusal_of(small("DQN", train_freq=[1, "episode"]), members=1)
+
+
+@pytest.mark.parametrize("name", ["sb3_contrib:MaskablePPO", "sb3_contrib:RecurrentPPO"])
+def test_a_class_by_its_name_has_the_ranges_of_the_algorithm_that_it_is(name):
+    """One row has no deviation, whatever the job calls the class."""
+    with pytest.raises(ConfigurationError, match="batch_size: 1 is refused; give a number of at least 2"):
+        check(Algorithm(name=name, hyperparameters={"batch_size": 1}))

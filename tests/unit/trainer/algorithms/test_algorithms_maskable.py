@@ -19,6 +19,7 @@ from palaestra_trainer.algorithms import check, make_model, policy_of
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.environments.masks import allows
+from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, SimulatorHung
@@ -237,10 +238,10 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
     ) in last_word().reason
 
 
-@pytest.mark.parametrize("normalize", [None, {}])
-def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, normalize):
-    """The task fails at any other action. `palaestra-eval` does as they do."""
-    code, _, (configuration, make_members) = run(task_of, algorithm={"normalize": normalize})
+@pytest.mark.parametrize("given", [{}, {"normalize": {}}, {"name": "sb3_contrib:MaskablePPO"}])
+def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, given):
+    """The task fails at any other action. `palaestra-eval` does as they do, and so does a class by name."""
+    code, _, (configuration, make_members) = run(task_of, algorithm=given)
     again = measure(configuration, directory.model, make_members, episodes=4, stream="C")
 
     assert code == 0
@@ -275,40 +276,29 @@ def test_palaestra_eval_refuses_an_environment_without_masks_before_a_simulator_
     assert "start" not in members[0].log
 
 
-class Fickle(MaskedTask):
-    """A task that repeats nothing: its observations and masks depend on its lives too."""
-
-    lives = 0
-
-    def reset(self, *, seed=None, options=None):
-        """Begin an episode that no other one is like."""
-        Fickle.lives += 1
-        return super().reset(seed=seed + 1_000 * Fickle.lives, options=options)
-
-
 def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
-    """A simulator that does not repeat itself may forbid now what it allowed."""
-    model, _, env = learn(task_of())
-    model.learn(40)
-    before = env.snapshot()
-    env.close()
-    assert all(len(state.actions) > 0 for state in before)
+    """A simulator that does not repeat itself may forbid now what it allowed; then the next episode begins."""
+    saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
+    env = learn(task_of())[2]
 
-    for _ in range(20):
-        _, members, fickle = learn(task_of(Fickle, max_steps=50))
-        fickle.resume([before[0], before[1]], masked=True)  # the task fails at a forbidden action
-        members[0].stop()
-        fickle.close()
+    with pytest.raises(AssertionError, match="action 0 is forbidden"):
+        env.resume(saved)
+    env.resume(saved, masked=True)
+
+    first, second = env.snapshot()
+    env.close()
+    assert (first.episode, len(first.actions)) == (1, 0)
+    assert (second.episode, second.actions.tolist()) == (4, [1])
 
 
 @pytest.mark.parametrize(
     ("masks", "fact"),
     [
         ([True] * 4, r"3 truth values, one for each choice of Discrete\(3\); got an array of shape \(4,\)"),
-        ([False] * 3, "at least one choice allowed; got none"),
-        ([0.0, np.nan, 1.0], "truth values; got float64 values such as nan"),
-        (["yes"] * 3, "truth values; got <U3 values such as 'yes'"),
-        ([[1], [1, 1]], "one array of 3 truth values; got lists of different lengths"),
+        ([False] * 3, "at least one allowed choice; got none"),
+        ([0.0, np.nan, 1.0], "got float64 values such as nan"),
+        (["yes"] * 3, "got <U3 values such as 'yes'"),
+        ([[1], [1, 1]], "got lists of different lengths"),
     ],
 )
 def test_what_is_no_mask_is_refused_with_what_came(run, last_word, masks, fact):
@@ -325,7 +315,7 @@ def test_what_is_no_mask_is_refused_with_what_came(run, last_word, masks, fact):
 
     assert code == 2
     reason = last_word().reason
-    assert "environment.id: Wrong: expected from action_masks(self) " in reason
+    assert "environment.id: Wrong: action_masks(self): expected " in reason
     assert re.search(fact, reason)
 
 
@@ -363,6 +353,8 @@ def test_a_policy_with_masks_never_acts_without_them(run, directory, play, job, 
 
     with pytest.raises(ValueError, match=r'action_masks: .* pass env.get_wrapper_attr\("action_masks"\)\(\)'):
         load_policy(directory.path).predict(seen)
+    with pytest.raises(ValueError, match="action_masks: expected at least one allowed choice; got none"):
+        load_policy(directory.path).predict(seen, action_masks=[False] * 3)
 
     another = type(directory)(tmp_path / "another")
     corridor = job("PPO", steps=40, environment={"id": "MoveToTargetEnv-v0"})

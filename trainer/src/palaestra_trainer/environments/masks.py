@@ -15,7 +15,6 @@ from gymnasium import spaces
 from palaestra_trainer.errors import ConfigurationError
 
 ACTION_MASKS = "action_masks"
-_METHOD = f"{ACTION_MASKS}(self)"
 
 
 def gives_masks(env: gymnasium.Env[Any, Any]) -> bool:
@@ -45,6 +44,36 @@ def all_allowed(space: spaces.Space[Any]) -> np.ndarray:
     return np.ones(sum(choices_of(space)), np.bool_)
 
 
+def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) -> np.ndarray:
+    """Return masks of actions as truth values; shape (masks, choices).
+
+    Args:
+        given: one mask or several, of any shape.
+        space: of the actions.
+        count: the number of masks; None: any.
+
+    Raises:
+        ValueError: they are no masks, or one of them allows nothing.
+    """
+    choices = choices_of(space)
+    expected = f"expected {sum(choices)} truth values, one for each choice of {space}; got"
+    try:
+        masks = np.asarray(given)
+    except ValueError as error:
+        raise ValueError(f"{expected} lists of different lengths") from error
+    found, rest = divmod(masks.size, sum(choices))
+    if rest or found != (count or max(1, found)):
+        raise ValueError(f"{expected} an array of shape {masks.shape}")
+    if masks.dtype.kind not in "biuf" or not np.isin(masks, (0, 1)).all():
+        raise ValueError(f"{expected} {masks.dtype} values such as {_odd(masks)!r}")
+    rows = masks.reshape(-1, sum(choices)).astype(np.bool_)
+    for number, part in enumerate(_parts(rows, choices)):
+        if not part.any(axis=-1).all():
+            where = f" for number {number} of the action" if len(choices) > 1 else ""
+            raise ValueError(f"expected at least one allowed choice{where}; got none")
+    return rows
+
+
 def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
     """Return a copy of the mask that the environment returns now; shape (choices,), bool.
 
@@ -52,23 +81,14 @@ def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
         ConfigurationError: it is no mask of the environment's actions, or allows none.
     """
     given = env.get_wrapper_attr(ACTION_MASKS)()
-    choices = choices_of(env.action_space)
     try:
-        mask = np.asarray(given)
+        mask: np.ndarray = masks_in(given, env.action_space, count=1)[0]
     except ValueError as error:
-        raise _wrong(
-            env, f"one array of {sum(choices)} truth values", "lists of different lengths"
+        inner = env.unwrapped
+        name = inner.spec.id if inner.spec else type(inner).__name__
+        raise ConfigurationError(
+            f"environment.id: {name}: {ACTION_MASKS}(self): {error}; fix the environment"
         ) from error
-    if mask.size != sum(choices):
-        came = f"an array of shape {mask.shape}"
-        raise _wrong(env, f"{sum(choices)} truth values, one for each choice of {env.action_space}", came)
-    if mask.dtype.kind not in "biuf" or not np.isin(mask, (0, 1)).all():
-        raise _wrong(env, "truth values", f"{mask.dtype} values such as {_odd(mask)!r}")
-    mask = mask.ravel().astype(np.bool_)
-    for number, part in enumerate(_parts(mask, choices)):
-        if not part.any():
-            where = f" for number {number} of the action" if len(choices) > 1 else ""
-            raise _wrong(env, f"at least one choice allowed{where}", "none")
     return mask
 
 
@@ -79,18 +99,10 @@ def allows(mask: np.ndarray, space: spaces.Space[Any], action: Any) -> bool:
 
 
 def _parts(mask: np.ndarray, choices: list[int]) -> list[np.ndarray]:
-    return np.split(mask, np.cumsum(choices)[:-1])
+    return np.split(mask, np.cumsum(choices)[:-1], axis=-1)
 
 
 def _odd(mask: np.ndarray) -> Any:
     """Return the first value that is no truth value."""
     values = mask.ravel().tolist()
     return next((value for value in values if value not in (0, 1)), values[0])
-
-
-def _wrong(env: gymnasium.Env[Any, Any], expected: str, came: str) -> ConfigurationError:
-    inner = env.unwrapped
-    name = inner.spec.id if inner.spec else type(inner).__name__
-    return ConfigurationError(
-        f"environment.id: {name}: expected from {_METHOD} {expected}; got {came}; fix the environment"
-    )

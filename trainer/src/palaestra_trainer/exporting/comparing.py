@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium import spaces
 
-from palaestra_trainer.environments.masks import ACTION_MASKS
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting.acting import OBSERVATION, Acting, Scoring
 from palaestra_trainer.exporting.sampling import EPISODE, drawn, drawn_masks, magnitudes
@@ -41,14 +39,21 @@ def compare(convert: Convert, acting: Acting, policy: Policy) -> float:
     """
     observations = drawn(acting, OBSERVATIONS)
     run = convert(acting)
-    differences = []
-    for masks in _masks(acting):
-        played = _played_in_turn if acting.state_shape else partial(_played_at_once, masks=masks)
-        ours, expected = played(run, acting, policy, observations)
-        differences.append(_difference(ours, expected, acting, observations))
+    played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
+    difference = max(_difference(*actions, acting, observations) for actions in played)
     # Masks alone may make actions differ, so the last ones allow everything.
+    _, expected = played[-1]
     _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
-    return max(differences)
+    return difference
+
+
+def _played(
+    run: Run, acting: Acting, policy: Policy, observations: Mapping[str, np.ndarray], masks: Arrays
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the actions of the file and of the policy."""
+    if acting.state_shape is None:
+        return _played_at_once(run, policy, observations, masks)
+    return _played_in_turn(run, acting, policy, observations)
 
 
 def _masks(acting: Acting) -> list[Arrays]:
@@ -145,12 +150,11 @@ def _span_and_tolerance(
 
 
 def _played_at_once(
-    run: Run, acting: Acting, policy: Policy, observations: Mapping[str, np.ndarray], *, masks: Arrays
+    run: Run, policy: Policy, observations: Mapping[str, np.ndarray], masks: Arrays
 ) -> tuple[np.ndarray, np.ndarray]:
-    del acting
     (ours,) = run(*observations.values(), *masks)
-    allowed = {ACTION_MASKS: masks[0]} if masks else {}
-    return ours, np.asarray(policy.predict(_whole(observations), **allowed)[0])
+    allowed = masks[0] if masks else None
+    return ours, np.asarray(policy.predict(_whole(observations), action_masks=allowed)[0])
 
 
 def _played_in_turn(

@@ -19,6 +19,7 @@ from palaestra_trainer.algorithms.values import arguments
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.configuration import Configuration, Environment, load
 from palaestra_trainer.environments.making import keywords, make_environment
+from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.run import byte_code
@@ -78,7 +79,7 @@ class Policy:
         any.
 
         Raises:
-            ValueError: there are no masks for a policy that needs them, or masks for another one.
+            ValueError: there are no masks for a policy that needs them, wrong ones, or masks for another one.
         """
         seen = (self._seen(observation), state, episode_start)
         if takes_masks(self.model):
@@ -87,7 +88,11 @@ class Policy:
                     "action_masks: the policy chooses only among allowed actions; pass "
                     'env.get_wrapper_attr("action_masks")(), or numpy.ones to allow all'
                 )
-            return predict_allowed(self.model, action_masks, *seen, deterministic=deterministic)
+            try:
+                masks = masks_in(action_masks, self.model.action_space)
+            except ValueError as error:
+                raise ValueError(f"action_masks: {error}; pass those of the environment") from error
+            return predict_allowed(self.model, masks, *seen, deterministic=deterministic)
         if action_masks is not None:
             raise ValueError(
                 f"action_masks: {type(self.model).__name__} chooses among all actions; leave them out, or "
