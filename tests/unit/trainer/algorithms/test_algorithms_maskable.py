@@ -277,7 +277,7 @@ def test_palaestra_eval_refuses_an_environment_without_masks_before_a_simulator_
 
 
 def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
-    """A simulator that does not repeat itself may forbid now what it allowed; then the next episode begins."""
+    """A simulator that does not repeat itself may forbid what it allowed; then the next episode begins."""
     saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
     env = learn(task_of())[2]
 
