@@ -74,9 +74,5 @@ NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
     {
         "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",
         "her": _HINDSIGHT,
-        "maskableppo": (
-            "MaskablePPO keeps masks of actions in a buffer that has no place for rows of broken simulators, "
-            "and evaluations would act without masks; use PPO, and let the environment ignore such actions"
-        ),
     }
 )

@@ -19,7 +19,8 @@ SENTENCES = [
      'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena, seeing, court or pen'),
     ({"trainer.algorithm.name": "TD4"},
      ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
-     "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),
+     "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, MaskablePPO, REINFORCE "
+      "or module:Class")),
     ({"trainer.algorithm.name": "HER"},
      ('spec.trainer.algorithm.name: "HER" cannot be used: HER is a replay buffer; '
      "use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer")),

@@ -48,6 +48,7 @@ ALGORITHMS = (
     "TRPO",
     "CrossQ",
     "RecurrentPPO",
+    "MaskablePPO",
     "REINFORCE",
 )
 ROBOTS = ("Robotino", "TurtleBot3Burger", "EPuck")

@@ -137,8 +137,8 @@ class Algorithm(ApiModel):
     """The learning algorithm."""
 
     name: Annotated[str, Field(min_length=1, max_length=256, pattern=ALGORITHM)] = "DQN"
-    """DQN, PPO, A2C, SAC, TD3 and DDPG are from Stable-Baselines3, QRDQN, TQC, TRPO, CrossQ and RecurrentPPO
-    from sb3-contrib; REINFORCE is Palaestra's. `module:Class` is a class that is compatible with
+    """DQN, PPO, A2C, SAC, TD3 and DDPG are from Stable-Baselines3, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO and
+    MaskablePPO from sb3-contrib; REINFORCE is Palaestra's. `module:Class` is a class that is compatible with
     Stable-Baselines3. docs/algorithms.md has the observations and actions that each takes."""
 
     hyperparameters: FreeObject = Field(default={})

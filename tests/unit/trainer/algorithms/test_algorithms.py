@@ -67,10 +67,10 @@ class Boundaries(BaseCallback):
         return True
 
 
-def test_all_twelve_are_there():
+def test_all_thirteen_are_there():
     """The TrainingJob's pattern names them."""
     stable_baselines3 = {"DQN", "PPO", "A2C", "SAC", "TD3", "DDPG"}
-    contrib = {"QRDQN", "TQC", "TRPO", "CrossQ", "RecurrentPPO"}
+    contrib = {"QRDQN", "TQC", "TRPO", "CrossQ", "RecurrentPPO", "MaskablePPO"}
 
     assert set(ALGORITHMS) == stable_baselines3 | contrib | {"REINFORCE"}
 
@@ -425,7 +425,11 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
 @pytest.mark.parametrize(
     ("name", "word", "fact"),
     [
-        ("A2C", "n_epochs", "A2C has no such hyperparameter, unlike PPO, RecurrentPPO; leave it out"),
+        (
+            "A2C",
+            "n_epochs",
+            "A2C has no such hyperparameter, unlike PPO, RecurrentPPO, MaskablePPO; leave it out",
+        ),
         (
             "DQN",
             "noise_type",

@@ -16,7 +16,7 @@ from palaestra_trainer.algorithms.beside import BESIDE, Beside, beside
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
 OFF_POLICY = {"learning_starts": 4, "batch_size": 4, "buffer_size": 60, "train_freq": 6}
@@ -33,6 +33,7 @@ HYPERPARAMETERS = {
     "PPO": ON_POLICY,
     "A2C": {"n_steps": 16},
     "TRPO": ON_POLICY,
+    "MaskablePPO": ON_POLICY,
     "RecurrentPPO": ON_POLICY | {"policy_kwargs": {"net_arch": [4], "lstm_hidden_size": 4}},
     "REINFORCE": {"episodes_per_update": 2},
 }
@@ -98,7 +99,8 @@ def model_of(name):
         OBSERVATIONS["Box"],
         next(space for space in ACTIONS.values() if isinstance(space, ALGORITHMS[name].actions)),
     )
-    keepers = [Keeper(Member(FakeTask(seen, acted))) for _ in range(2)]
+    task = MaskedTask if name == "MaskablePPO" else FakeTask
+    keepers = [Keeper(Member(task(seen, acted))) for _ in range(2)]
     hyperparameters = {"policy_kwargs": {"net_arch": [4]}} | HYPERPARAMETERS[name]
     return make_model(
         Algorithm(name=name, hyperparameters=hyperparameters), SimulatorsVecEnv(keepers, 1), seed=1

@@ -17,7 +17,7 @@ from palaestra_trainer import checkpoint, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory, read_lines
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from tools.algorithms import refusal
 
@@ -51,6 +51,7 @@ HYPERPARAMETERS = {
     "A2C": {},
     "TRPO": ON_POLICY | {"cg_max_steps": 3},
     "RecurrentPPO": ON_POLICY | {"n_epochs": 2, "policy_kwargs": SMALL | {"lstm_hidden_size": 4}},
+    "MaskablePPO": ON_POLICY | {"n_epochs": 2},
     "REINFORCE": {"episodes_per_update": 1},
 }
 CELLS = [(name, seen, acted) for name in ALGORITHMS for seen in OBSERVATIONS for acted in ACTIONS]
@@ -74,13 +75,14 @@ def play(make_member, make_configuration, tmp_path):
         algorithm = {"name": name, "hyperparameters": {"policy_kwargs": SMALL} | HYPERPARAMETERS[name]}
         algorithm |= more
         taken = iter(range(1, 10_000))
+        task, first_task = KINDS.get(name, (FakeTask, Interrupted))
 
         def make_members(given):
             members = [make_member(entry.name) for entry in given.simulators]
             for member in members:
-                member.env = FakeTask(OBSERVATIONS[seen], ACTIONS[acted])
+                member.env = task(OBSERVATIONS[seen], ACTIONS[acted])
             first = members[0]
-            first.env = Interrupted(OBSERVATIONS[seen], ACTIONS[acted], deaths, taken, signal_at)
+            first.env = first_task(OBSERVATIONS[seen], ACTIONS[acted], deaths, taken, signal_at)
             first.restart = first.env.restart
             return members
 
@@ -110,6 +112,13 @@ class Interrupted(FakeTask):
         if next(self._taken) == self._signal_at:
             os.kill(os.getpid(), signal.SIGTERM)
         return super().step(action)
+
+
+class MaskedInterrupted(Interrupted, MaskedTask):
+    """A task that forbids actions, during which a signal comes."""
+
+
+KINDS = {"MaskablePPO": (MaskedTask, MaskedInterrupted)}
 
 
 def tensors(path):

@@ -19,7 +19,7 @@ from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.infos import OURS
 from palaestra_trainer.run.training import use_threads
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from tests.tables import for_each
 
@@ -50,7 +50,8 @@ def refusal_of(algorithm, members=2):
     """Return why the algorithm is refused before it learns; let it learn, and return "", if it is not."""
     actions = entry_of(algorithm.name).actions
     kind = "Box" if spaces.Box in actions else "Discrete"
-    env = DummyVecEnv([lambda: Valid(FakeTask(OBSERVATIONS["Box"], ACTIONS[kind]))] * members)
+    task = MaskedTask if algorithm.name == "MaskablePPO" else FakeTask
+    env = DummyVecEnv([lambda: Valid(task(OBSERVATIONS["Box"], ACTIONS[kind]))] * members)
     try:
         check(algorithm)
         model = make_model(algorithm, env, seed=1)
@@ -103,6 +104,7 @@ def test_what_is_not_refused_learns(algorithm):
         ("PPO", {"policy_kwargs": {"net_arch": [0]}}, "policy_kwargs.net_arch: a layer of 0 is refused"),
         ("PPO", {"learning_rate": 0}, "learning_rate: 0 is refused; give a number above 0"),
         ("RecurrentPPO", {"batch_size": 1}, "batch_size: 1 is refused; give a number of at least 2"),
+        ("MaskablePPO", {"batch_size": 1}, "batch_size: 1 is refused; give a number of at least 2"),
         ("TQC", {"top_quantiles_to_drop_per_net": 25}, "25 of 25 quantiles of each critic leaves none"),
         ("DQN", {"replay_buffer_class": ["HerReplayBuffer"]}, "use HerReplayBuffer, or leave it out"),
     ],
@@ -115,3 +117,10 @@ def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):
 def test_a_frequency_in_episodes_fits_one_simulator():
     """Stable-Baselines3 allows it there."""
     assert not refusal_of(small("DQN", train_freq=[1, "episode"]), members=1)
+
+
+@pytest.mark.parametrize("name", ["sb3_contrib:MaskablePPO", "sb3_contrib:RecurrentPPO"])
+def test_a_class_by_its_name_has_the_ranges_of_the_algorithm_that_it_is(name):
+    """One row has no deviation, whatever the job calls the class."""
+    with pytest.raises(ConfigurationError, match="batch_size: 1 is refused; give a number of at least 2"):
+        check(Algorithm(name=name, hyperparameters={"batch_size": 1}))

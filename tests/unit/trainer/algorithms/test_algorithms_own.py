@@ -20,6 +20,7 @@ LAB = '''
 import sb3_contrib
 import stable_baselines3 as sb3
 import torch
+from sb3_contrib.common.maskable.buffers import MaskableRolloutBuffer
 from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
@@ -37,8 +38,14 @@ class Search(sb3_contrib.ARS):
     """ARS under another name."""
 
 
-class Masked(sb3_contrib.MaskablePPO):
-    """MaskablePPO under another name."""
+class Masked(sb3.PPO):
+    """PPO with the rollout buffer of MaskablePPO, which nothing gives masks to."""
+
+    def _setup_model(self):
+        super()._setup_model()
+        self.rollout_buffer = MaskableRolloutBuffer(
+            self.n_steps, self.observation_space, self.action_space, n_envs=self.n_envs
+        )
 
 
 class Eager(sb3.DQN):
@@ -214,8 +221,6 @@ REFUSED = [
         "my_lab:Search",
         "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
     ),
-    ("sb3_contrib:MaskablePPO", "sb3_contrib:MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
-    ("MaskablePPO", "MaskablePPO cannot be used: MaskablePPO keeps masks of actions"),
     ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
     ("my_lab:Doubled", "my_lab:Doubled is no subclass of BaseAlgorithm; name a class that is one"),
     ("my_lab:no_class", "my_lab:no_class is no subclass of BaseAlgorithm"),

@@ -19,7 +19,7 @@ from palaestra_trainer.algorithms import ALGORITHMS, make_model, small_cnn
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
 POINTS = [[0, 0.01], [0.5, 0.002], [1, 0.001]]
@@ -47,7 +47,8 @@ def save(make_member, tmp_path):
         entry = ALGORITHMS[name]
         member = make_member("collect-0")
         acted = "Box" if entry.actions is None or "Box" in str(entry.actions) else "Discrete"
-        member.env = FakeTask(OBSERVATIONS[seen], ACTIONS[acted])
+        task = MaskedTask if name == "MaskablePPO" else FakeTask
+        member.env = task(OBSERVATIONS[seen], ACTIONS[acted])
         given = SMALL | {"policy_kwargs": CLASSES} | (options or {}) | (NOISE if entry.takes_noise else {})
         hyperparameters = {key: value for key, value in given.items() if key in entry.known}
         if "n_steps" in hyperparameters and entry.replays:

@@ -21,7 +21,7 @@ from palaestra_trainer.exporting import comparing, onnx_file, safetensors_file
 from palaestra_trainer.exporting.acting import Acting
 from palaestra_trainer.exporting.sampling import drawn
 from palaestra_trainer.run.policies import Policy, Scale
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import MaskedTask
 
 NUMBERS = spaces.Box(-1.0, 1.0, (3,), np.float32)
 FEW = spaces.Discrete(3)
@@ -35,7 +35,7 @@ def policy_of(cls, seen=NUMBERS, acted=FEW, scales=None, **options):
     """Return an untrained policy of Stable-Baselines3's for these spaces."""
     name = "MultiInput" if isinstance(seen, spaces.Dict) else "Mlp"
     alias = f"{name}LstmPolicy" if cls is sb3_contrib.RecurrentPPO else f"{name}Policy"
-    model = cls(alias, DummyVecEnv([lambda: FakeTask(seen, acted)]), **deepcopy(SMALL) | options)
+    model = cls(alias, DummyVecEnv([lambda: MaskedTask(seen, acted)]), **deepcopy(SMALL) | options)
     nowhere = Environment(id="nowhere")
     return Policy(
         model=model, environment_id="", environment_options={}, environment=nowhere, scales=scales or {}
@@ -242,3 +242,37 @@ def test_a_network_that_onnx_cannot_express_is_refused_with_a_remedy():
         ExportError, match=r"cannot be converted to ONNX \(.*--to safetensors, or load_policy"
     ):
         compared(policy)
+
+
+@pytest.mark.parametrize("acted", [FEW, spaces.MultiDiscrete([2, 3]), spaces.MultiBinary(2)])
+def test_a_file_that_ignores_masks_is_refused(acted):
+    """It would take an action that the environment forbids."""
+    policy = policy_of(sb3_contrib.MaskablePPO, acted=acted)
+    acting = Acting(policy)
+    right = onnx_file.runner(onnx_file.content(acting, {}), acting)
+
+    def unmasked(*inputs):
+        return right(*inputs[:-1], np.ones_like(inputs[-1]))
+
+    assert compared(policy) == compared(policy, safetensors_file) == 0
+    with pytest.raises(ExportError, match=r"acts differently on \d+ of \d+ numbers"):
+        comparing.compare(lambda _: unmasked, acting, policy)
+
+
+def test_actions_that_differ_by_their_masks_alone_show_nothing():
+    """A file with any network would take the same ones."""
+    policy = policy_of(sb3_contrib.MaskablePPO)
+    with torch.no_grad():
+        policy.model.policy.action_net.weight.zero_()
+        policy.model.policy.action_net.bias.copy_(torch.tensor([3.0, 2.0, 1.0]))
+
+    with pytest.raises(ExportError, match=SAME):
+        compared(policy)
+
+
+def test_an_observation_with_the_name_of_the_masks_is_refused():
+    """The file has one input of each name."""
+    policy = policy_of(sb3_contrib.MaskablePPO, spaces.Dict({"action_masks": NUMBERS}))
+
+    with pytest.raises(ExportError, match=r"the observation has a key action_masks, .* rename the key"):
+        Acting(policy)

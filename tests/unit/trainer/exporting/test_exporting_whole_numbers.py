@@ -14,7 +14,7 @@ from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory, read_lines
-from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS
 
 pytestmark = pytest.mark.minutes(1)
@@ -34,6 +34,7 @@ HYPERPARAMETERS = {
     "PPO": ON_POLICY,
     "A2C": {},
     "TRPO": ON_POLICY | {"cg_max_steps": 3},
+    "MaskablePPO": ON_POLICY,
     "RecurrentPPO": ON_POLICY | {"policy_kwargs": SMALL | {"lstm_hidden_size": 4}},
     "REINFORCE": {"episodes_per_update": 1},
 }
@@ -64,6 +65,10 @@ class Counting(FakeTask):
         return seen(space)
 
 
+class CountingMasked(Counting, MaskedTask):
+    """One that forbids actions too."""
+
+
 @pytest.fixture
 def train(make_member, make_configuration, tmp_path):
     """Train for some steps with an evaluation; return the run directory."""
@@ -71,11 +76,12 @@ def train(make_member, make_configuration, tmp_path):
     def run(name, space):
         entry = ALGORITHMS[name]
         kind = "Box" if spaces.Box in (entry.actions or ()) else "Discrete"
+        counting = CountingMasked if name == "MaskablePPO" else Counting
 
         def make_members(given):
             members = [make_member(entry.name) for entry in given.simulators]
             for member in members:
-                member.env = Counting(space, ACTIONS[kind])
+                member.env = counting(space, ACTIONS[kind])
             return members
 
         hyperparameters = {"policy_kwargs": SMALL} | HYPERPARAMETERS.get(name, OFF_POLICY)
@@ -108,6 +114,8 @@ def test_they_are_trained_on_and_evaluated_and_both_files_act_as_the_policy(trai
     seen, _ = task.reset(seed=5)
     parts = seen if isinstance(seen, dict) else {"observation": seen}
     batch = {key: part[None] for key, part in parts.items()}
+    masks = {"action_masks": np.array([True, False, True])} if name == "MaskablePPO" else {}
+    batch |= {key: mask[None] for key, mask in masks.items()}
     if name == "RecurrentPPO":
         batch |= {state: np.zeros((1, 1, 4), np.float32) for state in ("hidden", "cell")}
-    assert np.allclose(session.run(["action"], batch)[0][0], policy.predict(seen)[0], atol=1e-5)
+    assert np.allclose(session.run(["action"], batch)[0][0], policy.predict(seen, **masks)[0], atol=1e-5)

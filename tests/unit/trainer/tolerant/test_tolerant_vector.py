@@ -8,10 +8,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 from palaestra_trainer.errors import FaultBudgetSpent
+from palaestra_trainer.testing import MaskedTask
+from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
 from palaestra_trainer.tolerant.vector import TolerantVectorEnv
 
@@ -201,3 +204,36 @@ def test_stable_baselines3_learns_in_it(make_env):
     assert [member.log for member in members] == [["restart"], ["restart"]]
     assert members[1].env.seeds[0] == 2
     assert env.get_attr("step_reward") == [-0.1, -0.1]
+
+
+@pytest.fixture
+def make_masked(make_players, make_member):
+    """Make a vector of two tasks that forbid actions; the first one breaks in its fourth step."""
+
+    def make(kind):
+        members = [make_member(f"collect-{index}") for index in range(2)]
+        for member, deaths in zip(members, [(4,), ()], strict=True):
+            member.env = task = MaskedTask(OBSERVATIONS["Box"], ACTIONS["Discrete"], deaths)
+            member.restart = task.restart
+        return kind(make_players(*members, deadline_s=20.0))
+
+    return make
+
+
+def test_sb3_contrib_asks_for_masks_by_its_own_names(make_masked):
+    """The task fails at a forbidden action, so MaskablePPO got the masks, before and after a fault."""
+    model = MaskablePPO("MlpPolicy", make_masked(TolerantVecEnv), n_steps=16, batch_size=8, device="cpu")
+
+    model.learn(64)
+
+    assert model.num_timesteps == 64
+
+
+def test_a_loop_of_gymnasium_asks_for_masks_of_all(make_masked):
+    """By `call`, as of gymnasium's own vectors."""
+    env = make_masked(TolerantVectorEnv)
+    env.reset(seed=[1, 2])
+
+    for _ in range(12):
+        masks = env.call("action_masks")
+        env.step(np.array([int(np.flatnonzero(mask)[-1]) for mask in masks]))

@@ -4,6 +4,7 @@ from palaestra_trainer.algorithms.entries import ALGORITHMS, entry_of
 from palaestra_trainer.algorithms.fitting import refuse_spaces
 from palaestra_trainer.algorithms.futile import futile
 from palaestra_trainer.algorithms.kept import begin_with, begun_with, keep
+from palaestra_trainer.algorithms.masks import is_masked, predict_allowed, refuse_without_masks, takes_masks
 from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.table import check, make_model
@@ -16,9 +17,13 @@ __all__ = [
     "check",
     "entry_of",
     "futile",
+    "is_masked",
     "keep",
     "make_model",
     "normalizer_of",
     "policy_of",
+    "predict_allowed",
     "refuse_spaces",
+    "refuse_without_masks",
+    "takes_masks",
 ]

@@ -51,6 +51,7 @@ BESIDE: Mapping[type[BaseAlgorithm], Beside] = MappingProxyType(
                 sb3_contrib.TQC,
                 sb3_contrib.TRPO,
                 sb3_contrib.CrossQ,
+                sb3_contrib.MaskablePPO,
                 REINFORCE,
             ),
             _NOTHING,

@@ -7,7 +7,7 @@ and the fault is no penalty.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -182,14 +182,27 @@ class ValidRolloutBuffer(RolloutBuffer):
         super().compute_returns_and_advantage(last_values, dones)
 
     def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
-        """Yield minibatches of valid rows in random order; the last one may be smaller."""
+        """Yield minibatches of valid rows in random order."""
         if not self.generator_ready:
             next(super().get(1))  # flattens the rows of all members into one column
         rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))
-        size = batch_size or max(len(rows), 1)
-        for start in range(0, len(rows), size):
-            yield self._get_samples(rows[start : start + size])
+        for batch in self._parts(rows, batch_size or max(len(rows), 1)):
+            yield self._get_samples(batch)
+
+    def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
+        """Yield `rows` in parts of `size`; the last one may be smaller."""
+        return (rows[start : start + size] for start in range(0, len(rows), size))
 
 
 class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):
     """The same for observations that are a Dict."""
+
+
+def batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
+    """Yield `rows` in parts of `size`; a single last row joins the part before it.
+
+    The deviation of a single advantage is NaN.
+    """
+    for start in range(0, max(len(rows) - 1, 1), size):
+        is_last = start + size >= len(rows) - 1
+        yield rows[start:] if is_last else rows[start : start + size]

@@ -186,6 +186,9 @@ ALGORITHMS: Mapping[str, Entry] = MappingProxyType(
         "CrossQ": _entry(sb3_contrib.CrossQ, spaces.Box),
         "TRPO": _entry(sb3_contrib.TRPO, *_ANY_ACTIONS),
         "RecurrentPPO": _entry(sb3_contrib.RecurrentPPO, spaces.Box, spaces.Discrete, spaces.MultiDiscrete),
+        "MaskablePPO": _entry(
+            sb3_contrib.MaskablePPO, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary
+        ),
     }
 )
 

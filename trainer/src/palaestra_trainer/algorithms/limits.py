@@ -81,19 +81,20 @@ RANGES_OF_POLICY: Mapping[str, Range] = {
     "n_quantiles": COUNT,
 }
 # Batch normalization, or a deviation of advantages, of a single row is none.
-LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2}
+LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2, "MaskablePPO": 2}
 
 
-def out_of_range(algorithm: str, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield name and fact of each number that is out of its range; values of other types are ignored.
 
     Args:
-        algorithm: its name.
+        cls: its class; a class that extends one of the table has the same ranges.
         given: hyperparameters by name.
     """
     ranges = dict(RANGES)
-    if algorithm in LEAST_BATCH:
-        ranges["batch_size"] = Range(LEAST_BATCH[algorithm])
+    for ancestor in cls.__mro__:
+        if ancestor.__name__ in LEAST_BATCH:
+            ranges["batch_size"] = Range(LEAST_BATCH[ancestor.__name__])
     yield from _outside("", given, ranges)
     if given.get("gradient_steps") == 0:
         yield "gradient_steps", "0 learns nothing; give a number above 0, or -1 for as many as steps"

@@ -182,10 +182,14 @@ class ValidNormalize(VecNormalize):
 
 
 class Normalized:
-    """A policy that takes unnormalized observations and normalizes them as during its training."""
+    """A policy that takes unnormalized observations and normalizes them as during its training.
+
+    Attributes:
+        model: it takes normalized observations.
+    """
 
     def __init__(self, model: BaseAlgorithm, normalizer: ValidNormalize) -> None:
-        self._model = model
+        self.model = model
         self._normalizer = normalizer
 
     def predict(
@@ -194,10 +198,11 @@ class Normalized:
         state: Any = None,
         episode_start: Any = None,
         deterministic: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+        **masks: Any,
     ) -> tuple[Any, Any]:
-        """Return an action for one observation, and the policy's next state."""
+        """Return an action for one observation, and the policy's next state; MaskablePPO takes masks."""
         seen = self._normalizer.normalize_obs(observation)
-        return self._model.predict(seen, state, episode_start, deterministic)
+        return self.model.predict(seen, state, episode_start, deterministic, **masks)
 
 
 def normalizer_of(model: BaseAlgorithm) -> ValidNormalize | None:

@@ -6,13 +6,13 @@ The first valid row after them begins an episode, so the LSTM restarts there, in
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from typing import Any
 
 import numpy as np
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
 
-from palaestra_trainer.algorithms.buffers import ValidRolloutBuffer
+from palaestra_trainer.algorithms.buffers import ValidRolloutBuffer, batches
 
 
 class _Sequences(ValidRolloutBuffer):
@@ -27,7 +27,7 @@ class _Sequences(ValidRolloutBuffer):
         first_of_member[0] = 1.0
         draw: Any = self._get_samples  # RecurrentPPO's has another second argument than RolloutBuffer's
         turned = np.roll(rows, -np.random.randint(len(rows)))
-        for batch in _batches(turned, batch_size or len(rows)):
+        for batch in batches(turned, batch_size or len(rows)):
             yield draw(batch, self.swap_and_flatten(first_of_member))
 
 
@@ -37,13 +37,3 @@ class ValidRecurrentRolloutBuffer(_Sequences, RecurrentRolloutBuffer):
 
 class ValidRecurrentDictRolloutBuffer(_Sequences, RecurrentDictRolloutBuffer):
     """The buffer for observations that are a Dict."""
-
-
-def _batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
-    """Yield `rows` in parts of `size`; a single last row joins the part before it.
-
-    The deviation of a single advantage is NaN.
-    """
-    for start in range(0, max(len(rows) - 1, 1), size):
-        is_last = start + size >= len(rows) - 1
-        yield rows[start:] if is_last else rows[start : start + size]

@@ -15,6 +15,8 @@ from typing import Any, cast
 
 import numpy as np
 from gymnasium import spaces
+from sb3_contrib import MaskablePPO
+from sb3_contrib.common.maskable.buffers import MaskableDictRolloutBuffer, MaskableRolloutBuffer
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import DictRolloutBuffer, RolloutBuffer
@@ -32,6 +34,10 @@ from palaestra_trainer.algorithms.buffers import (
     valid_rows,
 )
 from palaestra_trainer.algorithms.her import ValidHerReplayBuffer
+from palaestra_trainer.algorithms.maskable import (
+    ValidMaskableDictRolloutBuffer,
+    ValidMaskableRolloutBuffer,
+)
 from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
     ValidRecurrentRolloutBuffer,
@@ -45,7 +51,11 @@ _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
+    MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
+    MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
 }
+# Evaluations and exported files give masks to MaskablePPO and its subclasses only.
+_WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)
 _BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class")
 
 
@@ -105,7 +115,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         super()._setup_model()
         theirs = self.rollout_buffer
         masked = _MASKED.get(type(theirs))
-        if masked is None:
+        if masked is None or (isinstance(theirs, _WITH_MASKS) and not isinstance(self, MaskablePPO)):
             raise _creates_its_own(self, theirs)
         sequences = {name: getattr(theirs, name) for name in ("hidden_state_shape",) if hasattr(theirs, name)}
         self.rollout_buffer = masked(

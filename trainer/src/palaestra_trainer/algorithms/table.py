@@ -37,7 +37,7 @@ def check(algorithm: Algorithm) -> Entry:
     given = algorithm.hyperparameters
     lines = [*elsewhere.mistakes(algorithm.name, entry, values.arguments_of(policy), given, values.FIELD)]
     plain = {name: value for name, value in given.items() if name in known and name not in her.NAMES}
-    lines += list(values.mistakes(entry.original, policy, plain)) or _out_of_range(algorithm.name, plain)
+    lines += list(values.mistakes(entry.original, policy, plain)) or _out_of_range(entry, plain)
     lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
     lines += her.mistakes(given, values.FIELD) if entry.replays else []
     if given.get("n_steps", 1) != 1 and "train_freq" in known:
@@ -50,8 +50,8 @@ def check(algorithm: Algorithm) -> Entry:
     return entry
 
 
-def _out_of_range(algorithm: str, given: Mapping[str, Any]) -> list[str]:
-    return [f"{values.FIELD}.{name}: {fact}" for name, fact in limits.out_of_range(algorithm, given)]
+def _out_of_range(entry: Entry, given: Mapping[str, Any]) -> list[str]:
+    return [f"{values.FIELD}.{name}: {fact}" for name, fact in limits.out_of_range(entry.original, given)]
 
 
 def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:

@@ -15,11 +15,13 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple
 
+import numpy as np
 import structlog
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
 from palaestra_trainer.copies import copied
+from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.position import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
@@ -75,6 +77,7 @@ class Collector:
         self._return, self._length = 0.0, 0
         self._actions: ActionLog | None = None
         self._news: dict[str, Any] = {}
+        self._found_broken: SimulatorFault | None = None
         self._hidden: set[str] = set()
 
     @property
@@ -99,7 +102,7 @@ class Collector:
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
         """
-        self._actions = None
+        self._actions = self._found_broken = None
         self.reset_info = {OURS: {"valid": False}}
         self._return, self._length = 0.0, 0
         if self.keeper.up():
@@ -109,11 +112,23 @@ class Collector:
                 self._break(fault)
         return self._observation
 
-    def resume(self, state: EpisodeState) -> Any:
+    def action_mask(self) -> np.ndarray:
+        """Return which actions the next step may take; all while the member is mended: it takes none then.
+
+        A fault meanwhile is that of the next step.
+        """
+        if self._actions is not None and self._found_broken is None:
+            try:
+                return self.keeper.action_mask()
+            except SimulatorFault as fault:
+                self._found_broken = fault
+        return all_allowed(self.env.action_space)
+
+    def resume(self, state: EpisodeState, *, masked: bool = False) -> Any:
         """Return the observation after the actions of `state`, taken again; nothing of it is counted.
 
-        A member that breaks meanwhile begins the next episode instead, and so does one whose episode ends
-        earlier than it did: its environment does not repeat.
+        A member that breaks meanwhile begins the next episode instead. So does one whose episode ends earlier
+        than it did or, if `masked`, whose mask forbids such an action: its environment does not repeat.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -125,6 +140,8 @@ class Collector:
         for action in () if state.actions is None or self._actions is None else state.actions:
             self._check()
             try:
+                if masked and not allows(self.keeper.action_mask(), self.env.action_space, action):
+                    return self.begin()
                 _, _, terminated, truncated, _ = self._advance(action)
             except SimulatorFault as fault:
                 self._break(fault)
@@ -171,6 +188,8 @@ class Collector:
         self._actions = ActionLog()
 
     def _advance(self, action: Any) -> Step:
+        if self._found_broken is not None:
+            raise self._found_broken
         try:
             step = self.keeper.step(action)
         except Diverged as error:
@@ -203,7 +222,7 @@ class Collector:
                 "step": self._length,
             }
         }
-        self._actions = None
+        self._actions = self._found_broken = None
         self.keeper.begin_mending(fault, self._length)
 
     def _recover(self) -> Row:

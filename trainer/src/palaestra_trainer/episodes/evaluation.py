@@ -19,6 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
+from palaestra_trainer.algorithms import predict_allowed, takes_masks
 from palaestra_trainer.episodes.intervals import wilson
 from palaestra_trainer.episodes.position import EVALUATING, reset_options
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
@@ -264,11 +265,15 @@ def _play(
     observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
-    over, end = False, EpisodeEnd("an evaluation")
+    over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
     while not over:
         check()
         end.not_after(len(rewards))
-        action, memory = policy.predict(observation, memory, np.array([not rewards]), deterministic=True)
+        seen = (observation, memory, np.array([not rewards]))
+        if masked:
+            action, memory = predict_allowed(policy, keeper.action_mask(), *seen)
+        else:
+            action, memory = policy.predict(*seen, deterministic=True)
         observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
         keeper.watcher.stepped(1)
         rewards.append(float(reward))

@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.copies import copied
+from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
@@ -58,6 +59,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
         self._watcher = keepers[0].watcher
         self._seeds = [None] * self.num_envs
+        self._gives_masks = all(gives_masks(keeper.member.env) for keeper in keepers)
 
     def pause(self) -> None:
         """Pause all members until `run`."""
@@ -95,13 +97,14 @@ class SimulatorsVecEnv(MembersVecEnv):
         """Return the position of each member in its episodes; cheap, and not changed by later steps."""
         return [collector.state for collector in self._collectors]
 
-    def resume(self, states: Sequence[EpisodeState]) -> VecEnvObs:
+    def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
         """Bring all members back to their states, at once; return their observations.
 
-        The steps for it are not counted; returns and lengths of the episodes continue as they were.
+        The steps for it are not counted; returns and lengths of the episodes continue as they were. If
+        `masked`, no member takes an action that its mask forbids now.
         """
         observations = take_turns(
-            partial(collector.resume, state)
+            partial(collector.resume, state, masked=masked)
             for collector, state in zip(self._collectors, states, strict=True)
         )
         self._keep_reset_infos()
@@ -148,11 +151,23 @@ class SimulatorsVecEnv(MembersVecEnv):
         """Return what a method of the chosen environments returns.
 
         `compute_reward` is called on the judge, because members may be restarting, with copies: the goals
-        are learned from afterwards.
+        are learned from afterwards. `action_masks` is called on no member that is being mended or lost.
         """
+        if method_name == ACTION_MASKS and self._gives_masks:
+            return self._action_masks(indices)
         if self._judge is None or method_name != COMPUTE_REWARD:
             return super().env_method(method_name, *method_args, indices=indices, **method_kwargs)
         return [self._judge.get_wrapper_attr(method_name)(*copied(method_args), **copied(method_kwargs))]
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """Return an attribute of the chosen environments; of `action_masks`, what `env_method` calls."""
+        if attr_name == ACTION_MASKS and self._gives_masks:
+            return [self._collectors[index].action_mask for index in self._get_indices(indices)]
+        return super().get_attr(attr_name, indices)
+
+    def _action_masks(self, indices: VecEnvIndices) -> list[Any]:
+        with self._watcher.spending(Cause.TRANSPORT):
+            return take_turns(self._collectors[index].action_mask for index in self._get_indices(indices))
 
     def _await_somebody(self) -> None:
         """Return when a member can step or has become ready; a vector of only invalid rows is useless."""

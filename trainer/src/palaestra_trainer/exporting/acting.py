@@ -2,6 +2,7 @@
 
 It does everything that `Policy.predict` does around the network: channels of images, normalization, and the
 bounds of actions. A recurrent policy takes its state as inputs and returns the next; zeros begin an episode.
+A policy of MaskablePPO takes masks as a further input, as `palaestra_trainer.environments.masks` says.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from gymnasium import spaces
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 from torch import nn
 
+from palaestra_trainer.algorithms import takes_masks
+from palaestra_trainer.environments.masks import ACTION_MASKS, choices_of
+from palaestra_trainer.errors import ExportError
 from palaestra_trainer.run.policies import Policy
 
 OBSERVATION = "observation"
@@ -51,9 +55,13 @@ class Acting(nn.Module):
     Args:
         loaded: the policy; it is left in evaluation mode on the CPU.
 
+    Raises:
+        ExportError: an observation has the name of the input for masks.
+
     Attributes:
         spaces: the space of each input, as the environment returns it.
         action_space: the space of an action.
+        choices: the number of choices of each number of an action; empty: the policy takes no masks.
         state_shape: layers and units of the state; None: the policy has no state.
         normalizers: one for each input, in their order; that of an input that is not normalized does nothing.
     """
@@ -66,6 +74,12 @@ class Acting(nn.Module):
         self.action_space: spaces.Space[Any] = loaded.model.action_space
         self._seen = parts_of(loaded.model.observation_space)
         self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
+        self.choices = choices_of(self.action_space) if takes_masks(loaded.model) else []
+        if self.choices and ACTION_MASKS in self.spaces:
+            raise ExportError(
+                f"the observation has a key {ACTION_MASKS}, which is the input for masks; nothing was "
+                "written; rename the key in the environment"
+            )
         lstm = getattr(policy, "lstm_actor", None)
         self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))
         scales = {key or OBSERVATION: scale for key, scale in loaded.scales.items()}
@@ -76,7 +90,8 @@ class Acting(nn.Module):
     @property
     def inputs(self) -> list[str]:
         """The names of the inputs in their order."""
-        return [*self.spaces, *(STATE if self.state_shape else ())]
+        masks = [ACTION_MASKS] if self.choices else []
+        return [*self.spaces, *masks, *(STATE if self.state_shape else ())]
 
     @property
     def outputs(self) -> list[str]:
@@ -94,7 +109,8 @@ class Acting(nn.Module):
         """Return the actions for a batch, and the next state of a recurrent policy."""
         observation = self.seen(inputs)
         if self.state_shape is None:
-            return (self._bounded(self.policy._predict(observation, deterministic=True)),)
+            masks = {ACTION_MASKS: inputs[-1]} if self.choices else {}
+            return (self._bounded(self.policy._predict(observation, deterministic=True, **masks)),)
         action, state = self.policy._predict(observation, *self.memory(inputs), deterministic=True)
         return (self._bounded(action), *state)
 
@@ -130,7 +146,7 @@ class Acting(nn.Module):
 class Scoring(Acting):
     """The scores of discrete actions, of which the policy takes the best; for a comparison, never for a file.
 
-    Its one output has the name of the action.
+    Its one output has the name of the action. Masks change no score.
     """
 
     @property
@@ -150,8 +166,9 @@ class Scoring(Acting):
         if hasattr(self.policy, "quantile_net"):
             return (self.policy.quantile_net(observation).mean(dim=1),)
         found = self.policy.get_distribution(observation, *self.memory(inputs))
-        made = (found[0] if isinstance(found, tuple) else found).distribution
-        return (torch.cat([one.logits for one in made], dim=1) if isinstance(made, list) else made.logits,)
+        one = found[0] if isinstance(found, tuple) else found
+        made = one.distributions if hasattr(one, "distributions") else one.distribution
+        return (torch.cat([part.logits for part in made], dim=1) if isinstance(made, list) else made.logits,)
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:

@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting.acting import OBSERVATION, Acting, Scoring
-from palaestra_trainer.exporting.sampling import EPISODE, drawn, magnitudes
+from palaestra_trainer.exporting.sampling import EPISODE, drawn, drawn_masks, magnitudes
 from palaestra_trainer.run.policies import Policy
 
 OBSERVATIONS = 1_000
@@ -26,6 +26,8 @@ Convert = Callable[[Acting], Run]
 def compare(convert: Convert, acting: Acting, policy: Policy) -> float:
     """Return the largest difference of an action on 1,000 observations, as a share of its range.
 
+    A policy that takes masks is compared with masks drawn, and with masks that allow everything.
+
     Args:
         convert: returns a function that runs a file made of such a module.
         acting: the module of the file that is to be written.
@@ -36,8 +38,36 @@ def compare(convert: Convert, acting: Acting, policy: Policy) -> float:
             have the same actions on these observations.
     """
     observations = drawn(acting, OBSERVATIONS)
-    play = _played_at_once if acting.state_shape is None else _played_in_turn
-    ours, expected = play(convert(acting), acting, policy, observations)
+    run = convert(acting)
+    played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
+    difference = max(_difference(*actions, acting, observations) for actions in played)
+    # Masks alone may make actions differ, so the last ones allow everything.
+    _, expected = played[-1]
+    _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
+    return difference
+
+
+def _played(
+    run: Run, acting: Acting, policy: Policy, observations: Mapping[str, np.ndarray], masks: Arrays
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the actions of the file and of the policy."""
+    if acting.state_shape is None:
+        return _played_at_once(run, policy, observations, masks)
+    return _played_in_turn(run, acting, policy, observations)
+
+
+def _masks(acting: Acting) -> list[Arrays]:
+    """Return the masks for all observations of each comparison."""
+    if not acting.choices:
+        return [()]
+    masks = drawn_masks(acting, OBSERVATIONS)
+    return [(masks,), (np.ones_like(masks),)]
+
+
+def _difference(
+    ours: np.ndarray, expected: np.ndarray, acting: Acting, observations: dict[str, np.ndarray]
+) -> float:
+    """Return the largest difference of an action, as a share of its range; refuse one that is too large."""
     if ours.shape != expected.shape:
         raise ExportError(f"actions have the shape {ours.shape}, not {expected.shape}; {_REMEDY}")
     apart = _apart(ours, expected)
@@ -47,7 +77,6 @@ def compare(convert: Convert, acting: Acting, policy: Policy) -> float:
             f"the exported policy acts differently on {int((apart > allowed).sum())} of {apart.size} "
             f"numbers, by up to {apart.max():.3g}; {_REMEDY}"
         )
-    _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
     return float((apart / span).max())
 
 
@@ -81,7 +110,8 @@ def _refuse_what_shows_nothing(
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:
     """Return whether the scores of actions depend on the observations, and a file has them too."""
-    inputs = [*map(torch.from_numpy, observations.values()), *scoring.begin(OBSERVATIONS)]
+    masks = map(torch.from_numpy, _masks(scoring)[-1])
+    inputs = [*map(torch.from_numpy, observations.values()), *masks, *scoring.begin(OBSERVATIONS)]
     try:
         with torch.no_grad():
             expected = scoring(*inputs)[0].numpy()
@@ -120,11 +150,11 @@ def _span_and_tolerance(
 
 
 def _played_at_once(
-    run: Run, acting: Acting, policy: Policy, observations: Mapping[str, np.ndarray]
+    run: Run, policy: Policy, observations: Mapping[str, np.ndarray], masks: Arrays
 ) -> tuple[np.ndarray, np.ndarray]:
-    del acting
-    (ours,) = run(*observations.values())
-    return ours, np.asarray(policy.predict(_whole(observations))[0])
+    (ours,) = run(*observations.values(), *masks)
+    allowed = masks[0] if masks else None
+    return ours, np.asarray(policy.predict(_whole(observations), action_masks=allowed)[0])
 
 
 def _played_in_turn(

@@ -51,6 +51,7 @@ def data_sheet(acting: Acting, configuration: Configuration, directory: RunDirec
             for name, known in zip(acting.spaces, acting.normalizers, strict=True)
             if isinstance(known, Normalizer)
         },
+        "choices": acting.choices or None,
         "state_shape": acting.state_shape,
         "observations": {
             "spaces": {name: describe(space) for name, space in acting.spaces.items()},

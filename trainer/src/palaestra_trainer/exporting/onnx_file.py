@@ -14,11 +14,12 @@ import onnx
 import onnxruntime
 import torch
 
+from palaestra_trainer.environments.masks import ACTION_MASKS
 from palaestra_trainer.errors import ExportError, fact_of
 from palaestra_trainer.exporting.acting import STATE, Acting
 from palaestra_trainer.exporting.comparing import Arrays, Run
 from palaestra_trainer.exporting.data_sheet import KEY
-from palaestra_trainer.exporting.sampling import drawn
+from palaestra_trainer.exporting.sampling import drawn, drawn_masks
 
 OPSET = 17  # of ONNX 1.12, of 2022
 # Types that PyTorch's exporter does not take, and a larger one that it takes.
@@ -57,8 +58,9 @@ def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
 
 
 def _converted(acting: Acting) -> onnx.ModelProto:
-    examples = [torch.from_numpy(part) for part in drawn(acting, _BATCH).values()]
-    axes = {name: {0: "batch"} for name in (*acting.spaces, "action")}
+    parts = [*drawn(acting, _BATCH).values(), *([drawn_masks(acting, _BATCH)] if acting.choices else [])]
+    examples = [torch.from_numpy(part) for part in parts]
+    axes = {name: {0: "batch"} for name in (*acting.spaces, ACTION_MASKS, "action")}
     axes |= {prefix + name: {1: "batch"} for name in STATE for prefix in ("", "next_")}
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         written = Path(folder) / "policy.onnx"

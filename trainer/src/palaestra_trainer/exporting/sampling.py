@@ -38,6 +38,17 @@ def drawn(acting: Acting, count: int) -> dict[str, np.ndarray]:
     return observations
 
 
+def drawn_masks(acting: Acting, count: int) -> np.ndarray:
+    """Return masks that allow half of the choices and at least one of each number; shape (count, choices)."""
+    generator = np.random.default_rng(0)
+    parts = []
+    for choices in acting.choices:
+        part = generator.integers(2, size=(count, choices)).astype(np.bool_)
+        part[np.arange(count), generator.integers(choices, size=count)] = True
+        parts.append(part)
+    return np.concatenate(parts, axis=1)
+
+
 def magnitudes(acting: Acting, observations: dict[str, np.ndarray]) -> np.ndarray:
     """Return for each observation the largest number that a network gets, at least 1.
 

@@ -45,9 +45,11 @@ def measure(
     with ExitStack() as stack:
         fleet = Fleet(only, make_members(only), NullWatcher())
         stack.callback(fleet.stop)
+        begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
+        task = fleet.evaluating[0].member.env
+        algorithms.refuse_without_masks(begun, task, configuration.environment.id)
         fleet.start()
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
-        begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
         trained = algorithms.make_model(begun, env, configuration.seed, configuration.device)
         checkpoint.load_tensors(model, trained)
         seeds = episode_seeds(configuration.seed, stream, episodes)

@@ -13,12 +13,13 @@ import gymnasium
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.algorithms import entry_of
+from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
 from palaestra_trainer.algorithms.kept import begun_with
 from palaestra_trainer.algorithms.values import arguments
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.configuration import Configuration, Environment, load
 from palaestra_trainer.environments.making import keywords, make_environment
+from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.run import byte_code
@@ -70,9 +71,34 @@ class Policy:
         state: Any = None,
         episode_start: Any = None,
         deterministic: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+        action_masks: Any = None,
     ) -> tuple[Any, Any]:
-        """Return an action for an observation as the environment returned it, and the policy's next state."""
-        return self.model.predict(self._seen(observation), state, episode_start, deterministic)
+        """Return an action for an observation as the environment returned it, and the policy's next state.
+
+        A policy of MaskablePPO needs the masks that the environment's `action_masks` returns; no other takes
+        any.
+
+        Raises:
+            ValueError: there are no masks for a policy that needs them, wrong ones, or masks for another one.
+        """
+        seen = (self._seen(observation), state, episode_start)
+        if takes_masks(self.model):
+            if action_masks is None:
+                raise ValueError(
+                    "action_masks: the policy chooses only among allowed actions; pass "
+                    'env.get_wrapper_attr("action_masks")(), or numpy.ones to allow all'
+                )
+            try:
+                masks = masks_in(action_masks, self.model.action_space)
+            except ValueError as error:
+                raise ValueError(f"action_masks: {error}; pass those of the environment") from error
+            return predict_allowed(self.model, masks, *seen, deterministic=deterministic)
+        if action_masks is not None:
+            raise ValueError(
+                f"action_masks: {type(self.model).__name__} chooses among all actions; leave them out, or "
+                "train with MaskablePPO"
+            )
+        return self.model.predict(*seen, deterministic)
 
     def _seen(self, observation: Any) -> Any:
         if isinstance(observation, Mapping):

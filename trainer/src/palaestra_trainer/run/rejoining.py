@@ -20,13 +20,14 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 log = structlog.get_logger(__name__)
 
 
-def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
+def rejoin(env: SimulatorsVecEnv, saved: State, *, masked: bool = False) -> State:
     """Return the state after each simulator was brought back to the saved state, or as near as possible.
 
-    A simulator that was broken at the save, breaks now, or is new in the run begins its next episode.
+    A simulator that was broken at the save, breaks now, or is new in the run begins its next episode. If
+    `masked`, so does one whose mask forbids an action of its episode now.
     """
     before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
-    observation = cast("Observations", env.resume(before))
+    observation = cast("Observations", env.resume(before, masked=masked))
     after = env.snapshot()
     begun = np.array(
         [was.actions is None or now.episode != was.episode for was, now in zip(before, after, strict=True)]

@@ -246,6 +246,7 @@ class Attempt:
         task = fleet.collecting[0].member.env
         algorithms.refuse_spaces(self._algorithm, task.observation_space, task.action_space)
         refuse_statistics(task, wanted.environment.id)
+        algorithms.refuse_without_masks(self._algorithm, task, wanted.environment.id)
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
@@ -312,7 +313,7 @@ class Attempt:
         saved = checkpoint.restore(found, model)
         env.set_training_progress(min(1.0, found.manifest.step / self._configuration.steps))
         with self._progress.spending(Cause.RECOVERING):
-            state = rejoin(env, saved)
+            state = rejoin(env, saved, masked=algorithms.takes_masks(model))
         state.put_back(model)
         self._progress.recall(state.rollout["returns"])
         return Resumed(found, state)

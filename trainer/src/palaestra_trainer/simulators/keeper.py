@@ -17,10 +17,12 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from functools import partial
 from typing import Any
 
+import numpy as np
 import structlog
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.copies import copied
+from palaestra_trainer.environments.masks import mask_of
 from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,
@@ -176,6 +178,15 @@ class Keeper:
         check_observation(self.name, self.member.env, observation)
         check_reward(self.name, self.member.env, reward, info)
         return copied(observation), reward, terminated, truncated, copied(info)
+
+    def action_mask(self) -> np.ndarray:
+        """Return which actions the environment allows in the next step; shape (choices,), bool.
+
+        Raises:
+            SimulatorFault: it broke; begin to mend it.
+            ConfigurationError: the environment returned no mask of its actions.
+        """
+        return mask_of(self.member.env)
 
     def set_attribute(self, name: str, value: Any) -> None:
         """Set an attribute of the member's environment, where it is defined, and of each that follows it.

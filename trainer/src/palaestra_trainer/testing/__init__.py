@@ -13,7 +13,7 @@ from palaestra_trainer.testing.fake_robotino import (
     fake_seeing,
 )
 from palaestra_trainer.testing.fake_scene import FakeScene
-from palaestra_trainer.testing.fake_task import FakeTask
+from palaestra_trainer.testing.fake_task import FakeTask, MaskedTask
 
 __all__ = [
     "FakeBurger",
@@ -22,6 +22,7 @@ __all__ = [
     "FakeScene",
     "FakeSeeingRobotino",
     "FakeTask",
+    "MaskedTask",
     "NotConforming",
     "check_robot",
     "check_scene",

@@ -16,6 +16,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from palaestra_trainer.environments.masks import allows, choices_of
 from palaestra_trainer.testing.mortal import Mortal
 
 _IMAGE = spaces.Box(0, 255, (36, 36, 3), np.uint8)
@@ -87,3 +88,31 @@ class FakeTask(Mortal, gymnasium.Env[Any, Any]):
     def _observe(self) -> Any:
         self.observation_space.seed(self._past)
         return self.observation_space.sample()
+
+
+class MaskedTask(FakeTask):
+    """A fake task that forbids actions: what came before decides which ones.
+
+    Raises:
+        AssertionError: a step has a forbidden action.
+    """
+
+    def action_masks(self) -> np.ndarray:
+        """Return which choices the next step allows: at least one of each number of the action."""
+        self._live()
+        return self._allowed()
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take a step, unless the action is forbidden."""
+        if not allows(self._allowed(), self.action_space, action):
+            raise AssertionError(f"action {action} is forbidden in step {self._length + 1}")
+        return super().step(action)
+
+    def _allowed(self) -> np.ndarray:
+        generator = np.random.default_rng(self._past)
+        masks = []
+        for choices in choices_of(self.action_space):
+            mask = generator.integers(2, size=choices).astype(np.bool_)
+            mask[generator.integers(choices)] = True
+            masks.append(mask)
+        return np.concatenate(masks)

@@ -1,0 +1,55 @@
+"""Algorithms that choose only among actions that a mask of the environment allows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+from sb3_contrib import MaskablePPO
+
+from palaestra_trainer.algorithms.entries import entry_of
+from palaestra_trainer.algorithms.normalization import Normalized
+from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
+from palaestra_trainer.errors import ConfigurationError
+
+
+def is_masked(algorithm: Algorithm) -> bool:
+    """Return whether an algorithm asks the environment which actions it allows."""
+    return issubclass(entry_of(algorithm.name).original, MaskablePPO)
+
+
+def takes_masks(policy: object) -> bool:
+    """Return whether a model, or the policy of one, chooses only among allowed actions."""
+    return isinstance(policy.model if isinstance(policy, Normalized) else policy, MaskablePPO)
+
+
+def refuse_without_masks(algorithm: Algorithm, env: gymnasium.Env[Any, Any], name: str) -> None:
+    """Refuse an environment without masks if the algorithm asks for them.
+
+    Args:
+        algorithm: what the job says.
+        env: the environment; its simulator does not have to be up.
+        name: its id.
+
+    Raises:
+        ConfigurationError: it has no method `action_masks`.
+    """
+    if is_masked(algorithm) and not gives_masks(env):
+        raise ConfigurationError(
+            f"environment.id: {name} has no method {ACTION_MASKS}, which {algorithm.name} asks for allowed "
+            f"actions; define {ACTION_MASKS}(self), which returns a truth value for each, or use PPO"
+        )
+
+
+def predict_allowed(policy: Any, masks: Any, *seen: Any, deterministic: bool = True) -> tuple[Any, Any]:
+    """Return an action that the masks allow, and the policy's next state.
+
+    Args:
+        policy: `takes_masks` is true of it.
+        masks: as `action_masks` returns them.
+        seen: observation, state, and whether an episode begins.
+        deterministic: without chance.
+    """
+    action, state = policy.predict(*seen, deterministic=deterministic, action_masks=masks)
+    return action, state
