@@ -72,9 +72,9 @@ class ActuatorMotor(Motor):
         super().reset()
         self._commanded = False
         if self._actuator.length is not None:
-            self.angle_rad = self.target_rad = self._actuator.length()
+            self.angle_rad = self.target_rad = self.asked_rad = self._actuator.length()
         if self._actuator.control is Control.POSITION:
-            self.target_rad = self._actuator.read() / self._actuator.scale
+            self.target_rad = self.asked_rad = self._actuator.read() / self._actuator.scale
         self._aim: float | None = None  # where a servo for a position is to be now
 
     def put(self, angle_rad: float) -> None:
@@ -120,6 +120,16 @@ class ActuatorMotor(Motor):
         """
         del torque_nm
         raise UnsimulatedError(f"{self._what()}, whose force the model limits; write forcerange there")
+
+    def set_control_pid(self, p: float, i: float, d: float) -> None:
+        """Set the gains with which a servo for a velocity turns to a target; see `Motor`.
+
+        Raises:
+            UnsimulatedError: the model has the gains.
+        """
+        if self._actuator.control is not Control.VELOCITY and (p, i, d) != self.spec.gains:
+            raise UnsimulatedError(f"{self._what()}, whose gains the model has; write kp and kv there")
+        super().set_control_pid(p, i, d)
 
     def feel(self) -> None:
         """Take position and force of this moment."""
