@@ -172,9 +172,9 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     roots = {figure.place: body for figure, body in robots.items()}
     roots.update((thing.place, body) for thing, body in things.items())
     links = _add_all_links(Ground(spec, roots, stands), contents, marks)
-    floor = _begin_spec(spec, surroundings)
+    floors = _begin_spec(spec, surroundings)
     surfaces = [(geom, material_of(shape.node)) for geom, shape, _, _ in marks.entries]
-    set_frictions(spec, [(floor, surroundings.floor), *surfaces], surroundings)
+    set_frictions(spec, [*((it, surroundings.floor) for it in floors), *surfaces], surroundings)
     model = spec.compile()
     data = mujoco.MjData(model)
     built = Built(
@@ -200,8 +200,8 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     return built
 
 
-def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
-    """Set what holds everywhere in a model; return the floor."""
+def _begin_spec(spec: Any, surroundings: Surroundings) -> list[Any]:
+    """Set what holds everywhere in a model; return the floors."""
     spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots takes any matrix
@@ -209,9 +209,17 @@ def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
     # The fast one drops terms between x and y: a robot is then slower across the axes than along them.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    return spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=STANDING, conaffinity=0, friction=FRICTION
-    )
+    return [
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[0.0, 0.0, height_m],
+            size=[0, 0, 1],
+            contype=STANDING,
+            conaffinity=0,
+            friction=FRICTION,
+        )
+        for height_m in surroundings.heights_m()
+    ]
 
 
 def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Figure | None, list[Added]]:

@@ -7,7 +7,7 @@ other node that would act in Webots, such as a PROTO or a loose crate, is refuse
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from palaestra_sim.errors import WorldError
@@ -23,7 +23,7 @@ from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import ELSEWHERE, LeaveOut, Reading
 from palaestra_sim.scene.robot_reader import RobotParts, read_robot
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.scene.surroundings import Surroundings, read_surroundings
+from palaestra_sim.scene.surroundings import Floor, Surroundings, read_surroundings
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 # Visible to people and cameras only, or read elsewhere (WorldInfo).
@@ -101,8 +101,10 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     for node in tree.root.nodes():
         _read(reading, node, reading.top, scene)
     if physics.abilities.forces:
-        floors = (node for node in tree.nodes.values() if node.type_name == "Plane" and node.outline)
-        scene.surroundings = read_surroundings(reading, reading.world_info, next(floors, None))
+        planes = (node for node in tree.nodes.values() if node.type_name == "Plane" and node.outline)
+        scene.surroundings = read_surroundings(reading, reading.world_info, next(planes, None))
+    floors = tuple(Floor(place, local) for place, local in reading.floors)
+    scene.surroundings = replace(scene.surroundings, floors=floors)
     reading.conclude()
     scene.top = reading.top
     scene.left_out = tuple(reading.left_out)
