@@ -27,7 +27,6 @@ from palaestra_sim.mujoco.geoms import (
     add_geom,
     own_bit,
     put,
-    spread,
 )
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.links import Added, Ground, LinkBody, add_links, bodies
@@ -303,11 +302,8 @@ def _add_loose(spec: Any, thing: Loose, marks: Marks) -> Any:
     frame = thing.place.ground_pose.inverse
     touch = Touch(LOOSE, STANDING | LOOSE)
     geoms = [add_geom(added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
-    if thing.mass_kg is not None:
-        spread(thing.mass_kg, thing.shapes, geoms)
-    for geom, shape in zip(geoms, thing.shapes, strict=True):
-        if thing.mass_kg is None:
-            geom.density = thing.density
+    for geom, shape, density in zip(geoms, thing.shapes, thing.densities, strict=True):
+        geom.density = density
         marks.note(geom, shape)
     return added
 
