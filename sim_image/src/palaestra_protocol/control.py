@@ -66,20 +66,24 @@ class RobotName:
     """The names of a robot in the world.
 
     `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
-    the scene.
+    the scene. `definition` is its DEF name; it is absent, not "", in messages of a robot without one.
     """
 
     robot: str
     ros_name: str
     supervisor: bool
+    definition: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {
+        content = {
             "robot": clipped(self.robot, MOST_NAME),
             "ros_name": clipped(self.ros_name, MOST_NAME),
             "supervisor": self.supervisor,
         }
+        if self.definition:
+            content["definition"] = clipped(self.definition, MOST_NAME)
+        return content
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -93,6 +97,7 @@ class RobotName:
             robot=fields.text("robot", MOST_NAME),
             ros_name=fields.text("ros_name", MOST_NAME, least=1),
             supervisor=fields.flag("supervisor"),
+            definition=fields.text("definition", MOST_NAME) if fields.has("definition") else "",
         )
 
 

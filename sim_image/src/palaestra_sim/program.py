@@ -29,7 +29,7 @@ from palaestra_sim.scene.loading import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.reading import LeaveOut
-from palaestra_sim.scene.summary import silent_devices, summary
+from palaestra_sim.scene.summary import differences, silent_devices, summary
 from palaestra_sim.world.mjcf import is_mjcf
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
@@ -175,6 +175,8 @@ class _Process:
         silent = silent_devices(self._simulator.simulation.robots)
         if silent:
             log.warning("devices without readings, whose enable answers failure: %s", silent)
+        for difference in differences(self._simulator.simulation):
+            log.warning("differs from Webots: %s", difference)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 

@@ -7,7 +7,7 @@ import yaml
 
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.ros import RosService
-from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots import Lever, Mode, Webots
 from palaestra_trainer.webots.devices import PositionSensor
 
 STEP_MS = 40
@@ -52,12 +52,18 @@ class CartPole:
 
 
 @pytest.fixture
-def cartpole(master, tmp_path):
-    """The world of the example, running under the name cartpole."""
-    del master
+def source():
+    """The world of the example."""
     job = yaml.safe_load(EXAMPLE.read_text())
+    return job["spec"]["simulators"][0]["world"]["inline"]
+
+
+@pytest.fixture
+def cartpole(master, tmp_path, source):
+    """The world, running under the name cartpole."""
+    del master
     world = tmp_path / "cartpole.xml"
-    world.write_text(job["spec"]["simulators"][0]["world"]["inline"])
+    world.write_text(source)
     running = CartPole(world)
     yield running
     running.close()
@@ -85,3 +91,30 @@ def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole)
     assert cartpole.call("supervisor/node/set_joint_position", "node_set_joint_position", **tilted).success
     velocity = cartpole.call("supervisor/node/get_velocity", "node_get_velocity", node=cartpole.node("pole"))
     assert velocity.velocity.linear.x > 0.1
+
+
+class TestAKeyframe:
+    """A world whose keyframe has a control: it pushes the cart."""
+
+    @pytest.fixture
+    def source(self, source):
+        """The world of the example with the keyframe."""
+        named = source.replace("<custom>", '<custom><text name="keyframe" data="home"/>')
+        return named.replace("</mujoco>", '<keyframe><key name="home" ctrl="5"/></keyframe></mujoco>')
+
+    def test_its_control_acts_until_the_first_command_after_a_reset(self, cartpole):
+        """A command of 0 at a reset would let a robot fall that its keyframe holds up."""
+        lever = Lever("cartpole", "push", "force")
+        lever.release()
+        start = [cartpole.step() for _ in range(5)]
+        cartpole.call("supervisor/simulation_reset", "get_bool", ask=True)
+        cartpole.step()
+        lever.release()
+        again = [cartpole.step() for _ in range(5)]
+        lever.set(-100.0)
+        back = [cartpole.step() for _ in range(5)]
+        lever.close()
+
+        assert start[-1] > 0.05
+        assert again[-1] > 0.05
+        assert back[-1] - back[-2] < back[1] - back[0]

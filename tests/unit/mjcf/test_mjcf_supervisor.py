@@ -6,7 +6,7 @@ import pytest
 
 from palaestra_sim.scene.tree.fields import FieldType
 from palaestra_sim.seam import UnsimulatedError
-from tests.unit.mjcf.conftest import FORCE, VELOCITY
+from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 
 def positions(simulation):
@@ -78,6 +78,43 @@ def test_a_world_begins_at_its_keyframe(load):
     simulation.step(10)
 
     assert positions(simulation)[0][0] == 0.5
+
+
+def home(control):
+    """Return the changes that let the world begin with the cart at 1 m and with that control."""
+    keyframe = f'<keyframe><key name="home" qpos="1 0 1 1 0.5 1 0 0 0" ctrl="{control}"/></keyframe>'
+    named = '<custom><text name="keyframe" data="home"/>'
+    return ("<custom>", named), ("<sensor>", f"{keyframe}<sensor>")
+
+
+@pytest.mark.parametrize("velocity", [None, 5.0])
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, velocity, reset):
+    """A velocity alone is not a target: a robot that stands would stretch its legs to 0."""
+    simulation = load(POSITION, "", *home(control=1))
+    motor = simulation.robots[0].motors["push"]
+    if reset:
+        motor.set_position(-1.0)
+        simulation.step(100)
+        simulation.reset()
+        simulation.step(10)
+    assert motor.target_rad == 1.0
+
+    if velocity is not None:
+        motor.set_velocity(velocity)
+    simulation.step(1000)
+
+    assert positions(simulation)[0][0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_servo_for_a_velocity_holds_where_the_world_begins(load):
+    """A motor of Webots turns to the position in the world file, until it gets a target."""
+    simulation = load(VELOCITY, "", *home(control=0))
+    simulation.robots[0].motors["push"].set_velocity(5.0)
+
+    simulation.step(1000)
+
+    assert positions(simulation)[0][0] == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ["ball", "target"])

@@ -15,6 +15,7 @@ from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movie, frame_step_ms
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.tree.fields import FieldType
 from palaestra_sim.seam import UnsimulatedError
 from palaestra_sim.stub.physics import StubPhysics
 from tests.failing import failing
@@ -78,6 +79,23 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
     assert np.abs(moved).max() > 5.0
     assert list(tmp_path.iterdir()) == [path]
     assert (simulation.movies.ready, simulation.movies.failed) == (True, False)
+
+
+def test_a_movie_follows_the_viewpoint(tmp_path):
+    """A client that moves it makes a panorama; the robot stands."""
+    simulation = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
+    viewpoint = next(node for node in simulation.tree.root.nodes() if node.type_name == "Viewpoint")
+    path = tmp_path / "panorama.mp4"
+    simulation.movies.start(movie(path))
+    simulation.step(40)
+    position = simulation.tree.field_of(viewpoint, "position", simulation)
+    position.set(FieldType.VEC3F, 0, (0.5, 0.0, 3.0))
+    simulation.step(40)
+    simulation.movies.stop()
+
+    (first, second), _ = frames(path)
+
+    assert np.abs(place(second) - place(first)).max() > 5.0
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):

@@ -235,3 +235,20 @@ def test_an_obstacle_that_moves_wakes_what_lies_on_it(load):
 
     assert first[-1][2] < 0.3
     assert fall() == first
+
+
+@pytest.mark.parametrize("physics", ["", "physics Physics { density -1 mass 3 }"])
+def test_a_solid_inside_another_is_one_body_with_it(load, physics):
+    """A lamp hangs from its shelf, and the legs of a table carry it, as in Webots; nothing falls off."""
+    lamp = """DEF LAMP Solid { translation 0.5 0 0 boundingObject Box { size 0.1 0.1 0.1 }
+      physics Physics { density -1 mass 1 } name "lamp" }"""
+    legs = """DEF LEGS Solid { translation 0 0 -0.5 boundingObject Box { size 0.4 0.4 0.9 }
+      physics Physics { density -1 mass 20 } name "legs" }"""
+    shelf = f"""DEF SHELF Solid {{ translation 0.8 0 1 boundingObject Box {{ size 0.4 0.4 0.1 }} {physics}
+      children [ {lamp} Group {{ children [ {legs} ] }} ] }}"""
+    simulation = load(shelf.encode())
+
+    simulation.step(1600)
+
+    heights = [simulation.tree.of_def(name).place.world_position[2] for name in ("SHELF", "SHELF.LAMP")]
+    assert heights == pytest.approx([1.0, 1.0] if not physics else [0.95, 0.95], abs=0.01)

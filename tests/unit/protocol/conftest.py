@@ -40,7 +40,14 @@ SHAPES = {
         driver=names,
         world=texts,
         robots=st.lists(
-            st.builds(RobotName, robot=names, ros_name=names, supervisor=st.booleans()), max_size=3
+            st.builds(
+                RobotName,
+                robot=names,
+                ros_name=names,
+                supervisor=st.booleans(),
+                definition=names | st.just(""),
+            ),
+            max_size=3,
         ).map(tuple),
         pid=st.none() | st.integers(1, 2**22),
         starts=counts,

@@ -68,7 +68,7 @@ def test_the_robots_are_listed_by_the_names_that_they_have(source, tmp_path) -> 
     robots = preparation.described(world.read_bytes(), "arena")
 
     name = ros_name(IDENTITY, "robotino")
-    assert robots == (RobotName(robot="robotino", ros_name=name, supervisor=True),)
+    assert robots == (RobotName(robot="robotino", ros_name=name, supervisor=True, definition="ROBOTINO"),)
 
 
 def test_a_robot_without_a_name_is_not_listed() -> None:

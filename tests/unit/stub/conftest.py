@@ -317,6 +317,7 @@ ROBOT = f"""DEF ROBOTINO Robot {{
   ]
   boundingObject Pose {{
     translation 0 0 0.15 children [ Cylinder {{ radius 0.2 height 0.2 }} ] }}
+  physics Physics {{ }}
 }}"""
 
 

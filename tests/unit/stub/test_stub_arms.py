@@ -14,7 +14,7 @@ LIFT = """SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 m
   endPoint Solid { children [ GPS { name "top" } ] } }"""
 WRIST = """HingeJoint { device [
   RotationalMotor { name "wrist" maxTorque 6 } Brake { name "band" } PositionSensor { name "turn" } ]
-  endPoint Solid { } }"""
+  endPoint Solid { physics Physics { } } }"""
 CAMERA = """Camera { name "eye" width 320 height 200 focus Focus { focalDistance 1 maxFocalDistance 2 }
   zoom Zoom { minFieldOfView 0.2 maxFieldOfView 1.2 } recognition Recognition { segmentation TRUE } }"""
 

@@ -18,7 +18,7 @@ NORTH = "rotation 0 0 1 1.5707963267948966"  # of a robot that looks along +y
 ON_A_TURNTABLE = """HingeJoint {{
   jointParameters HingeJointParameters {{ axis 0 0 1 }}
   device RotationalMotor {{ name "turntable" }}
-  endPoint Solid {{ children [ {} ] }} }}"""
+  endPoint Solid {{ children [ {} ] physics Physics {{ }} }} }}"""
 
 
 @pytest.fixture

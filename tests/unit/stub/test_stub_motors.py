@@ -80,12 +80,31 @@ def test_a_motor_tells_what_the_world_file_says(robot):
     assert robot.get("wheel1_joint/get_position_sensor_name") == "wheel1_joint_sensor"
 
 
-def test_available_torque_is_kept_within_the_limit(robot):
-    """It changes nothing here, but is read back."""
-    robot.call("wheel0_joint/set_available_torque", value=4.0)
-    robot.call("wheel0_joint/set_available_torque", value=40.0)
+@pytest.mark.parametrize(("asked", "kept"), [(0.0, 0.0), (40.0, 10.0), (-1.0, 10.0), (math.nan, 10.0)])
+def test_available_torque_is_kept_within_the_limit(robot, asked, kept):
+    """Every value that Webots takes or ignores answers success."""
+    assert robot.get("wheel0_joint/set_available_torque", value=asked) is True
+    assert robot.get("wheel0_joint/get_available_torque") == kept
 
-    assert robot.get("wheel0_joint/get_available_torque") == 4.0
+
+def test_a_part_of_the_torque_of_a_wheel_is_refused(robot):
+    """The stub has no masses, so it has no way to drive a robot more weakly."""
+    with pytest.raises(Exception, match="a part of the torque of 'wheel0_joint' is not simulated; set 0, or"):
+        robot.call("wheel0_joint/set_available_torque", value=4.0)
+
+
+def test_a_motor_without_torque_drives_nothing(robot):
+    """A program that switches its motors off expects the robot to stay."""
+    sensor = robot.inbox("wheel0_joint_sensor/value")
+    robot.call("wheel0_joint_sensor/enable", value=32)
+    for wheel in ("wheel0_joint", "wheel1_joint", "wheel2_joint"):
+        robot.call(f"{wheel}/set_available_torque", value=0.0)
+        robot.call(f"{wheel}/set_position", value=INF)
+        robot.call(f"{wheel}/set_velocity", value=4.0)
+
+    robot.call("robot/time_step", value=320)
+
+    assert sensor == [0.0]
 
 
 def test_torque_control_fails(robot):
@@ -144,6 +163,110 @@ def test_positions_are_clamped_to_limits_that_differ():
     assert motor.target_rad == -INF
 
 
+def positions(motor, steps, step_s=0.008):
+    """Return the positions of a motor after each of some steps."""
+    found = []
+    for _ in range(steps):
+        motor.advance(step_s)
+        found.append(motor.angle_rad)
+    return found
+
+
+def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
+    """A proportional gain of 1 comes 63 % near in a second; the default gain of 10 arrives."""
+    motor.set_control_pid(1.0, 0.0, 0.0)
+    motor.set_position(1.0)
+
+    assert positions(motor, 125)[-1] == pytest.approx(1.0 - (1.0 - 0.008) ** 125)
+
+
+def test_the_controller_integrates_and_differentiates_the_error(motor):
+    """As Webots does in each basic step, from the moment when the gains were set."""
+    motor.set_control_pid(1.0, 2.0, 0.001)
+    motor.set_position(0.5)
+
+    first, second = positions(motor, 2, step_s=0.1)
+
+    speed = 0.5 + 2.0 * 0.05 + 0.001 * 5.0
+    assert first == pytest.approx(0.1 * speed)
+    error = 0.5 - first
+    speed = error + 2.0 * (0.05 + 0.1 * error) + 0.001 * (error - 0.5) / 0.1
+    assert second == pytest.approx(first + 0.1 * speed)
+
+
+@pytest.mark.parametrize("gains", [(0.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (math.nan, 0.0, 0.0)])
+def test_gains_that_webots_refuses_change_nothing(motor, gains):
+    """All three stay as they are."""
+    motor.set_control_pid(*gains)
+
+    assert motor.gains == (10.0, 0.0, 0.0)
+
+
+def test_a_multiplier_scales_positions_velocities_and_torques():
+    """The program reads back what it has set, and the shaft moves by the product."""
+    motor = Motor(MotorSpec(name="m", multiplier=-0.5, max_velocity_rad_s=2.0))
+
+    motor.set_position(1.0)
+    motor.set_velocity(3.0)
+    motor.set_effort(8.0)
+
+    assert (motor.asked_rad, motor.asked_velocity_rad_s) == (1.0, 3.0)
+    assert (motor.target_rad, motor.velocity_rad_s, motor.effort_nm) == (-0.5, -1.5, -4.0)
+    motor.set_position(INF)
+    motor.set_velocity(5.0)
+    assert (motor.target_rad, motor.velocity_rad_s, motor.asked_velocity_rad_s) == (INF, -2.0, 4.0)
+
+
+def test_a_joint_without_physics_accelerates_by_its_torque_and_keeps_its_velocity_to_the_target():
+    """Webots moves it without its controller: 10 rad/s2, then the velocity, and the target exactly."""
+    motor = Motor(MotorSpec(name="m", max_velocity_rad_s=2.0))
+    motor.kinematic = True
+    motor.set_position(1.0)
+
+    course = positions(motor, 10, step_s=0.1)
+
+    assert course == pytest.approx([0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.0, 1.0, 1.0, 1.0])
+    assert motor.speed_rad_s == 0.0
+
+
+@pytest.mark.parametrize(("acceleration", "speed"), [(-1.0, 1.0), (4.0, 0.4), (40.0, 1.0)])
+def test_the_acceleration_of_a_joint_without_physics_is_at_most_its_torque(acceleration, speed):
+    """The manual calls this the kinematics mode."""
+    motor = Motor(MotorSpec(name="m", acceleration_rad_s2=acceleration))
+    motor.kinematic = True
+    motor.set_position(INF)
+
+    motor.advance(0.1)
+
+    assert motor.speed_rad_s == pytest.approx(speed)
+
+
+def test_an_endless_motion_of_a_joint_without_physics_ends_at_its_limit():
+    """A limit of commands is one of the motion there."""
+    motor = Motor(MotorSpec(name="m", max_torque_nm=100.0, min_rad=-1.0, max_rad=1.0))
+    motor.kinematic = True
+    motor.set_position(INF)
+
+    assert positions(motor, 3, step_s=0.1) == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_a_robot_without_physics_accelerates_as_its_wheels_do(ros, start, world, simple_robot):
+    """Its wheels need 0.4 s to 4 rad/s at 10 rad/s2; with physics they have them at once."""
+    start(world(robot=simple_robot.replace("physics Physics { }", "")))
+    robot = ros.node("robotino")
+    sensor = robot.inbox("wheel0_joint_sensor/value")
+    robot.call("wheel0_joint_sensor/enable", value=32)
+    for wheel in ("wheel0_joint", "wheel1_joint", "wheel2_joint"):
+        robot.call(f"{wheel}/set_position", value=INF)
+        robot.call(f"{wheel}/set_velocity", value=4.0)
+
+    for _ in range(20):
+        robot.call("robot/time_step", value=32)
+
+    speeds = [(after - before) / 0.032 for before, after in itertools.pairwise([0.0, *sensor])]
+    assert speeds == pytest.approx([min(4.0, 0.32 * step) for step in range(1, 21)])
+
+
 def test_a_reset_takes_every_command_back(motor):
     """Why a client sends set_position(inf) after each reset."""
     motor.set_position(INF)
@@ -159,7 +282,8 @@ def test_a_reset_takes_every_command_back(motor):
 
 def test_a_motor_off_the_wheels_turns_too(ros, start, world, simple_robot):
     """A joint more, such as a turret: it moves nothing but its shaft."""
-    turret = """HingeJoint { device [ RotationalMotor { name "turret" } PositionSensor { name "angle" } ] }"""
+    turret = """HingeJoint { device [ RotationalMotor { name "turret" } PositionSensor { name "angle" } ]
+      endPoint Solid { physics Physics { } } }"""
     start(world(robot=simple_robot.replace("DEF IR", f"{turret} DEF IR")))
     robot = ros.node("robotino")
     angles = robot.inbox("angle/value")

@@ -64,7 +64,9 @@ def test_an_unknown_world_names_those_that_ship() -> None:
 def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
     """One ROS node then steps the simulation, senses and sets the scene."""
     assert robots(builtin("arena")) == (
-        WorldRobot(robot="robotino", ros_name="robotino", supervisor=True, synchronize=True),
+        WorldRobot(
+            robot="robotino", ros_name="robotino", supervisor=True, synchronize=True, definition="ROBOTINO"
+        ),
     )
 
 

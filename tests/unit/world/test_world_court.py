@@ -18,7 +18,7 @@ def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
     """An instance of a PROTO of Webots, which the stub has too."""
     assert defined("BURGER").type_name == "TurtleBot3Burger"
     assert robots(builtin("court")) == (
-        WorldRobot(robot="burger", ros_name="burger", supervisor=True, synchronize=True),
+        WorldRobot(robot="burger", ros_name="burger", supervisor=True, synchronize=True, definition="BURGER"),
     )
 
 

@@ -302,12 +302,12 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
     """Generated or not; the controller takes the last of two names."""
     text = (
         'Robot { controller "ros" supervisor TRUE controllerArgs ["--name=a" "--name=b"] }'
-        'Robot { controller "ros" name "arm" controllerArgs "--synchronize" }'
+        'DEF ARM Robot { controller "ros" name "arm" controllerArgs "--synchronize" }'
     )
 
     assert robots(world(text)) == (
         WorldRobot(robot="robot", ros_name="b", supervisor=True, synchronize=False),
-        WorldRobot(robot="arm", ros_name=None, supervisor=False, synchronize=True),
+        WorldRobot(robot="arm", ros_name=None, supervisor=False, synchronize=True, definition="ARM"),
     )
 
 

@@ -27,7 +27,6 @@ from palaestra_sim.mujoco.geoms import (
     add_geom,
     own_bit,
     put,
-    spread,
 )
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.links import Added, Ground, LinkBody, add_links, bodies
@@ -172,9 +171,9 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     roots = {figure.place: body for figure, body in robots.items()}
     roots.update((thing.place, body) for thing, body in things.items())
     links = _add_all_links(Ground(spec, roots, stands), contents, marks)
-    floor = _begin_spec(spec, surroundings)
+    floors = _begin_spec(spec, surroundings)
     surfaces = [(geom, material_of(shape.node)) for geom, shape, _, _ in marks.entries]
-    set_frictions(spec, [(floor, surroundings.floor), *surfaces], surroundings)
+    set_frictions(spec, [*((it, surroundings.floor) for it in floors), *surfaces], surroundings)
     model = spec.compile()
     data = mujoco.MjData(model)
     built = Built(
@@ -200,8 +199,8 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     return built
 
 
-def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
-    """Set what holds everywhere in a model; return the floor."""
+def _begin_spec(spec: Any, surroundings: Surroundings) -> list[Any]:
+    """Set what holds everywhere in a model; return the floors."""
     spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots takes any matrix
@@ -209,9 +208,17 @@ def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
     # The fast one drops terms between x and y: a robot is then slower across the axes than along them.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    return spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=STANDING, conaffinity=0, friction=FRICTION
-    )
+    return [
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[0.0, 0.0, height_m],
+            size=[0, 0, 1],
+            contype=STANDING,
+            conaffinity=0,
+            friction=FRICTION,
+        )
+        for height_m in surroundings.heights_m()
+    ]
 
 
 def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Figure | None, list[Added]]:
@@ -295,11 +302,8 @@ def _add_loose(spec: Any, thing: Loose, marks: Marks) -> Any:
     frame = thing.place.ground_pose.inverse
     touch = Touch(LOOSE, STANDING | LOOSE)
     geoms = [add_geom(added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
-    if thing.mass_kg is not None:
-        spread(thing.mass_kg, thing.shapes, geoms)
-    for geom, shape in zip(geoms, thing.shapes, strict=True):
-        if thing.mass_kg is None:
-            geom.density = thing.density
+    for geom, shape, density in zip(geoms, thing.shapes, thing.densities, strict=True):
+        geom.density = density
         marks.note(geom, shape)
     return added
 

@@ -40,6 +40,7 @@ class MujocoPhysics:
 
     def __init__(self) -> None:
         self._surroundings = Surroundings()
+        self._floors = self._surroundings.heights_m()
         self._contents = Contents()
         self._built: Built = build(self._contents, self._surroundings)
         self._moved: frozenset[Place] = frozenset()  # obstacles that moved since the last reset
@@ -68,6 +69,10 @@ class MujocoPhysics:
         contents = Contents(
             figures=tuple(figures), solids=tuple(solids), loose=tuple(loose), doors=tuple(doors)
         )
+        floors = self._surroundings.heights_m()
+        if floors != self._floors:
+            self._floors = floors
+            self._stale = True
         if contents == self._contents:
             self._built.put_obstacles()
             displaced = self._built.displaced()

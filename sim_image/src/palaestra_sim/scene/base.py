@@ -4,6 +4,7 @@ The law of the wheels is in `drive`. In Webots torque and friction limit the acc
 three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z. They are those of the Robotino
 3's own controller (Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). All three axes are
 slowed by the same factor, as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
+In a robot without physics, Webots itself limits the accelerations of the wheels: see `Motor.kinematic`.
 
 Every simulator takes the speed from here, so a robot answers its commands alike in all of them.
 """
@@ -33,13 +34,14 @@ class Base:
         vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
     """
 
-    __slots__ = ("_step_s", "_wheels", "drive", "omega", "vx", "vy")
+    __slots__ = ("_kinematic", "_step_s", "_wheels", "drive", "omega", "vx", "vy")
 
     def __init__(self, wheels: Sequence[Motor] = (), drive: Drive | None = None) -> None:
         if drive is not None and len(wheels) != len(drive.to_speeds):
             raise ValueError(f"{len(wheels)} motors do not fit a drive of {len(drive.to_speeds)} wheels")
         self.drive = drive
         self._wheels = tuple(wheels) if drive is not None else ()
+        self._kinematic = all(wheel.kinematic for wheel in wheels)
         self._step_s = 0.0
         self.halt()
 
@@ -51,8 +53,7 @@ class Base:
         """Stop all motion; the motors begin again from rest."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
-            wheel.speed_rad_s = 0.0
-            wheel.changed = True
+            wheel.halt()
 
     def push(self, vx: float, vy: float, omega: float) -> None:
         """Give the robot a speed in its own axes; its motors start from there."""
@@ -86,7 +87,7 @@ class Base:
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
         # In steps of the largest acceleration, which all three axes share.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
-        if steps > 1.0:
+        if steps > 1.0 and not self._kinematic:
             demands = [
                 speed + (demand - speed) / steps for demand, speed in zip(demands, speeds, strict=True)
             ]

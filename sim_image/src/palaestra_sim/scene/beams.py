@@ -38,7 +38,9 @@ class Beam(NamedTuple):
 def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
     """Return the beam that leaves a frame in a direction of this frame."""
     dx, dy, dz = turn(pose.rotation, direction)
-    along = max(math.hypot(dx, dy), _STEEPEST)
+    along = math.hypot(dx, dy)
+    if along < _STEEPEST:  # any direction is right; that of rounding errors would be none of length 1
+        dx, dy, along = _STEEPEST, 0.0, _STEEPEST
     slope = dz / along
     ray = pose.position[0], pose.position[1], dx / along, dy / along
     return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)

@@ -110,12 +110,10 @@ class Loose:
         node: its Solid.
         place: its frame.
         shapes: what it and the Solids inside it run into other things with.
-        mass_kg: of all of it; None: from the density.
-        density: in kg/m3.
+        densities: of the shapes, in kg/m3.
     """
 
     node: SceneNode
     place: LoosePlace
     shapes: Sequence[Shape] = field(default_factory=tuple)
-    mass_kg: float | None = None
-    density: float = 1000.0
+    densities: Sequence[float] = field(default_factory=tuple)

@@ -3,6 +3,9 @@
 A motor has the commands of Webots: a target position and a velocity. With a target of infinity it turns at
 that velocity; with a finite one it turns to the target, at most at that velocity. An invalid command is
 ignored without an error, because the ROS interface always answers success.
+
+Where the end of a joint has physics, a PID controller demands the speed. Without physics, Webots moves the
+joint itself, without that controller: see `Motor.kinematic`. Source: Webots reference, Motor.
 """
 
 from __future__ import annotations
@@ -11,8 +14,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-# The P of controlPID, whose default is 10 0 0. Source: Webots reference, Motor.
-POSITION_GAIN: Final = 10.0
+_REACHED: Final = 1e-6  # in rad or m: so near its target a joint without physics rests, as in Webots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +23,8 @@ class MotorSpec:
 
     Of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean
     no limits of commands, equal `stops` no stops of the joint, which the shaft never passes. `start_rad` is
-    the position in the world file. `forces` is whether the physics has them.
+    the position in the world file. `gains` are P, I and D of its controller. `multiplier` scales the
+    positions, velocities and torques that a client sets. `forces` is whether the physics has them.
     """
 
     name: str
@@ -31,6 +34,7 @@ class MotorSpec:
     max_rad: float = 0.0
     max_torque_nm: float = 10.0
     multiplier: float = 1.0
+    gains: tuple[float, float, float] = (10.0, 0.0, 0.0)
     start_rad: float = 0.0
     stops: tuple[float, float] = (0.0, 0.0)
     model: str = ""
@@ -45,6 +49,10 @@ class Motor:
     Attributes:
         speed_rad_s: of the shaft.
         angle_rad: of the shaft, since the start or the last reset.
+        asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
+        gains: P, I and D of its controller.
+        kinematic: whether its joint has no physics. Then the available torque limits its acceleration, as in
+            Webots, and it keeps the commanded velocity up to its target.
         changed: whether a command came since the physics looked; the physics sets it back.
         damping: of the joint, in N m s/rad, set by its brake; 0 without one.
         forceful: whether the physics moves it by forces.
@@ -53,14 +61,21 @@ class Motor:
     """
 
     __slots__ = (
+        "_integral",
+        "_last_error",
+        "_rate",
         "acceleration_rad_s2",
         "angle_rad",
+        "asked_rad",
+        "asked_velocity_rad_s",
         "available_torque_nm",
         "changed",
         "damping",
         "effort_nm",
         "feedback_nm",
         "forceful",
+        "gains",
+        "kinematic",
         "spec",
         "speed_rad_s",
         "target_rad",
@@ -70,6 +85,7 @@ class Motor:
     def __init__(self, spec: MotorSpec) -> None:
         self.spec = spec
         self.forceful = False
+        self.kinematic = False
         self.reset()
 
     @property
@@ -89,14 +105,15 @@ class Motor:
 
     def reset(self) -> None:
         """Return to the state of a new world: position control, at the start, as fast as allowed."""
-        self.target_rad = self.spec.start_rad
-        self.velocity_rad_s = self.spec.max_velocity_rad_s
+        self.target_rad = self.asked_rad = self.spec.start_rad
+        self.velocity_rad_s = self.asked_velocity_rad_s = self.spec.max_velocity_rad_s
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
         self.available_torque_nm = self.spec.max_torque_nm
         self.damping = 0.0
         self.effort_nm: float | None = None
         self.feedback_nm = 0.0
-        self.speed_rad_s = 0.0
+        self.set_control_pid(*self.spec.gains)
+        self.halt()
         self.angle_rad = self.spec.start_rad
         self.changed = True
 
@@ -104,14 +121,22 @@ class Motor:
         """Put the shaft to an angle within the stops, which becomes the target."""
         low, high = self.spec.stops
         self.angle_rad = angle_rad if low == high else max(low, min(high, angle_rad))
-        self.target_rad = self.angle_rad
+        self.target_rad = self.asked_rad = self.angle_rad
+        self.halt()
+
+    def halt(self) -> None:
+        """Stop the shaft; the motor begins again from rest."""
         self.speed_rad_s = 0.0
+        self._rate = 0.0  # of a kinematic motor: the velocity that it has reached
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:
         """Turn to `target_rad`, or with infinity at the commanded velocity. NaN is ignored."""
         if math.isnan(target_rad):
             return
+        self.asked_rad = target_rad
+        if math.isfinite(target_rad):
+            target_rad *= self.spec.multiplier
         low, high = self.spec.min_rad, self.spec.max_rad
         if low != high and math.isfinite(target_rad):
             target_rad = max(low, min(high, target_rad))
@@ -120,7 +145,7 @@ class Motor:
         self.changed = True
 
     def set_velocity(self, velocity_rad_s: float) -> None:
-        """Set the velocity, clamped to the motor's limit.
+        """Set the velocity, times the multiplier, clamped to the motor's limit.
 
         Ignored: NaN, and a negative velocity while the target is finite.
         """
@@ -128,8 +153,11 @@ class Motor:
             return
         if velocity_rad_s < 0.0 and math.isfinite(self.target_rad):
             return
-        limit = self.spec.max_velocity_rad_s
-        self.velocity_rad_s = max(-limit, min(limit, velocity_rad_s))
+        limit, multiplier = self.spec.max_velocity_rad_s, self.spec.multiplier
+        scaled = velocity_rad_s * multiplier
+        self.velocity_rad_s = max(-limit, min(limit, scaled))
+        within = self.velocity_rad_s == scaled
+        self.asked_velocity_rad_s = velocity_rad_s if within else self.velocity_rad_s / multiplier
         self.changed = True
 
     def set_acceleration(self, acceleration_rad_s2: float) -> None:
@@ -139,19 +167,29 @@ class Motor:
             self.changed = True
 
     def set_available_torque(self, torque_nm: float) -> None:
-        """Set the torque that a client reads back; ignored beyond the motor's limit."""
-        if abs(torque_nm) <= self.spec.max_torque_nm:
-            self.available_torque_nm = torque_nm
+        """Set the greatest torque, clamped to the motor's limit. NaN and negative values are ignored."""
+        if torque_nm >= 0.0:
+            self.available_torque_nm = min(torque_nm, self.spec.max_torque_nm)
+            self.changed = True
+
+    def set_control_pid(self, p: float, i: float, d: float) -> None:
+        """Set P, I and D of the controller, which forgets the past. Invalid values are ignored, all three."""
+        if (p > 0.0 and i >= 0.0 and d >= 0.0) or (p, i, d) == self.spec.gains:
+            self.gains = p, i, d
+            self._integral = self._last_error = 0.0
+            self.changed = True
 
     def set_effort(self, torque_nm: float) -> None:
-        """Act with a torque, clamped to the available one, until the next position. NaN is ignored.
+        """Act with a torque, times the multiplier, until the next position. NaN is ignored.
+
+        It is clamped to the available torque.
 
         Only a motor that is `forceful` does.
         """
         if math.isnan(torque_nm):
             return
         limit = abs(self.available_torque_nm)
-        self.effort_nm = max(-limit, min(limit, torque_nm))
+        self.effort_nm = max(-limit, min(limit, torque_nm * self.spec.multiplier))
         self.changed = True
 
     def set_damping(self, constant: float) -> None:
@@ -161,13 +199,12 @@ class Motor:
             self.changed = True
 
     def demand(self, step_s: float) -> float:
-        """Return the speed in rad/s that the motor demands in the next `step_s` seconds."""
-        if math.isinf(self.target_rad):
-            wanted = self.velocity_rad_s
-        else:
-            limit = abs(self.velocity_rad_s)
-            wanted = POSITION_GAIN * (self.target_rad - self.angle_rad)
-            wanted = max(-limit, min(limit, wanted))
+        """Return the speed in rad/s that the motor demands in the next `step_s` seconds, once a step."""
+        if self.kinematic:
+            return self._kinematic_speed(step_s)
+        if not self.available_torque_nm:
+            return 0.0
+        wanted = self.velocity_rad_s if math.isinf(self.target_rad) else self._toward_target(step_s)
         if self.damping:
             reachable = abs(self.available_torque_nm) / self.damping
             wanted = max(-reachable, min(reachable, wanted))
@@ -175,6 +212,42 @@ class Motor:
             return wanted
         change = self.acceleration_rad_s2 * step_s
         return max(self.speed_rad_s - change, min(self.speed_rad_s + change, wanted))
+
+    def _toward_target(self, step_s: float) -> float:
+        """Return the speed that the PID controller asks for, at most the commanded velocity."""
+        p, i, d = self.gains
+        error = self.target_rad - self.angle_rad
+        wanted = p * error
+        if i or d:
+            self._integral += error * step_s
+            wanted += i * self._integral + d * (error - self._last_error) / step_s
+            self._last_error = error
+        limit = abs(self.velocity_rad_s)
+        return max(-limit, min(limit, wanted))
+
+    def _kinematic_speed(self, step_s: float) -> float:
+        """Return the speed in the next step of a joint without physics, which ends at the target."""
+        gap = self.target_rad - self.angle_rad
+        endless = math.isinf(gap)
+        if abs(gap) < _REACHED or (endless and self._at_limit()):
+            self._rate = 0.0
+            return 0.0
+        acceleration = self.acceleration_rad_s2
+        if acceleration < 0.0 or acceleration > self.available_torque_nm:
+            acceleration = self.available_torque_nm
+        wanted = self.velocity_rad_s if endless else abs(self.velocity_rad_s)
+        change = acceleration * step_s
+        self._rate = max(self._rate - change, min(self._rate + change, wanted))
+        if endless:
+            return math.copysign(1.0, gap) * self._rate
+        return math.copysign(min(abs(gap) / step_s, self._rate), gap)
+
+    def _at_limit(self) -> bool:
+        """Return whether a limit of the positions ends an endless motion of a joint without physics."""
+        low, high, velocity = self.spec.min_rad, self.spec.max_rad, self.velocity_rad_s
+        if low == high:
+            return False
+        return (self.angle_rad >= high and velocity >= 0.0) or (self.angle_rad <= low and velocity <= 0.0)
 
     def advance(self, step_s: float) -> None:
         """Turn the shaft for `step_s` seconds, as far as the stops of its joint."""
@@ -188,4 +261,5 @@ class Motor:
     @property
     def steady(self) -> bool:
         """Return whether the shaft turns at the commanded speed, which stays until the next command."""
-        return math.isinf(self.target_rad) and self.speed_rad_s == self.velocity_rad_s
+        endless = math.isinf(self.target_rad) and self.speed_rad_s == self.velocity_rad_s
+        return endless and not (self.kinematic and self.spec.min_rad != self.spec.max_rad)

@@ -65,7 +65,7 @@ class Movies:
     """The movies of one world, one at a time.
 
     Args:
-        view: returns a camera with a picture of that size; None if nothing is drawn.
+        view: returns a camera of that size where the Viewpoint is now; None if nothing is drawn.
         film: returns a film for a movie; None if nothing is drawn.
         basic_step_ms: of the simulation.
 
@@ -84,7 +84,7 @@ class Movies:
         self._new_film = film
         self._basic_step_ms = basic_step_ms
         self._film: Film | None = None
-        self._eye: Eye | None = None
+        self._size = (0, 0)
         self._every_ms = 0
         self._elapsed_ms = 0
 
@@ -102,13 +102,14 @@ class Movies:
         if self._film is not None:
             raise UnsimulatedError("a movie is being recorded; stop it first")
         self.failed = True
-        self._eye = self._view(movie.size)
-        if self._eye is None:
+        eye = self._view(movie.size)
+        if eye is None:
             return False
         _require_possible(movie)
         self._every_ms = frame_step_ms(movie.acceleration, self._basic_step_ms)
         frames_s = Fraction(1000 * movie.acceleration, self._every_ms)
-        self._eye.open()
+        eye.open()
+        self._size = movie.size
         try:
             self._film = self._new_film(replace(movie, frames_s=frames_s))
         except OSError as error:
@@ -119,12 +120,16 @@ class Movies:
 
     def stepped(self) -> None:
         """Record the state after a basic step, if it is due."""
-        film, eye = self._film, self._eye
-        if film is None or eye is None:
+        film = self._film
+        if film is None:
             return
         self._elapsed_ms += self._basic_step_ms
-        if self._elapsed_ms % self._every_ms == 0:
-            self._try(lambda: film.add(eye.colors()))
+        if self._elapsed_ms % self._every_ms:
+            return
+        eye = self._view(self._size)  # a client may have moved the Viewpoint
+        if eye is not None:
+            pixels = eye.colors()
+            self._try(lambda: film.add(pixels))
 
     def stop(self) -> None:
         """End the recording; without one, do nothing."""
@@ -136,7 +141,7 @@ class Movies:
             self.failed = True
         else:
             self._try(film.finish)
-        self._film = self._eye = None
+        self._film = None
 
     def _try(self, write: Callable[[], None]) -> None:
         try:
@@ -144,7 +149,7 @@ class Movies:
         except OSError as error:
             log.warning("movie: %s", error.strerror or error)
             self.failed = True
-            self._film = self._eye = None
+            self._film = None
 
 
 def frame_step_ms(acceleration: int, basic_step_ms: int) -> int:

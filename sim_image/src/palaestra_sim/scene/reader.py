@@ -6,8 +6,8 @@ other node that would act in Webots, such as a PROTO or a loose crate, is refuse
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from palaestra_sim.errors import WorldError
@@ -16,14 +16,14 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.joint_reader import fill_door, read_door
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose, LoosePlace
-from palaestra_sim.scene.matter import DENSITY
+from palaestra_sim.scene.matter import DENSITY, volume_m3
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import ELSEWHERE, LeaveOut, Reading
 from palaestra_sim.scene.robot_reader import RobotParts, read_robot
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.scene.surroundings import Surroundings, read_surroundings
+from palaestra_sim.scene.surroundings import Floor, Surroundings, read_surroundings
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 # Visible to people and cameras only, or read elsewhere (WorldInfo).
@@ -48,6 +48,7 @@ DRAWN_ONLY: Final = frozenset(
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 _ONE_AXIS: Final = frozenset(("HingeJoint", "SliderJoint"))
+_LEAST_M3: Final = 1e-9  # of shapes with a mass
 _JOINTS: Final = _ONE_AXIS | frozenset(("BallJoint", "Hinge2Joint"))
 
 
@@ -61,6 +62,7 @@ class Scene:
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         loose: what moves when it is pushed.
+        heavy: Solids with physics that are fixed to another Solid, with their own shapes.
         doors: what swings on joints that are on no robot.
         robots: in the order of the world file.
         top: the frame around everything; None if z of the world points up.
@@ -74,6 +76,7 @@ class Scene:
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
     loose: list[Loose] = field(default_factory=list)
+    heavy: list[tuple[SceneNode, Sequence[Shape]]] = field(default_factory=list)
     doors: list[Link] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
     top: Place | None = None
@@ -101,8 +104,10 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     for node in tree.root.nodes():
         _read(reading, node, reading.top, scene)
     if physics.abilities.forces:
-        floors = (node for node in tree.nodes.values() if node.type_name == "Plane" and node.outline)
-        scene.surroundings = read_surroundings(reading, reading.world_info, next(floors, None))
+        planes = (node for node in tree.nodes.values() if node.type_name == "Plane" and node.outline)
+        scene.surroundings = read_surroundings(reading, reading.world_info, next(planes, None))
+    floors = tuple(Floor(place, local) for place, local in reading.floors)
+    scene.surroundings = replace(scene.surroundings, floors=floors)
     reading.conclude()
     scene.top = reading.top
     scene.left_out = tuple(reading.left_out)
@@ -200,8 +205,34 @@ def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scen
 
 
 def _is_loose(node: SceneNode) -> bool:
+    if _is_fixed(node):
+        return False
     mass_kg = node.numbers("mass") if node.stand_in else None
     return bool(node.nodes("physics")) or (mass_kg is not None and mass_kg > (0.0,))
+
+
+def _is_fixed(node: SceneNode) -> bool:
+    """Return whether a Solid is inside another one without a joint, so that Webots makes them one body.
+
+    If the other one has no physics, both are fixed to the world.
+    """
+    for around in node.ancestors():
+        if around.type_name in _JOINTS:
+            return False
+        if around.type_name in _SOLIDS:
+            return True
+    return False
+
+
+def _densities(reading: Reading, node: SceneNode, shapes: Sequence[Shape]) -> dict[Shape, float]:
+    """Return the densities of the shapes of a Solid in kg/m3, from its mass or its density."""
+    # A stand-in has no physics of its own, but the mass of its PROTO.
+    described = next(iter(node.nodes("physics")), node)
+    mass_kg = reading.number(described, "mass", -1.0)
+    density = reading.number(described, "density", DENSITY)
+    if mass_kg > 0.0:
+        density = mass_kg / max(sum(map(volume_m3, shapes)), _LEAST_M3)
+    return dict.fromkeys(shapes, density if density > 0.0 else DENSITY)
 
 
 def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
@@ -211,18 +242,17 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
     fixed = Scene(physics=scene.physics)
     _read_children(reading, node, place, fixed)
     shapes = [*bounding_shapes(reading, node, place), *fixed.solids]
-    # A stand-in has no physics of its own, but the mass of its PROTO.
-    described = next(iter(node.nodes("physics")), node)
-    mass_kg = reading.number(described, "mass", -1.0)
-    density = reading.number(described, "density", DENSITY)
+    heavy = {shape for _, some in fixed.heavy for shape in some}
+    densities = _densities(reading, node, [shape for shape in shapes if shape not in heavy])
+    for inner, some in fixed.heavy:
+        densities |= _densities(reading, inner, some)
     if shapes and not node.left_out:
         scene.loose.append(
             Loose(
                 node=node,
                 place=place,
                 shapes=tuple(shapes),
-                mass_kg=mass_kg if mass_kg > 0.0 else None,
-                density=density if density > 0.0 else DENSITY,
+                densities=tuple(densities[shape] for shape in shapes),
             )
         )
     scene.loose += fixed.loose
@@ -232,13 +262,15 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
 
 def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
     name = scene.physics.abilities.name
-    if node.nodes("physics"):
+    if node.nodes("physics") and not _is_fixed(node):
         fact = f"a {node.type_name} with physics moves when it is pushed, which {name} does not simulate"
         reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
     if node.type_name == "Track" and node.nodes("device"):
         fact = f"a Track with devices moves what stands on it, which {name} does not simulate"
         reading.lacks(node, fact)
     shapes = list(bounding_shapes(reading, node, place))
+    if node.nodes("physics"):
+        scene.heavy.append((node, shapes))
     if not node.left_out:
         _stand(reading, shapes, scene)
 

@@ -56,6 +56,7 @@ class Reading:
         left_out: the nodes that were left out, each with its place and the reason.
         world_info: the WorldInfo of the world; None if it has none.
         top: the frame around everything; None if z of the world points up.
+        floors: the place and the local frame of each level Plane that looks up.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class Reading:
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
         self.top: Place | None = None
+        self.floors: list[tuple[Place, Pose]] = []
 
     def refuse(self, node: SceneNode, fact: str, remedy: str) -> None:
         """Record a mistake in `node`."""

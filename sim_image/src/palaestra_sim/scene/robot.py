@@ -146,6 +146,8 @@ class Robot:
         for link in self.links:
             if link.joint is not None:
                 link.joint.halt()
+        for motor in self._stray_motors:
+            motor.halt()
 
     def sow(self) -> None:
         """Restart the noise with the seed that is now in customData."""

@@ -58,6 +58,7 @@ def links_among(reading: Reading, parts: Parts) -> tuple[tuple[Link, ...], tuple
         link.matter = _matter_on(link, links, reading, parts)
         if link.joint is not None and link.joint.motor is not None:
             link.joint.motor.forceful = True
+            link.joint.motor.kinematic = False
     return tuple(links), _matter_on(None, links, reading, parts)
 
 

@@ -106,6 +106,9 @@ class _RobotReader:
         self._read_children(node, self._frame)
         wheels = wheels_among(self._driven)
         drive = find_drive([found.wheel() for found in wheels])
+        if node.nodes("physics"):
+            for found in wheels:  # they carry the robot, whose masses are one body
+                found.motor.kinematic = False
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
         links: tuple[Link, ...] = ()
         matter: tuple[Matter, ...] = ()
@@ -243,6 +246,8 @@ class _RobotReader:
         if joint is None:
             return
         joint.motor = self._read_devices_of(node, parameters_of(node), place, joint)
+        if joint.motor is not None:
+            joint.motor.kinematic = not _end_has_physics(node)
         for end in node.nodes("endPoint"):
             if end.type_name == "Slot":
                 self._read_children(end, place)
@@ -353,6 +358,14 @@ class _RobotReader:
 def _moves(place: Place) -> bool:
     """Return whether a motor can move a place on its robot."""
     return any(isinstance(it, JointPlace) and it.joint.motor is not None for it in place.chain())
+
+
+def _end_has_physics(joint: SceneNode) -> bool:
+    """Return whether the Solid at the end of a joint has physics; it may be in a Slot."""
+    return any(
+        _end_has_physics(end) if end.type_name == "Slot" else bool(end.nodes("physics"))
+        for end in joint.nodes("endPoint")
+    )
 
 
 def _where(reading: Reading, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:

@@ -109,9 +109,12 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> I
                 yield from _shapes(reading, inner, place, grown.inside(pose, scale))
         case "Plane":
             # A ceiling is out of the way of everything that stands on the floor.
-            normal = place.ground_pose.after(standing(node, grown.frame)).rotation[8]
+            local = standing(node, grown.frame)
+            normal = place.ground_pose.after(local).rotation[8]
             if abs(normal) < _FLAT:
                 reading.lacks(node, "a Plane that is no floor and no ceiling")
+            elif normal > 0.0 and not any(around.type_name == "Robot" for around in node.ancestors()):
+                reading.floors.append((place, local))
         case "IndexedFaceSet":
             yield from _mesh(reading, node, place, grown)
         case _:

@@ -328,7 +328,9 @@ class Simulation:
 
     def _moved(self, place: Place) -> None:
         """Update the places of the solids, if `place` is part of one of them."""
-        if any(place in shape.place.chain() for shape in self.scene.solids):
+        places = [shape.place for shape in self.scene.solids]
+        places += [floor.place for floor in self.scene.surroundings.floors]
+        if any(place in moving.chain() for moving in places):
             self._solids_moved = True
             self._arrange()
 

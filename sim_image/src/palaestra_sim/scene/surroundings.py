@@ -1,4 +1,4 @@
-"""What holds everywhere in a world, for a physics with forces: gravity, and the frictions of materials."""
+"""What holds everywhere in a world: its floors, and for a physics with forces gravity and frictions."""
 
 from __future__ import annotations
 
@@ -6,12 +6,32 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
 
 DEFAULT: Final = "default"  # the material of a Solid that names none
 _COULOMB: Final = 1.0  # of two materials without ContactProperties
 _ENDLESS: Final = 100.0  # for -1, which is infinite in Webots
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A level Plane of a boundingObject, which has no end in Webots.
+
+    Attributes:
+        place: of its Solid.
+        local: its frame in that place.
+    """
+
+    place: Place
+    local: Pose
+
+    @property
+    def height_m(self) -> float:
+        """Where it is now, in the axes of the ground."""
+        return self.place.ground_pose.after(self.local).position[2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +41,18 @@ class Surroundings:
     Attributes:
         gravity_m_s2: downward.
         frictions: the coefficients of pairs of materials, for those that have ContactProperties.
-        floor: the material of the floor.
+        floor: the material of the floors.
+        floors: of the world; without any, there is one at height 0.
     """
 
     gravity_m_s2: float = 9.81
     frictions: Mapping[frozenset[str], float] = field(default_factory=dict)
     floor: str = DEFAULT
+    floors: tuple[Floor, ...] = ()
+
+    def heights_m(self) -> tuple[float, ...]:
+        """Return where the floors are now."""
+        return tuple(floor.height_m for floor in self.floors) or (0.0,)
 
     def friction(self, one: str, other: str) -> float:
         """Return the coefficient of friction of two materials."""

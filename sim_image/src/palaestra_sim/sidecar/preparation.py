@@ -94,7 +94,12 @@ def described(source: bytes, name: str) -> tuple[RobotName, ...]:
         WorldError: the world is wrong.
     """
     return tuple(
-        RobotName(robot=robot.robot, ros_name=robot.ros_name, supervisor=robot.supervisor)
+        RobotName(
+            robot=robot.robot,
+            ros_name=robot.ros_name,
+            supervisor=robot.supervisor,
+            definition=robot.definition,
+        )
         for robot in robots(source, name)
         if robot.ros_name
     )

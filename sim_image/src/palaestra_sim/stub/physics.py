@@ -40,6 +40,7 @@ class StubPhysics:
 
     def __init__(self) -> None:
         self._moving: list[tuple[Figure, StubBody]] = []
+        self._surroundings = Surroundings()
         self._solids: tuple[Shape, ...] = ()
         self._level: dict[Figure, list[_Level]] = {}
         self._sloped: dict[Figure, list[SlopedBeams]] = {}
@@ -51,7 +52,8 @@ class StubPhysics:
         return StubBody(build.base, outline, rim, build.heights)
 
     def begin(self, surroundings: Surroundings) -> None:
-        """Do nothing: there are no forces."""
+        """Take the floors of the world; there are no forces."""
+        self._surroundings = surroundings
 
     def arrange(
         self,
@@ -71,7 +73,8 @@ class StubPhysics:
             self._face(figure, [body for _, body in others])
             uprights = [_upright(shape) for shape in solids] if self._sloped.get(figure) else ()
             for sloped in self._sloped.get(figure, ()):
-                sloped.face(uprights, [_of_robot(it, body) for it, body in others])
+                others_now = [_of_robot(it, body) for it, body in others]
+                sloped.face(uprights, others_now, self._surroundings.heights_m())
 
     def advance(self, step_s: float) -> None:
         """Move the bodies on by one basic step."""

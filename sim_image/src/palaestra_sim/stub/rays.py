@@ -64,21 +64,25 @@ class Upright(NamedTuple):
 class SlopedBeams:
     """The beams of one robot that climb or fall, cast one by one.
 
-    Besides the obstacles there is a floor, at height 0 of the world.
+    Besides the obstacles there are floors, which have no end.
     """
 
-    __slots__ = ("_beams", "_others", "_solids", "distances")
+    __slots__ = ("_beams", "_floors", "_others", "_solids", "distances")
 
     def __init__(self, beams: Sequence[Beam]) -> None:
         self._beams = tuple(beams)
         self._solids: tuple[Upright, ...] = ()
         self._others: tuple[Upright, ...] = ()
+        self._floors: tuple[float, ...] = ()
         self.distances = [beam.reach_m for beam in beams]
 
-    def face(self, solids: Sequence[Upright], others: Sequence[Upright]) -> None:
-        """Set the obstacles of the beams: standing ones and robots."""
+    def face(
+        self, solids: Sequence[Upright], others: Sequence[Upright], floors_m: Sequence[float] = (0.0,)
+    ) -> None:
+        """Set the obstacles of the beams: standing ones and robots, and the heights of floors."""
         self._solids = tuple(solids)
         self._others = tuple(others)
+        self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
         """Return how far each beam travels in meters; `height_m` is of the robot's frame."""
@@ -90,8 +94,11 @@ class SlopedBeams:
         start = beam.height_m + height_m
         stretch = math.hypot(1.0, beam.slope)  # of the beam, for each meter along the floor
         nearest = beam.reach_m / stretch
-        if beam.slope < 0.0:
-            nearest = min(nearest, max(0.0, start / -beam.slope))
+        if beam.slope:
+            for floor in self._floors:
+                along = (floor - start) / beam.slope
+                if along >= 0.0:
+                    nearest = min(nearest, along)
         for outline, low, high in (*self._solids, *self._others):
             enter, leave = outline.crossing(frame, beam.ray)
             below, above = _between(low - start, high - start, beam.slope)

@@ -21,13 +21,14 @@ class WorldRobot:
     """A robot whose controller is "ros".
 
     `robot` is its Robot.name; `ros_name` is from its `--name=`, None without. `supervisor`: it may read and
-    change the whole scene. `synchronize`: it waits for a client to step.
+    change the whole scene. `synchronize`: it waits for a client to step. `definition` is its DEF name.
     """
 
     robot: str
     ros_name: str | None
     supervisor: bool
     synchronize: bool
+    definition: str = ""
 
 
 def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
@@ -79,4 +80,5 @@ def described(node: Node) -> WorldRobot:
         ros_name=names[-1] if names else None,  # the controller takes the last one
         supervisor=node.flag("supervisor", default=False),
         synchronize=SYNCHRONIZE in arguments,
+        definition=node.def_name or "",
     )

@@ -61,6 +61,8 @@ class JointRobot(SimulatedRobot, Joints):
 
     def command(self, values: Iterable[float]) -> None:
         """Set the command of each motor, within `greatest`, until changed."""
+        for motor in self._motors:
+            motor.prepare()
         calls = [
             (motor.service, {"value": min(max(float(value), -most), most)})
             for motor, value, most in zip(self._motors, values, self.greatest, strict=True)

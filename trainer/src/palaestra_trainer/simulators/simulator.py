@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
 
+from palaestra_protocol.control import RobotName
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
 from palaestra_trainer.launching.sidecar import Sidecar
@@ -23,6 +24,17 @@ from palaestra_trainer.webots.offers import withdraw
 _POLL_S = 0.1
 
 MakeEnvironment = Callable[[RobotAbc, Scene], gymnasium.Env[Any, Any]]
+
+
+def driven_robot(robots: Sequence[RobotName], definition: str) -> RobotName | None:
+    """Return the robot of a world that a class with this DEF name drives.
+
+    It is the first robot with that name. If none has it, it is the first one that is no supervisor; None if
+    all are supervisors.
+    """
+    of_class = (each for each in robots if definition and each.definition == definition)
+    others = (each for each in robots if not each.supervisor)
+    return next(of_class, None) or next(others, None)
 
 
 class Simulator:
@@ -59,7 +71,7 @@ class Simulator:
         supervisor = next((each for each in state.robots if each.supervisor), None)
         if supervisor is None:
             raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; set it on one")
-        driven = next((each for each in state.robots if not each.supervisor), supervisor)
+        driven = driven_robot(state.robots, robot.definition) or supervisor
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )

@@ -25,7 +25,7 @@ class Lever:
         service: sets the command.
     """
 
-    __slots__ = ("_position", "_services", "device", "robot", "service")
+    __slots__ = ("_position", "_ready", "_services", "device", "robot", "service")
 
     def __init__(self, robot: str, device: str, command: Command) -> None:
         self._services = Services(robot)
@@ -34,6 +34,7 @@ class Lever:
         self.device = device
         self.service = self._services.get(f"{name}/set_{command}", "set_float")
         self._position = self._services.get(f"{name}/set_position", "set_float")
+        self._ready = False
 
     def set(self, value: float) -> None:
         """Set the command from the next step on.
@@ -41,18 +42,28 @@ class Lever:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
+        self.prepare()
         self.service(value=value)
 
-    def release(self) -> None:
-        """Set the command to 0, as needed at the start and after every reset.
+    def prepare(self) -> None:
+        """Let the motor take commands of `service`, before the first one after a reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        if self.service.name.endswith("set_velocity"):
+        if not self._ready and self.service.name.endswith("set_velocity"):
             self._position(value=math.inf)
-        self.set(0.0)
+        self._ready = True
+
+    def release(self) -> None:
+        """Keep what the simulator's reset has set, until the next command.
+
+        A world gives its motors a state of its own: the position in the file, or the control of a keyframe,
+        which holds a robot up. A command of 0 would replace it.
+        """
+        self._ready = False
 
     def close(self) -> None:
         """Close the connections."""
+        self._ready = False
         self._services.close()

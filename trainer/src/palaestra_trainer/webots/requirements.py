@@ -32,7 +32,8 @@ def require_devices(robot: str, wanted: Iterable[str]) -> None:
         raise WorldMisfit(
             robot,
             f"the robot has no device {', '.join(missing)}; it has {has}."
-            " Use a world with the robot that the environment drives",
+            " Use a world with the robot that the environment drives; in a world with several robots, set"
+            " `definition` in the class of trainer.robot to the DEF name of its robot",
         )
 
 

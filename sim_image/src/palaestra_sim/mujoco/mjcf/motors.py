@@ -44,6 +44,7 @@ class Actuator:
         control: what its control is.
         scale: its control for a position, velocity or force of 1 at the joint.
         length: returns the position of its joint or tendon, in rad or m; None if it has none.
+        read: returns its control.
         write: sets its control.
         force: returns the force or torque at the joint, in N or N m.
     """
@@ -51,6 +52,7 @@ class Actuator:
     control: Control
     scale: float
     length: Callable[[], float] | None
+    read: Callable[[], float]
     write: Callable[[float], None]
     force: Callable[[], float]
 
@@ -66,9 +68,13 @@ class ActuatorMotor(Motor):
         self.forceful = True  # MuJoCo moves everything by forces
 
     def reset(self) -> None:
-        """Return to the state of a new world, without a command."""
+        """Return to the state of a new world, without a command; the model has returned to its start."""
         super().reset()
         self._commanded = False
+        if self._actuator.length is not None:
+            self.angle_rad = self.target_rad = self.asked_rad = self._actuator.length()
+        if self._actuator.control is Control.POSITION:
+            self.target_rad = self.asked_rad = self._actuator.read() / self._actuator.scale
         self._aim: float | None = None  # where a servo for a position is to be now
 
     def put(self, angle_rad: float) -> None:
@@ -114,6 +120,16 @@ class ActuatorMotor(Motor):
         """
         del torque_nm
         raise UnsimulatedError(f"{self._what()}, whose force the model limits; write forcerange there")
+
+    def set_control_pid(self, p: float, i: float, d: float) -> None:
+        """Set the gains with which a servo for a velocity turns to a target; see `Motor`.
+
+        Raises:
+            UnsimulatedError: the model has the gains.
+        """
+        if self._actuator.control is not Control.VELOCITY and (p, i, d) != self.spec.gains:
+            raise UnsimulatedError(f"{self._what()}, whose gains the model has; write kp and kv there")
+        super().set_control_pid(p, i, d)
 
     def feel(self) -> None:
         """Take position and force of this moment."""

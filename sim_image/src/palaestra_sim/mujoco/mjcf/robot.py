@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -77,6 +77,7 @@ class _Fitter:
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
+        self._model.settle()  # motors read the lengths of tendons
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):
@@ -105,6 +106,7 @@ class _Fitter:
             control=control[0],
             scale=control[1],
             length=motors.length_of(self._model, index),
+            read=self._reader(index),
             write=self._writer(index),
             force=motors.force_of(self._model, index),
         )
@@ -187,7 +189,11 @@ class _Fitter:
         axis = (1.0, 0.0, 0.0)  # MuJoCo moves it
         return self._shafts.setdefault(joint, Shaft(joint=Joint(axis=axis, slides=bool(slides))))
 
-    def _writer(self, index: int) -> Any:
+    def _reader(self, index: int) -> Callable[[], float]:
+        controls = self._model.data.ctrl
+        return lambda: float(controls[index])
+
+    def _writer(self, index: int) -> Callable[[float], None]:
         controls = self._model.data.ctrl
 
         def write(value: float) -> None:

@@ -209,5 +209,6 @@ class MjcfSimulation:
         self._reset_asked = False
         self.time_ms = 0
         self._model.reset()
+        self._model.settle()  # motors read the lengths of tendons
         for motor in self._equipment.motors:
             motor.reset()

@@ -35,13 +35,19 @@ def _reader(limit: str) -> Callable[[Part], Motor]:
                 min_rad=number("minPosition", 0.0),
                 max_rad=number("maxPosition", 0.0),
                 max_torque_nm=number(limit, 10.0),
-                multiplier=number("multiplier", 1.0),
+                multiplier=number("multiplier", 1.0) or 1.0,  # Webots takes 1 for 0
+                gains=_gains(part),
                 model=part.text("model"),
                 forces=part.forces,
             )
         )
 
     return read
+
+
+def _gains(part: Part) -> tuple[float, float, float]:
+    p, i, d = part.reading.vector(part.node, "controlPID", (10.0, 0.0, 0.0))
+    return p, i, d
 
 
 def _services(effort: str, type_number: int) -> Callable[[Motor], tuple[Row, ...]]:
@@ -67,8 +73,12 @@ def _commands(motor: Motor, effort: str) -> tuple[Row, ...]:
             "set_float",
             _setter(motor.set_effort) if motor.forceful else _unable(motor, effort),
         ),
-        (f"set_available_{effort}", "set_float", _setter(motor.set_available_torque)),
-        ("set_control_pid", "motor_set_control_pid", lambda _: {"success": 1}),
+        (
+            f"set_available_{effort}",
+            "set_float",
+            _setter(motor.set_available_torque) if _has_effort(motor) else _switch(motor, effort),
+        ),
+        ("set_control_pid", "motor_set_control_pid", _gains_setter(motor)),
         *(() if motor.forceful else _no_feedback(effort)),
     )
 
@@ -109,10 +119,10 @@ def _topics(effort: str) -> Callable[[Motor], tuple[Topic, ...]]:
 def _answers(motor: Motor, effort: str) -> tuple[Row, ...]:
     spec = motor.spec
     return (
-        ("get_target_position", "get_float", lambda _: {"value": motor.target_rad}),
+        ("get_target_position", "get_float", lambda _: {"value": motor.asked_rad}),
         ("get_min_position", "get_float", lambda _: {"value": spec.min_rad}),
         ("get_max_position", "get_float", lambda _: {"value": spec.max_rad}),
-        ("get_velocity", "get_float", lambda _: {"value": motor.velocity_rad_s}),
+        ("get_velocity", "get_float", lambda _: {"value": motor.asked_velocity_rad_s}),
         ("get_max_velocity", "get_float", lambda _: {"value": spec.max_velocity_rad_s}),
         ("get_acceleration", "get_float", lambda _: {"value": motor.acceleration_rad_s2}),
         ("get_multiplier", "get_float", lambda _: {"value": spec.multiplier}),
@@ -126,6 +136,34 @@ def _setter(command: Callable[[float], None]) -> Handler:
 
     def handle(request: Any) -> dict[str, Any]:
         command(request.value)
+        return done
+
+    return handle
+
+
+def _gains_setter(motor: Motor) -> Handler:
+    def handle(request: Any) -> dict[str, Any]:
+        motor.set_control_pid(request.controlp, request.controli, request.controld)
+        return {"success": 1}
+
+    return handle
+
+
+def _has_effort(motor: Motor) -> bool:
+    """Return whether the torque or force of a motor changes how it moves."""
+    return motor.forceful or motor.kinematic
+
+
+def _switch(motor: Motor, effort: str) -> Handler:
+    """Return the service of a motor that moves with all of its torque or with none of it."""
+    done = {"success": True}
+    most = motor.spec.max_torque_nm
+
+    def handle(request: Any) -> dict[str, Any]:
+        if 0.0 < request.value < most:
+            fact = f"a part of the {effort} of {motor.name!r} is not simulated"
+            raise UnsimulatedError(f"{fact}; set 0, or the whole {effort} of {most:g}")
+        motor.set_available_torque(request.value)
         return done
 
     return handle
