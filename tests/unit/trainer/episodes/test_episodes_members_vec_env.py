@@ -1,4 +1,4 @@
-"""The interface of a Stable-Baselines3 vector, beside the library's own vector of the same environments."""
+"""The interface of a Stable-Baselines3 vector, beside the library's own vectors of the same environments."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from gymnasium import spaces
 from gymnasium.vector import SyncVectorEnv
 from gymnasium.wrappers import TimeLimit
-from stable_baselines3.common.vec_env import DummyVecEnv
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
@@ -86,11 +86,22 @@ CALLS = {
 }
 
 
+@pytest.fixture(scope="module", params=["in this process", "in processes"])
+def reference(request):
+    """A vector of Stable-Baselines3."""
+    if request.param == "in this process":
+        env = DummyVecEnv([wrapped] * MEMBERS)
+    else:
+        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # another would import PyTorch thrice
+    yield env
+    env.close()
+
+
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
-def test_a_vector_answers_as_that_of_stable_baselines3(keepers, make, call):
-    """Callbacks of others are written for it."""
-    assert call(make(keepers())) == call(DummyVecEnv([wrapped] * MEMBERS))
+def test_a_vector_answers_as_those_of_stable_baselines3(keepers, make, call, reference):
+    """Callbacks of others are written for them."""
+    assert call(make(keepers())) == call(reference)
 
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array"])
