@@ -1,7 +1,8 @@
 """Masks of actions, which an environment returns by its method `action_masks`, as sb3-contrib calls it.
 
-A mask has one truth value for each choice: of a Discrete for each action, of a MultiDiscrete for each value
-of its first number, then of its second, and so on, of a MultiBinary for 0 and 1 of each of its numbers.
+A mask has one truth value for each choice. Of a Discrete, each action is a choice. Of a MultiDiscrete, the
+values of its first number come first, then those of its second, and so on. Of a MultiBinary, each number has
+two choices: 0, then 1.
 """
 
 from __future__ import annotations
