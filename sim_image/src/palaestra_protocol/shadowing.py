@@ -1,7 +1,7 @@
 """A user's modules, and the modules of Python and of Palaestra's dependencies that they shadow.
 
 PYTHONPATH and the folder of a script come before the standard library. All libraries then import a `queue.py`
-in them in place of Python's own, and fails with a traceback that does not name the file.
+in them in place of Python's own, and fail with a traceback that does not name the file.
 
 Programs that run no code of the user import from such folders last. Other programs are refused, as the user's
 code may need its own `queue` and the libraries need Python's.
