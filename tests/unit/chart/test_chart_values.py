@@ -109,7 +109,7 @@ def _definition(schema: dict[str, Any]) -> dict[str, Any]:
 
 def test_the_schema_knows_every_value_and_no_other():
     """A value that only one of them has is a mistake in either."""
-    assert properties(SCHEMA) == {value.path for value in VALUES} | {"global"}
+    assert properties(SCHEMA) == {value.path for value in VALUES} | {"enabled", "global"}
 
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: value.path)
@@ -124,3 +124,25 @@ def test_helm_finds_nothing_wrong(mode):
     values = yaml.safe_dump(MODES[mode])
 
     assert "0 chart(s) failed" in helm("lint", str(CHART), "--strict", "--values=-", sent=values)
+
+
+PARENT = """\
+apiVersion: v2
+name: platform
+version: 1.0.0
+dependencies:
+  - {name: palaestra, version: ">=0", condition: palaestra.enabled}
+"""
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_a_parent_chart_switches_the_chart_on_and_off(tmp_path, enabled):
+    """Helm's condition is a value of the chart itself, which the schema refused."""
+    (tmp_path / "charts").mkdir()
+    (tmp_path / "charts" / "palaestra").symlink_to(CHART)
+    (tmp_path / "Chart.yaml").write_text(PARENT)
+    (tmp_path / "values.yaml").write_text(yaml.safe_dump({"palaestra": {"enabled": enabled}}))
+
+    shown = helm("template", "platform", str(tmp_path))
+
+    assert bool(shown.strip()) is enabled

@@ -8,7 +8,9 @@ import json
 import os
 import pickle
 import shutil
+import stat
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -437,6 +439,44 @@ def test_another_failure_to_write_is_not_hidden(trained, monkeypatch):
 
     with pytest.raises(OSError, match="Read-only"):
         model.save()
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP])
+def test_a_file_system_without_fsync_of_folders_keeps_checkpoints(trained, monkeypatch, number):
+    """gcsfuse, s3fs, SMB and some NFS have none; files are waited for all the same."""
+    sync, synced = os.fsync, []
+
+    def fsync(descriptor):
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(number, os.strerror(number))
+        synced.append(descriptor)
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    model = trained()
+
+    model.save()
+
+    assert checkpoint.newest(model.folder).manifest.step == 40
+    assert synced
+
+
+@pytest.mark.parametrize("number", [errno.EPERM, errno.ENOTSUP])
+def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained, monkeypatch, number):
+    """As object stores are; a traceback at the first checkpoint was tried again and again."""
+    rename = Path.rename
+
+    def refuse(path, target):
+        if path.is_dir():
+            raise OSError(number, os.strerror(number))
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", refuse)
+    model = trained()
+
+    with pytest.raises(ConfigurationError, match=r"its file system renames no folders .* use another volume"):
+        model.save()
+    assert list(model.folder.iterdir()) == []
 
 
 def test_a_draft_is_never_taken_for_a_checkpoint(trained):

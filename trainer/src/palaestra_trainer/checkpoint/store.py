@@ -22,6 +22,7 @@ from palaestra_trainer.run_directory import sync
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
+_NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})  # as of object stores
 _NUMBER = re.compile(r"[0-9]{1,18}")
 
 
@@ -46,6 +47,7 @@ class Saver:
         were there as they were.
 
         Raises:
+            ConfigurationError: the file system has no way to put it in place as a whole.
             OSError: it cannot be written for another reason than a full disk.
         """
         state.put_back(model)
@@ -56,9 +58,9 @@ class Saver:
             draft.mkdir()
             complete = self._write(draft, model, state, described)
             target = _put_in_place(draft)
-        except OSError as error:
+        except (OSError, ConfigurationError) as error:
             shutil.rmtree(draft, ignore_errors=True)
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            if not isinstance(error, OSError) or error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
             log.error("checkpoint not written: disk full", step=described.step, folder=str(self._folder))
             return False
@@ -162,9 +164,17 @@ def _put_in_place(draft: Path) -> Path:
     """Give a finished draft its name; an older one of the same step is there until then."""
     name = draft.name.removeprefix(".").removesuffix(".draft")
     target, replaced = draft.with_name(name), draft.with_name(f".{name}.replaced")
-    if target.exists():
-        target.rename(replaced)
-    draft.rename(target)
+    try:
+        if target.exists():
+            target.rename(replaced)
+        draft.rename(target)
+    except OSError as error:
+        if error.errno not in _NO_RENAME:
+            raise
+        raise ConfigurationError(
+            f"{draft.parent}: its file system renames no folders ({error.strerror}), so no checkpoint is "
+            "ever whole there; use another volume, such as one of a block device or NFS"
+        ) from error
     sync(draft.parent)
     shutil.rmtree(replaced, ignore_errors=True)
     return target
