@@ -11,7 +11,7 @@ from tests.contract.prose import files, findings
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ("operator/src", "sim_image/src", "trainer/src")
-PAGES = ("docs", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "charts")
+PAGES = ("docs", "README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "charts")
 
 
 @pytest.mark.parametrize("place", [*SOURCES, *PAGES])
