@@ -34,17 +34,19 @@ NODE = b"A{a 0}"  # of all nodes, those that cost most memory for each byte
 
 def measure(scale=1.0):
     """Return how long another tenant's jobs take to be planned, alone and beside hostile ones, and memory."""
-    count = scaled(HOSTILE, scale)
+    count, others = scaled(HOSTILE, scale), scaled(OTHERS, scale)
     with tempfile.TemporaryDirectory(prefix="palaestra-hostile-") as name, running(Path(name)) as plane:
         api = _installed(plane)
         with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
-            alone = {size: _seconds_to_plan(api, "alone", size) for size in (5_000, LARGE_BYTES)}
+            alone = {size: _seconds_to_plan(api, "alone", size, others) for size in (5_000, LARGE_BYTES)}
             idle_mib = _rss_mib(running_operator.process.pid)
             with _Watching(running_operator) as watched, ThreadPoolExecutor(8) as pool:
                 began = time.monotonic()
                 list(pool.map(lambda number: _create_hostile(api, number), range(count)))
                 applied_s = time.monotonic() - began
-                beside = {size: _seconds_to_plan(api, "beside", size) for size in (5_000, LARGE_BYTES)}
+                beside = {
+                    size: _seconds_to_plan(api, "beside", size, others) for size in (5_000, LARGE_BYTES)
+                }
                 wait_for(lambda: _planned(api) == count, DEADLINE_S, lambda: _planned(api))
                 all_s = time.monotonic() - began
         api.close()
@@ -122,10 +124,10 @@ def _read(path):
         return ""
 
 
-def _seconds_to_plan(api, namespace, size):
+def _seconds_to_plan(api, namespace, size, times):
     """Return the longest of several times from the creation of a job to its batch/v1 Job."""
     longest = 0.0
-    for number in range(OTHERS):
+    for number in range(times):
         name = f"job-{size}-{number}"
         began = time.monotonic()
         _create(api, namespace, name, with_world(size, number))

@@ -11,11 +11,13 @@ import sys
 
 import pytest
 
+from tests.bench import hostile
 from tests.bench.__main__ import PARTS
 from tests.local_run import ROOT
 from tests.soak import chaos
 
 SMALL = ("newcomer", "parallel", "planning", "simulators", "stepping")
+OF_A_CLUSTER = ("hostile",)
 OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")  # of each example in MEASURED
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
 DEADLINE_S = 800  # of a minute or two, on a busy machine
@@ -29,7 +31,7 @@ def numbers(found):
 
 def test_every_part_is_run_by_a_test():
     """A new one must come with its test."""
-    assert PARTS.keys() == {*SMALL, *OF_WHOLE_RUNS, *ELSEWHERE}
+    assert PARTS.keys() == {*SMALL, *OF_A_CLUSTER, *OF_WHOLE_RUNS, *ELSEWHERE}
 
 
 @pytest.mark.minutes(1)
@@ -51,6 +53,17 @@ def test_the_benchmark_measures(parts, tmp_path):
         found = list(numbers(line))
         assert len(found) > len(("scale", "seconds"))
         assert all(isinstance(number, int | float) for number in found)
+
+
+@pytest.mark.minutes(1)
+@pytest.mark.timeout(900)
+def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
+    """With one job of each, on a control plane of its own, whose operator has the rights of an installation."""
+    found = hostile.measure(0.0)
+
+    assert found["hostile_jobs"] == 1
+    assert found["rss_mib_at_most"] >= found["rss_mib_before"] > 0
+    assert all(isinstance(number, int | float) for number in numbers(found))
 
 
 @pytest.mark.minutes(1)
