@@ -58,7 +58,7 @@ def test_the_benchmark_measures(parts, tmp_path):
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
 def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
-    """With one job of each, on a control plane of its own, whose operator has the rights of an installation."""
+    """With one job of each, on a control plane of its own; the operator has the rights of an installation."""
     found = hostile.measure(0.0)
 
     assert found["hostile_jobs"] == 1
