@@ -77,7 +77,7 @@ def fetch(
 
 
 def _usual_bytes(job: TrainingJob) -> int:
-    """Return the bound for the files of a run; nobody asked for the size of a claim that existed before."""
+    """Return the bound for the files of a run; the job does not state the size of an existing claim."""
     storage = job.spec.storage
     return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 

@@ -25,7 +25,7 @@ EXEC, PROVIDER = "exec", "auth-provider"
 def authorization(
     user: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any], context: ssl.SSLContext
 ) -> Authorization:
-    """Return what gives the header `Authorization` of a user, other than one of an auth-provider.
+    """Return a source of the header `Authorization` for a user, other than one of an auth-provider.
 
     Args:
         user: of a kubeconfig.
@@ -90,7 +90,7 @@ class _OfPlugin:
 
 def _of_file(file: Path) -> Authorization:
     if not text_of(file):
-        raise NotConfigured(f"{TOKEN_FILE}: {file} is missing or empty; log in anew, or name another file")
+        raise NotConfigured(f"{TOKEN_FILE}: {file} is missing or empty; log in again, or name another file")
     return Token(file, time.monotonic)
 
 

@@ -18,7 +18,7 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
     """Return the headers of a kubeconfig's user; none if it acts for itself.
 
     Raises:
-        NotConfigured: a value has another type, or nobody is named in `as`.
+        NotConfigured: a value has another type, or `as` names no user.
     """
     groups, extra = user.get(GROUPS) or [], user.get(EXTRA) or {}
     if not isinstance(groups, list):
