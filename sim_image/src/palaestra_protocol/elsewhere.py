@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-_BUFFER = "a run has buffers of its own, which keep rows of broken simulators out of every loss; leave it out"
+_MEMORY = "a run stores next observations, as with false, because rows of all simulators lie in one line"
 _VECTOR = "a run makes the vector environment itself; write wrappers of one as trainer.environment.wrappers"
 _EVALUATION = "write trainer.evaluation"
 _COUNT = "write the count of a group of spec.simulators with role Collect"
@@ -43,11 +43,9 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "normalize": _NORMALIZE,
         "num_envs": _COUNT,
         "num_timesteps": _STEPS,
-        "optimize_memory_usage": _BUFFER,
+        "optimize_memory_usage": f"{_MEMORY}; leave it out",
         "policy": "write trainer.algorithm.policy",
         "progress_bar": "palaestra run and palaestra watch show the progress; leave it out",
-        "rollout_buffer_class": _BUFFER,
-        "rollout_buffer_kwargs": _BUFFER,
         "save_freq": "write trainer.checkpoint.everySteps",
         "seed": "write spec.seed",
         "tensorboard_log": "every run directory has a folder tensorboard; leave it out",

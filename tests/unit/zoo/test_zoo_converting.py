@@ -181,7 +181,6 @@ NOTED = [
     ("callback: stable_baselines3.common.callbacks.EvalCallback", "set trainer.evaluation"),
     ("callback: rl_zoo3.callbacks.ParallelTrainCallback", "it needs Zoo's own training"),
     ("monitor_kwargs: \"dict(info_keywords=('is_success',))\"", "monitor_kwargs: left out; a run records"),
-    ("replay_buffer_class: a.Own", "replay_buffer_class: left out; a.Own has no place for rows of broken"),
     ('replay_buffer_kwargs: "dict(handle_timeout_termination=True)"', "a run does the same as with True"),
     ('replay_buffer_kwargs: "dict(handle_timeout_termination=False)"', "left out; a run does as with True"),
     (
@@ -240,6 +239,22 @@ def test_hindsight_is_written_as_in_a_job(converted):
     assert now.algorithm.hyperparameters == before.algorithm.hyperparameters == buffer
     assert before.algorithm.name == "TQC"
     assert notes == []
+
+
+@pytest.mark.parametrize(("kind", "algorithm"), [("replay", "DQN"), ("rollout", "PPO")])
+def test_a_buffer_of_ones_own_is_named_as_in_a_job(converted, kind, algorithm):
+    """With its own options; what a run does anyway is left out."""
+    trainer, notes = converted(
+        f"{kind}_buffer_class: my.lab.Own",
+        f'{kind}_buffer_kwargs: "dict(alpha=0.5, handle_timeout_termination=True)"',
+        algorithm=algorithm,
+    )
+
+    assert trainer.algorithm.hyperparameters == {
+        f"{kind}_buffer_class": "my.lab:Own",
+        f"{kind}_buffer_kwargs": {"alpha": 0.5},
+    }
+    assert len(notes) == 1
 
 
 @pytest.mark.parametrize("word", ["frame_stack: 4", "vec_env_wrapper: [{sb3.VecFrameStack: {n_stack: 4}}]"])

@@ -125,25 +125,40 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
         draft.hyperparameters["policy_kwargs"] = arguments
 
 
-def _buffer_class(draft: Draft, value: Any) -> None:
-    if value is None:
-        return
-    if str(value).rpartition(".")[2] == _HINDSIGHT:
-        draft.hyperparameters["replay_buffer_class"] = _HINDSIGHT
-    else:
-        draft.note(
-            "replay_buffer_class",
-            f"left out; {value} has no place for rows of broken simulators, and only {_HINDSIGHT} is usable",
-        )
+def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
+    """Return the place of the class of a buffer: `kind` is replay or rollout."""
+
+    def place(draft: Draft, value: Any) -> None:
+        if value is not None:
+            name = _HINDSIGHT if _is_hindsight(value) else _as_class(str(value))
+            draft.hyperparameters[f"{kind}_buffer_class"] = name
+
+    return place
 
 
-def _buffer_arguments(draft: Draft, value: Any) -> None:
-    hindsight = str(draft.entry.get("replay_buffer_class")).rpartition(".")[2] == _HINDSIGHT
-    for name, option in _options(draft, "replay_buffer_kwargs", value):
-        if name in _GOALS and hindsight:
-            draft.hyperparameters.setdefault("replay_buffer_kwargs", {})[name] = option
-        else:
-            _buffer_option(draft, f"replay_buffer_kwargs.{name}", option)
+def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
+    """Return the place of the options of a buffer; those of Stable-Baselines3's own classes are a run's."""
+
+    def place(draft: Draft, value: Any) -> None:
+        chosen = draft.entry.get(f"{kind}_buffer_class")
+        for name, option in _options(draft, f"{kind}_buffer_kwargs", value):
+            if _takes(chosen, name):
+                draft.hyperparameters.setdefault(f"{kind}_buffer_kwargs", {})[name] = option
+            else:
+                _buffer_option(draft, f"{kind}_buffer_kwargs.{name}", option)
+
+    return place
+
+
+def _takes(buffer: Any, option: str) -> bool:
+    """Return whether a buffer of an entry has an option of its own; an author's may have any."""
+    if buffer is None:
+        return False
+    return option in _GOALS if _is_hindsight(buffer) else option not in _BUFFER_OPTIONS
+
+
+def _is_hindsight(buffer: Any) -> bool:
+    return str(buffer).rpartition(".")[2] == _HINDSIGHT
 
 
 def _buffer_option(draft: Draft, word: str, option: Any) -> None:
@@ -326,8 +341,10 @@ _PLACES: Mapping[str, Callable[[Draft, Any], None]] = {
     "optimize_memory_usage": _memory,
     "policy": _policy,
     "policy_kwargs": _policy_arguments,
-    "replay_buffer_class": _buffer_class,
-    "replay_buffer_kwargs": _buffer_arguments,
+    "replay_buffer_class": _buffer_class("replay"),
+    "replay_buffer_kwargs": _buffer_arguments("replay"),
+    "rollout_buffer_class": _buffer_class("rollout"),
+    "rollout_buffer_kwargs": _buffer_arguments("rollout"),
     "seed": _seed,
     "vec_env_wrapper": _vector_wrappers,
 }

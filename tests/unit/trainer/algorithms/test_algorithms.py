@@ -12,7 +12,7 @@ from stable_baselines3.common.utils import explained_variance
 from torch import nn, optim
 
 from palaestra_protocol.elsewhere import ELSEWHERE, OF_ZOO
-from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, check, make_model
+from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, buffer_options, check, make_model
 from palaestra_trainer.algorithms.entries import OURS
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
@@ -435,7 +435,12 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
             "noise_type",
             "DQN has no such hyperparameter, unlike SAC, TD3, DDPG, TQC, CrossQ; leave",
         ),
-        ("PPO", "rollout_buffer_class", "is no hyperparameter here; a run has buffers of its own"),
+        (
+            "DQN",
+            "optimize_memory_usage",
+            "is no hyperparameter here; a run stores next observations, as with",
+        ),
+        ("REINFORCE", "rollout_buffer_class", "REINFORCE has no such hyperparameter, unlike PPO, A2C, TRPO"),
         ("PPO", "log_std_init", "is an argument of the policy; write it in policy_kwargs.log_std_init"),
         ("PPO", "lr", "PPO has no such hyperparameter; write learning_rate"),
         ("A2C", "cliprange", "A2C has no such hyperparameter; use one of"),
@@ -468,9 +473,7 @@ def test_layers_that_policy_and_value_shared_have_their_form_of_today():
 
 def test_each_argument_that_a_run_gives_itself_has_its_place():
     """Whatever a person copies from a call of Stable-Baselines3, the answer says where it goes."""
-    hindsight = {"replay_buffer_class", "replay_buffer_kwargs"}  # hyperparameters where there is a buffer
-
-    assert OURS - {"self"} - hindsight <= ELSEWHERE.keys()
+    assert OURS - {"self"} - {*buffer_options.NAMES} <= ELSEWHERE.keys()
 
 
 def test_no_word_with_a_place_elsewhere_is_a_hyperparameter():

@@ -106,7 +106,7 @@ def test_what_is_not_refused_learns(algorithm):
         ("RecurrentPPO", {"batch_size": 1}, "batch_size: 1 is refused; give a number of at least 2"),
         ("MaskablePPO", {"batch_size": 1}, "batch_size: 1 is refused; give a number of at least 2"),
         ("TQC", {"top_quantiles_to_drop_per_net": 25}, "25 of 25 quantiles of each critic leaves none"),
-        ("DQN", {"replay_buffer_class": ["HerReplayBuffer"]}, "use HerReplayBuffer, or leave it out"),
+        ("DQN", {"replay_buffer_class": ["HerReplayBuffer"]}, "write HerReplayBuffer or module:Class"),
     ],
 )
 def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):

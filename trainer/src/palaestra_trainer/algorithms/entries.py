@@ -23,15 +23,15 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from palaestra_protocol.elsewhere import NO_ALGORITHM
 from palaestra_trainer import own
-from palaestra_trainer.algorithms import her, noise
+from palaestra_trainer.algorithms import buffer_options, noise
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import with_valid_rows
 from palaestra_trainer.algorithms.signatures import parameters
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 
-# Arguments of the classes that the training loop itself gives, or that valid-row buffers
-# cannot honour: they store rows of several members in one line.
+# Arguments of the classes that the training loop itself gives, that are checked with others, or that
+# valid-row buffers cannot honour: they store rows of several members in one line.
 OURS = frozenset(
     {
         "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
@@ -76,13 +76,19 @@ class Entry:
         return issubclass(self.original, OffPolicyAlgorithm)
 
     @property
+    def takes_rollout_buffers(self) -> bool:
+        """Whether it takes the class of its rollout buffer."""
+        return buffer_options.ROLLOUT.chooser in parameters(self.original)
+
+    @property
     def known(self) -> list[str]:
         """The names of its hyperparameters."""
         names = [name for name in parameters(self.original) if name not in OURS]
         return [
             *names,
             *(noise.NAMES if self.takes_noise else ()),
-            *(her.NAMES if self.replays else ()),
+            *(buffer_options.REPLAY.names if self.replays else ()),
+            *(buffer_options.ROLLOUT.names if self.takes_rollout_buffers else ()),
         ]
 
     @property
@@ -92,7 +98,7 @@ class Entry:
         return {
             name: known[name].default
             for name in self.known
-            if name in known and name not in her.NAMES and _is_plain(known[name])
+            if name in known and name not in buffer_options.NAMES and _is_plain(known[name])
         }
 
 

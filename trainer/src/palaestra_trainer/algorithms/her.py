@@ -29,7 +29,6 @@ from palaestra_trainer.infos import is_valid
 log = structlog.get_logger(__name__)
 
 NAME = "HerReplayBuffer"
-NAMES = ("replay_buffer_class", "replay_buffer_kwargs")
 STRATEGIES = ("future", "final", "episode")
 OPTIONS = ("n_sampled_goal", "goal_selection_strategy")
 GOALS = ("achieved_goal", "desired_goal")
@@ -38,31 +37,18 @@ _EPISODES = ("ep_start", "ep_length")
 
 def wanted(algorithm: Algorithm) -> bool:
     """Return whether a job chooses hindsight experience replay."""
-    return algorithm.hyperparameters.get("replay_buffer_class") is not None
+    return algorithm.hyperparameters.get("replay_buffer_class") == NAME
 
 
-def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrong one of the two hyperparameters."""
-    chosen, options = given.get(NAMES[0]), given.get(NAMES[1])
-    if chosen not in (None, NAME):
-        yield (
-            f"{field}.{NAMES[0]}: {chosen!r} is refused, because another buffer would store rows of broken "
-            f"simulators, and no checkpoint could keep it; use {NAME}, or leave it out"
-        )
-    if options is None:
-        return
-    if chosen is None:
-        yield f"{field}.{NAMES[1]}: has no effect without replay_buffer_class: {NAME}; set it, or remove both"
-    if not isinstance(options, dict):
-        yield f"{field}.{NAMES[1]}: {options!r} is refused; give a mapping"
-        return
+def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
+    """Yield field, fact and remedy of each wrong option of the buffer."""
     for name, value in options.items():
         if name not in OPTIONS:
-            yield f"{field}.{NAMES[1]}.{name}: is not an option here; {nearest(str(name), list(OPTIONS))}"
+            yield f"{field}.{name}: is not an option here; {nearest(str(name), list(OPTIONS))}"
         elif name == OPTIONS[0] and not _is_count(value):
-            yield f"{field}.{NAMES[1]}.{name}: {value!r} is refused; give a whole number above 0"
+            yield f"{field}.{name}: {value!r} is refused; give a whole number above 0"
         elif name == OPTIONS[1] and value not in STRATEGIES:
-            yield f"{field}.{NAMES[1]}.{name}: {value!r} is refused; use {', '.join(STRATEGIES)}"
+            yield f"{field}.{name}: {value!r} is refused; use {', '.join(STRATEGIES)}"
 
 
 def refuse_other_observations(observation: spaces.Space[Any]) -> None:
@@ -82,13 +68,6 @@ def refuse_other_observations(observation: spaces.Space[Any]) -> None:
             f"environment.id: its achieved_goal has the shape {parts[GOALS[0]].shape} and its desired_goal "
             f"{parts[GOALS[1]].shape}; give both the same"
         )
-
-
-def arguments(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the algorithm's class for these hyperparameters."""
-    if given.get(NAMES[0]) is None:
-        return {}
-    return {NAMES[0]: ValidHerReplayBuffer, NAMES[1]: dict(given.get(NAMES[1]) or {})}
 
 
 class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):

@@ -26,6 +26,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.type_aliases import RolloutReturn, TrainFreq, TrainFrequencyUnit
 from stable_baselines3.common.utils import explained_variance
 
+from palaestra_trainer.algorithms import own_buffers
 from palaestra_trainer.algorithms.buffers import (
     ValidDictReplayBuffer,
     ValidDictRolloutBuffer,
@@ -33,7 +34,6 @@ from palaestra_trainer.algorithms.buffers import (
     ValidRolloutBuffer,
     valid_rows,
 )
-from palaestra_trainer.algorithms.her import ValidHerReplayBuffer
 from palaestra_trainer.algorithms.maskable import (
     ValidMaskableDictRolloutBuffer,
     ValidMaskableRolloutBuffer,
@@ -56,7 +56,7 @@ _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
 }
 # Evaluations and exported files give masks to MaskablePPO and its subclasses only.
 _WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)
-_BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class")
+_BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class", "rollout_buffer_kwargs")
 
 
 class ValidRowsCounted(BaseAlgorithm):
@@ -79,9 +79,9 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     """
 
     def _setup_model(self) -> None:
-        if self.replay_buffer_class is not ValidHerReplayBuffer:
-            as_dict = isinstance(self.observation_space, spaces.Dict)
-            self.replay_buffer_class = ValidDictReplayBuffer if as_dict else ValidReplayBuffer
+        as_dict = isinstance(self.observation_space, spaces.Dict)
+        chosen = self.replay_buffer_class or (ValidDictReplayBuffer if as_dict else ValidReplayBuffer)
+        self.replay_buffer_class = own_buffers.of_valid_rows(chosen)
         super()._setup_model()
         if not isinstance(self.replay_buffer, ValidReplayBuffer):
             raise _creates_its_own(self, self.replay_buffer)
@@ -112,8 +112,13 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         return cast("ValidRolloutBuffer", self.rollout_buffer)  # set in _setup_model
 
     def _setup_model(self) -> None:
+        if chosen := self.rollout_buffer_class:
+            self.rollout_buffer_class = own_buffers.of_valid_rows(chosen)
         super()._setup_model()
         theirs = self.rollout_buffer
+        if isinstance(theirs, own_buffers.OwnBuffer):
+            self._refuse_masks(theirs)
+            return
         masked = _MASKED.get(type(theirs))
         if masked is None or (isinstance(theirs, _WITH_MASKS) and not isinstance(self, MaskablePPO)):
             raise _creates_its_own(self, theirs)
@@ -127,6 +132,17 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
             gamma=theirs.gamma,
             n_envs=theirs.n_envs,
             **sequences,
+        )
+
+    def _refuse_masks(self, buffer: RolloutBuffer) -> None:
+        """Refuse a buffer that stores masks in an algorithm that has none, and the other way round."""
+        takes_masks = isinstance(self, MaskablePPO)
+        if isinstance(buffer, _WITH_MASKS) == takes_masks:
+            return
+        masks, base = ("needs", "MaskableRolloutBuffer") if takes_masks else ("gives no", "RolloutBuffer")
+        raise ConfigurationError(
+            f"{own_buffers.field_of(type(buffer))}: {type(buffer).__name__} does not fit "
+            f"{type(self).__name__}, which {masks} masks of actions; extend {base}"
         )
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:

@@ -14,7 +14,7 @@ from sb3_contrib import TQC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.algorithms import elsewhere, her, limits, noise, values
+from palaestra_trainer.algorithms import buffer_options, elsewhere, limits, noise, values
 from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
 from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
@@ -36,10 +36,12 @@ def check(algorithm: Algorithm) -> Entry:
     known = entry.known
     given = algorithm.hyperparameters
     lines = [*elsewhere.mistakes(algorithm.name, entry, values.arguments_of(policy), given, values.FIELD)]
-    plain = {name: value for name, value in given.items() if name in known and name not in her.NAMES}
+    plain = {
+        name: value for name, value in given.items() if name in known and name not in buffer_options.NAMES
+    }
     lines += list(values.mistakes(entry.original, policy, plain)) or _out_of_range(entry, plain)
     lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
-    lines += her.mistakes(given, values.FIELD) if entry.replays else []
+    lines += buffer_options.mistakes({name: value for name, value in given.items() if name in known})
     if given.get("n_steps", 1) != 1 and "train_freq" in known:
         lines.append(
             "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
@@ -102,11 +104,9 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     added = noise.action_noise(given, env) if entry.takes_noise else None
     chosen = values.arguments(
         entry.original,
-        {name: value for name, value in given.items() if name not in {*noise.NAMES, *her.NAMES}},
+        {name: value for name, value in given.items() if name not in {*noise.NAMES, *buffer_options.NAMES}},
     )
-    if her.wanted(algorithm):
-        her.refuse_other_observations(env.observation_space)
-    chosen |= her.arguments(given)
+    chosen |= buffer_options.arguments(given, env.observation_space)
     if entry.takes_noise:
         chosen["action_noise"] = added
     chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)

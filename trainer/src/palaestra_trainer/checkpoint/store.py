@@ -12,7 +12,7 @@ from pathlib import Path
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.checkpoint import experience, manifest
+from palaestra_trainer.checkpoint import experience, manifest, own_buffer
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, digest_of
 from palaestra_trainer.checkpoint.state import State, replay_buffer
 from palaestra_trainer.checkpoint.tensors import load_tensors, save_tensors
@@ -87,6 +87,7 @@ class Saver:
     def _write(self, draft: Path, model: BaseAlgorithm, state: State, described: Manifest) -> Manifest:
         save_tensors(draft / MODEL, model)
         state.write(draft)
+        own_buffer.write(model, draft)
         files = {}
         for file in sorted(draft.iterdir()):
             sync(file)
@@ -157,6 +158,7 @@ def restore(checkpoint: Checkpoint, model: BaseAlgorithm) -> State:
         buffer.positions = state.positions
         experience.read(buffer, checkpoint)
         state = dataclasses.replace(state, positions=buffer.positions)
+    own_buffer.read(model, checkpoint.path)
     return state
 
 

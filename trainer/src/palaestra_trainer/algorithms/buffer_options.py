@@ -1,0 +1,114 @@
+"""The hyperparameters that choose a buffer, in the words of Stable-Baselines3 and rl-baselines3-zoo.
+
+A buffer is HerReplayBuffer by its name, or a class of the author's as `module:Class`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gymnasium import spaces
+from stable_baselines3.common.buffers import BaseBuffer, ReplayBuffer, RolloutBuffer
+
+from palaestra_trainer import own
+from palaestra_trainer.algorithms import her, own_buffers
+from palaestra_trainer.algorithms.own_buffers import FIELD
+from palaestra_trainer.algorithms.signatures import parameters
+from palaestra_trainer.configuration import nearest
+from palaestra_trainer.errors import ConfigurationError
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of buffer, and the two hyperparameters that choose one.
+
+    Attributes:
+        chooser: names a class.
+        options: holds the keyword arguments of that class.
+        base: what the class extends.
+        by_name: classes that need no module.
+    """
+
+    chooser: str
+    options: str
+    base: type[BaseBuffer]
+    by_name: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Both hyperparameters."""
+        return self.chooser, self.options
+
+
+REPLAY = Kind("replay_buffer_class", "replay_buffer_kwargs", ReplayBuffer, (her.NAME,))
+ROLLOUT = Kind("rollout_buffer_class", "rollout_buffer_kwargs", RolloutBuffer)
+KINDS = (REPLAY, ROLLOUT)
+NAMES = (*REPLAY.names, *ROLLOUT.names)
+
+
+def mistakes(given: Mapping[str, Any]) -> Iterator[str]:
+    """Yield field, fact and remedy of each wrong one of these hyperparameters."""
+    for kind in KINDS:
+        yield from _mistakes(kind, given.get(kind.chooser), given.get(kind.options))
+
+
+def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[str, Any]:
+    """Return the keyword arguments of the algorithm's class for these hyperparameters.
+
+    Raises:
+        ConfigurationError: the buffer does not take the environment's observation.
+    """
+    found: dict[str, Any] = {}
+    for kind in KINDS:
+        chosen = given.get(kind.chooser)
+        if chosen == her.NAME:
+            her.refuse_other_observations(observation)
+            found[kind.chooser] = her.ValidHerReplayBuffer
+        elif chosen is not None:
+            found[kind.chooser] = _own(kind, chosen)
+            own_buffers.refuse_other_observations(found[kind.chooser], observation)
+        if chosen is not None:
+            found[kind.options] = dict(given.get(kind.options) or {})
+    return found
+
+
+def _mistakes(kind: Kind, chosen: Any, options: Any) -> Iterator[str]:
+    known: dict[str, object] | None = None
+    if own.names_class(chosen):
+        try:
+            known = _options(_own(kind, chosen))
+        except ConfigurationError as error:
+            yield str(error)
+    elif chosen not in (None, *kind.by_name):
+        named = " or ".join((*kind.by_name, "module:Class"))
+        yield f"{FIELD}.{kind.chooser}: {chosen!r} is no buffer; write {named}, or leave it out"
+    if options is None:
+        return
+    if chosen is None:
+        yield f"{FIELD}.{kind.options}: has no effect without {kind.chooser}; set it, or remove both"
+    if not isinstance(options, dict):
+        yield f"{FIELD}.{kind.options}: {options!r} is refused; give a mapping"
+    elif known is not None:
+        yield from _unknown(f"{FIELD}.{kind.options}", options, known)
+    elif kind is REPLAY and not own.names_class(chosen):
+        yield from her.mistakes(options, f"{FIELD}.{kind.options}")
+
+
+def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]) -> Iterator[str]:
+    for name in options:
+        if name not in known:
+            remedy = nearest(str(name), known) if known else "its class adds none, so remove it"
+            yield f"{field}.{name}: is not an option here; {remedy}"
+
+
+def _own(kind: Kind, name: str) -> type[BaseBuffer]:
+    """Return the class that `name` names, made to store or sample valid rows only."""
+    return own_buffers.with_valid_rows(own.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
+
+
+def _options(cls: type[BaseBuffer]) -> dict[str, object]:
+    """Return the keyword arguments that an author's class adds; the algorithm gives those of its base."""
+    given = {*parameters(ReplayBuffer), *parameters(RolloutBuffer)}
+    return {name: found for name, found in parameters(cls).items() if name not in given}

@@ -1,0 +1,195 @@
+"""Buffers of a job's author: classes that extend a buffer of Stable-Baselines3.
+
+In Python's order of methods, such a class comes after the buffer for valid rows. So its `add` gets one valid
+row at a time, and its returns are those of a rollout that was truncated before each invalid row.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, cast
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from sb3_contrib.common.maskable.buffers import MaskableDictRolloutBuffer, MaskableRolloutBuffer
+from stable_baselines3.common.buffers import (
+    BaseBuffer,
+    DictReplayBuffer,
+    DictRolloutBuffer,
+    NStepReplayBuffer,
+    ReplayBuffer,
+    RolloutBuffer,
+)
+from stable_baselines3.her import HerReplayBuffer
+
+from palaestra_trainer.algorithms.buffers import (
+    ValidDictReplayBuffer,
+    ValidDictRolloutBuffer,
+    ValidReplayBuffer,
+    ValidRolloutBuffer,
+)
+from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
+from palaestra_trainer.errors import ConfigurationError, fact_of
+
+FIELD = "algorithm.hyperparameters"
+# What a class may extend, and the class for valid rows that comes before it; the nearest base is found first.
+_VALID: Mapping[type[BaseBuffer], type[BaseBuffer]] = {
+    DictReplayBuffer: ValidDictReplayBuffer,
+    ReplayBuffer: ValidReplayBuffer,
+    MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
+    MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
+    DictRolloutBuffer: ValidDictRolloutBuffer,
+    RolloutBuffer: ValidRolloutBuffer,
+}
+# These read the rows after a row; in one column, such a row may be another member's.
+_NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)
+_STATE_METHODS = ("state_dict", "load_state_dict")
+
+
+class OwnBuffer(BaseBuffer):
+    """What a checkpoint keeps of an author's buffer, besides the rows that every buffer has.
+
+    That is what `state_dict` returns, where the class has it and `load_state_dict`; else every attribute that
+    the class adds.
+
+    Raises:
+        ConfigurationError: no checkpoint could write an attribute.
+    """
+
+    _rows_only: type[BaseBuffer]  # the buffer for valid rows that this one extends
+
+    def __init__(
+        self,
+        buffer_size: int,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        *args: Any,
+        **options: Any,
+    ) -> None:
+        super().__init__(buffer_size, observation_space, action_space, *args, **options)
+        self._not_kept = {*vars(self._rows_only(1, observation_space, action_space)), "_not_kept"}
+        self.own_state()
+
+    def own_state(self) -> dict[str, Any]:
+        """Return what the class adds, by name: arrays, tensors, and values that JSON has.
+
+        Raises:
+            ConfigurationError: something is of another kind, or the author's `state_dict` failed.
+        """
+        state = self._own_state()
+        for name, value in state.items():
+            if not _can_be_written(value):
+                raise ConfigurationError(
+                    f"{field_of(type(self))}: {type(self).__name__} has {name}, a {type(value).__name__}, "
+                    "which no checkpoint can write; use arrays, tensors and numbers, or give the class "
+                    "state_dict() and load_state_dict()"
+                )
+        return state
+
+    def put_own_state(self, state: Mapping[str, Any]) -> None:
+        """Let the buffer go on from what `own_state` returned.
+
+        Raises:
+            ConfigurationError: the author's `load_state_dict` failed.
+        """
+        if _has_state_methods(self):
+            with _reported(type(self), "load_state_dict"):
+                cast("Any", self).load_state_dict(dict(state))
+            return
+        for name, value in state.items():
+            setattr(self, name, value)
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Refuse to drop all rows but the `kept` ones: only the class knows what else belongs to them.
+
+        Raises:
+            ConfigurationError: always.
+        """
+        raise ConfigurationError(
+            f"{field_of(type(self))}: the checkpoint has lost {np.count_nonzero(~kept)} rows, and only "
+            f"{type(self).__name__} knows what belongs to them; restore the run directory from a copy, or "
+            "begin a new run"
+        )
+
+    def _own_state(self) -> dict[str, Any]:
+        if _has_state_methods(self):
+            with _reported(type(self), "state_dict"):
+                return dict(cast("Any", self).state_dict())
+        return {name: value for name, value in vars(self).items() if name not in self._not_kept}
+
+
+def field_of(cls: type[BaseBuffer]) -> str:
+    """Return the field of a job that names a buffer of this class."""
+    return f"{FIELD}.{'replay' if issubclass(cls, ReplayBuffer) else 'rollout'}_buffer_class"
+
+
+def of_valid_rows(cls: Any) -> Any:
+    """Return the class of a buffer if it is for valid rows, else a subclass that is, as `with_valid_rows`."""
+    return cls if issubclass(cls, ValidReplayBuffer | ValidRolloutBuffer) else with_valid_rows(cls)
+
+
+def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
+    """Return a subclass of an author's buffer, with its name, that stores or samples valid rows only.
+
+    Raises:
+        ConfigurationError: invalid rows would reach its samples, or rows of another episode.
+    """
+    if issubclass(named, _NEIGHBOURS):
+        raise ConfigurationError(
+            f"{field_of(named)}: {named.__name__} reads the rows after a row, and rows of several simulators "
+            "lie in one column; extend ReplayBuffer, or use HerReplayBuffer by its name"
+        )
+    base = next((base for base in _VALID if issubclass(named, base)), None)
+    if base is None or getattr(named, "get", None) is not getattr(base, "get", None):
+        raise ConfigurationError(
+            f"{field_of(named)}: {named.__name__} draws batches of its own (get), in which may be rows "
+            "that a fault spoiled; override compute_returns_and_advantage, add or _get_samples instead"
+        )
+    content = {"__doc__": named.__doc__, "__module__": named.__module__, "_rows_only": _VALID[base]}
+    return cast("type[BaseBuffer]", type(named.__name__, (OwnBuffer, _VALID[base], named), content))
+
+
+def refuse_other_observations(cls: type[BaseBuffer], observation: spaces.Space[Any]) -> None:
+    """Return if a buffer takes the observation.
+
+    Raises:
+        ConfigurationError: it takes a Dict and the observation is none, or the other way round.
+    """
+    takes_dict = issubclass(cls, DictReplayBuffer | DictRolloutBuffer)
+    if takes_dict == isinstance(observation, spaces.Dict):
+        return
+    kind = "Replay" if issubclass(cls, ReplayBuffer) else "Rollout"
+    base = f"{kind}Buffer" if takes_dict else f"Dict{kind}Buffer"
+    raise ConfigurationError(
+        f"{field_of(cls)}: {cls.__name__} takes observations that are {'a' if takes_dict else 'no'} Dict, "
+        f"unlike the environment's; extend {base} of Stable-Baselines3"
+    )
+
+
+@contextmanager
+def _reported(cls: type[BaseBuffer], method: str) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # the author's code may raise anything
+        raise ConfigurationError(
+            f"{field_of(cls)}: {cls.__name__}.{method} failed ({fact_of(error)}); correct it"
+        ) from error
+
+
+def _has_state_methods(buffer: BaseBuffer) -> bool:
+    return all(callable(getattr(buffer, name, None)) for name in _STATE_METHODS)
+
+
+def _can_be_written(value: Any) -> bool:
+    """Return whether a value is the same after it was written and read."""
+    if isinstance(value, np.ndarray):
+        return not value.dtype.hasobject
+    if isinstance(value, torch.Tensor | float):  # NaN is not equal to itself
+        return True
+    try:
+        return bool(json.loads(json.dumps(value)) == value)
+    except (TypeError, ValueError):
+        return False
