@@ -8,8 +8,10 @@ from palaestra_sim.scene.simulation import Simulation
 
 WORLD = """#VRML_SIM R2023b utf8
 WorldInfo { basicTimeStep 16 }
-Solid { translation 0 0 -0.05 boundingObject Box { size 20 20 0.1 } name "floor" }
-Solid { translation 5 5 0.5 boundingObject Cylinder { radius 0.2 height 1 } name "post" }
+Solid { translation 0 0 -0.05 name "floor"
+  children [ Shape { geometry DEF FLOOR Box { size 20 20 0.1 } } ] boundingObject USE FLOOR }
+Solid { translation 5 5 0.5 name "post"
+  children [ Shape { geometry DEF POST Cylinder { radius 0.2 height 1 } } ] boundingObject USE POST }
 Robot {
   children [
     DistanceSensor { name "sensor" translation 0.1 0 0.5 rotation 0 1 0 ANGLE type "laser"

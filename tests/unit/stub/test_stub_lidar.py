@@ -7,7 +7,7 @@ import pytest
 
 from palaestra_sim.ros.node import ServiceFailed
 
-WALL = "Solid { translation 2 0 0.5 boundingObject Box { size 0.2 8 1 } }"
+WALL = "Solid { translation 2 0 0.5 children [ Shape { geometry Box { size 0.2 8 1 } } ] }"
 FLAT = "horizontalResolution 5 numberOfLayers 1 fieldOfView 1.5 minRange 0.1 maxRange 3"
 TALL = "horizontalResolution 3 numberOfLayers 3 fieldOfView 0.3 verticalFieldOfView 1.0 maxRange 5"
 ROBOT = """Robot {{ supervisor TRUE controller "ros" controllerArgs [ "--name=seer" "--synchronize" ]
@@ -63,7 +63,7 @@ def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
 
 def test_several_layers_look_up_and_down(seer):
     """The top one over the wall; the lowest one to the floor; only layers have scans then."""
-    robot = seer(TALL)
+    robot = seer(TALL, WALL + "Solid { children [ Shape { geometry Plane { size 20 20 } } ] }")
     image, middle = seen(robot, "range_image", "laser_scan/layer1")
     top, _, low = (floats(image["data"])[row * 3 + 1] for row in range(3))
 

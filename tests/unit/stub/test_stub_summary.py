@@ -90,15 +90,17 @@ def test_a_mistake_is_an_error(check):
 def test_values_that_differ_from_webots_are_named(check):
     """A policy that learns from them meets others in Webots."""
     mesh = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 1 ] } }"
-    devices = 'DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }'
+    devices = """DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }
+        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 }"""
     robot = f'Robot {{ controller "ros" controllerArgs ["--name=a" "--synchronize"] children [ {devices} ] }}'
 
     code, lines = check(f"Solid {{ boundingObject {mesh} }} {robot}")
 
     assert code == 0
     assert lines[1:] == [
-        "differs from Webots: 1 infra-red DistanceSensor: colors do not count, rays meet boundingObjects",
-        "differs from Webots: 1 Lidar: rays meet boundingObjects, not shapes",
+        "differs from Webots: 1 infra-red DistanceSensor: textures do not count, rays pass the robot itself",
+        "differs from Webots: 1 sonar DistanceSensor: an obstacle counts at every angle",
+        "differs from Webots: 1 Lidar: rays pass the robot itself",
         "differs from Webots: 1 IndexedFaceSet as boundingObject: the box around its points",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
     ]

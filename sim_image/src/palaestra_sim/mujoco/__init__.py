@@ -9,7 +9,8 @@
 - `body`: a robot that drives
 - `loose`: a thing that moves when it is pushed
 - `library`: MuJoCo itself
-- `rays`: how far the beams of sensors travel
+- `rays`: how far the beams of sensors travel until a boundingObject
+- `sight`: how far those of lidars travel until a shape
 - `eye`, `pictures`: what cameras see
 - `visible`: from visible shapes to a model of their own
 - `canvas`, `pixels`: OpenGL

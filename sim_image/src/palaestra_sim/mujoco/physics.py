@@ -17,6 +17,7 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built, Contents, build
 from palaestra_sim.mujoco.pictures import Pictures
 from palaestra_sim.mujoco.rays import Beams
+from palaestra_sim.mujoco.sight import LidarBeams
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.drawn import View
@@ -47,7 +48,7 @@ class MujocoPhysics:
         self._stale = False
         self._settled = True
         self._pushes: list[tuple[Figure | Loose, Push]] = []
-        self._pictures: Pictures | None = None
+        self._pictures: Pictures
 
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
@@ -132,6 +133,10 @@ class MujocoPhysics:
 
         return cast
 
+    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        return LidarBeams(self._pictures, figure, beams).cast
+
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
         self._pushes.append((target, push))
@@ -142,7 +147,7 @@ class MujocoPhysics:
 
     def eye(self, place: Place, lens: Lens) -> MujocoEye | None:
         """Return a camera; None if its picture would not be flat."""
-        return MujocoEye(self._pictures, place, lens) if self._pictures is not None and lens.flat else None
+        return MujocoEye(self._pictures, place, lens) if lens.flat else None
 
     def film(self, movie: Movie) -> MujocoFilm:
         """Return a film to record a movie on."""

@@ -46,6 +46,11 @@ class Pictures:
         """The visible things of the last picture, by number."""
         return self._visible.things
 
+    def placed(self) -> Visible:
+        """Return the model with every shape where it is now."""
+        self._refresh()
+        return self._visible
+
     def open(self) -> None:
         """Get ready to draw.
 

@@ -24,15 +24,7 @@ class Beams:
     def __init__(self, figure: Figure, beams: Sequence[Beam]) -> None:
         self._figure = figure
         self._reach = np.array([beam.reach_m for beam in beams])
-        # In the robot's frame.
-        self._origins = np.array([[beam.ray[0], beam.ray[1], beam.height_m] for beam in beams])
-        stretch = [math.hypot(1.0, beam.slope) for beam in beams]
-        self._directions = np.array(
-            [
-                [beam.ray[2] / along, beam.ray[3] / along, beam.slope / along]
-                for beam, along in zip(beams, stretch, strict=True)
-            ]
-        )
+        self._origins, self._directions = origins_and_directions(beams)
         self._distances = np.empty(len(beams))
         self._hits = np.empty(len(beams), dtype=np.int32)
         order = groupby(range(len(beams)), key=lambda index: tuple(self._origins[index]))
@@ -69,3 +61,16 @@ class Beams:
             count,
             mujoco.mjMAXVAL,
         )
+
+
+def origins_and_directions(beams: Sequence[Beam]) -> tuple[Any, Any]:
+    """Return where beams begin, and where they go, in the robot's frame; each (n, 3), meters and units."""
+    origins = np.array([[beam.ray[0], beam.ray[1], beam.height_m] for beam in beams])
+    stretch = [math.hypot(1.0, beam.slope) for beam in beams]
+    directions = np.array(
+        [
+            [beam.ray[2] / along, beam.ray[3] / along, beam.slope / along]
+            for beam, along in zip(beams, stretch, strict=True)
+        ]
+    )
+    return origins, directions

@@ -27,6 +27,7 @@ _FROM_CAMERA: Final = 0.25
 _FROM_ABOVE: Final = 0.30
 SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, where z points up
 SKY: Final = 1  # the group of its geom, the last one of the model
+PASSED: Final = 2  # the group of what a lidar does not see, while it looks
 
 
 @dataclass(slots=True, eq=False)

@@ -65,6 +65,7 @@ class Drawn:
         place: that carries it; None: the world.
         node: the Shape, or the stand-in.
         mesh: of kind "mesh".
+        roughness: of a PBRAppearance, 0 to 1.
     """
 
     kind: Kind
@@ -74,6 +75,7 @@ class Drawn:
     place: Place | None
     node: SceneNode
     mesh: Mesh | None = None
+    roughness: float = 0.0
 
 
 def drawn(root: SceneNode) -> Iterator[Drawn]:
@@ -145,9 +147,9 @@ class _Frame(NamedTuple):
 
 def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
     if node.type_name == "Shape":
-        color = _color(node)
+        look = _of_shape(node)
         for geometry in node.nodes("geometry"):
-            yield from _geometry(geometry, frame, color, node)
+            yield from _geometry(geometry, frame, look, node)
     elif node.left_out and node.type_name != "Robot":
         return
     elif node.stand_in:
@@ -161,19 +163,24 @@ def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
     looks = [it for it in node.inside() if it.type_name in {"Appearance", "PBRAppearance"}]
-    color = _look(looks[0]) if looks else None
+    look = _look(looks[0]) if looks else None
     frame = frame._replace(pose=frame.pose.after(frame_of_shapes(node)))
     for outline in node.nodes("boundingObject"):
         for pose in outline.nodes():
             for geometry in pose.nodes():
                 plain = _FLOOR if geometry.type_name == "Plane" else _STAND_IN
-                yield from _geometry(geometry, frame.within(pose), color or (*plain, 1.0), node)
+                yield from _geometry(geometry, frame.within(pose), look or _Look((*plain, 1.0)), node)
 
 
-def _geometry(node: SceneNode, frame: _Frame, color: Color, owner: SceneNode) -> Iterator[Drawn]:
+class _Look(NamedTuple):
+    color: Color
+    roughness: float = 0.0
+
+
+def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
     """Yield the shape of a geometry; nothing for one whose numbers are none, or that is in another file."""
     solid = _solid(node, frame.pose)
-    if solid is None or color[3] <= 0.0:
+    if solid is None or look.color[3] <= 0.0:
         return
     x, y, z = (length * factor for length, factor in zip(solid.size, frame.scale, strict=True))
     if node.type_name == "Plane":
@@ -182,11 +189,12 @@ def _geometry(node: SceneNode, frame: _Frame, color: Color, owner: SceneNode) ->
         yield Drawn(
             kind=solid.kind,
             size=(x, y, z),
-            color=color,
+            color=look.color,
             local=solid.pose,
             place=frame.place,
             node=owner,
             mesh=solid.mesh,
+            roughness=look.roughness,
         )
 
 
@@ -232,21 +240,22 @@ def _mesh(node: SceneNode, pose: Pose) -> tuple[Pose, Mesh] | None:
     return None if mesh is None else (pose, mesh)
 
 
-def _color(shape: SceneNode) -> Color:
+def _of_shape(shape: SceneNode) -> _Look:
     look = next(iter(shape.nodes("appearance")), None)
-    return (*_WHITE, 1.0) if look is None else _look(look)
+    return _Look((*_WHITE, 1.0)) if look is None else _look(look)
 
 
-def _look(look: SceneNode) -> Color:
-    """Return the color of an Appearance, of a PBRAppearance, or of a PROTO for one."""
+def _look(look: SceneNode) -> _Look:
+    """Return the look of an Appearance, of a PBRAppearance, or of a PROTO for one."""
     if look.type_name == "Appearance":
         material = next(iter(look.nodes("material")), None)
         if material is None:
-            return (*_PATTERN, 1.0) if look.nodes("texture") else (*_WHITE, 1.0)
-        return _mixed(material, "diffuseColor", _MATERIAL)
+            return _Look((*(_PATTERN if look.nodes("texture") else _WHITE), 1.0))
+        return _Look(_mixed(material, "diffuseColor", _MATERIAL))
     if look.type_name == "PBRAppearance":
-        return _mixed(look, "baseColor", _PATTERN if look.nodes("baseColorMap") else _WHITE)
-    return _mixed(look, "colorOverride", _PATTERN)
+        color = _mixed(look, "baseColor", _PATTERN if look.nodes("baseColorMap") else _WHITE)
+        return _Look(color, min(1.0, max(0.0, _number(look, "roughness", 0.0))))
+    return _Look(_mixed(look, "colorOverride", _PATTERN))
 
 
 def _mixed(node: SceneNode, field: str, default: tuple[float, float, float]) -> Color:

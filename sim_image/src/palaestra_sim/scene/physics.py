@@ -125,6 +125,10 @@ class Physics(Protocol):
         """Return a function that returns how far each beam of a robot travels now, in meters."""
         ...
 
+    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        ...
+
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
         ...

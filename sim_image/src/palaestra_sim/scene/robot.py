@@ -18,6 +18,7 @@ from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Sample, Source
+from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motion import Motion, Trail, motion_of
@@ -26,6 +27,7 @@ from palaestra_sim.scene.nodes.scene_node import FieldContent
 from palaestra_sim.scene.physics import Cast, Physics
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.robot_reader import RobotParts
+from palaestra_sim.scene.sight import Glance, Sight
 
 
 class Robot:
@@ -44,9 +46,10 @@ class Robot:
         battery: without energy if the robot has none.
     """
 
-    def __init__(self, parts: RobotParts, random_seed: int, physics: Physics) -> None:
+    def __init__(self, parts: RobotParts, random_seed: int, physics: Physics, view: View) -> None:
         self.parts = parts
         self._physics = physics
+        self._view = view
         self.name = parts.name
         self.motors: dict[str, Motor] = parts.devices.motors
         self.sensors: Mapping[str, Source] = parts.devices.sensors
@@ -87,6 +90,14 @@ class Robot:
     def look(self, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam travels now, in meters; see `Carrier`."""
         return self._physics.look(self, beams)
+
+    def see(self, beams: Sequence[Beam]) -> Cast:
+        """Return the same for beams that meet what is visible; see `Carrier`."""
+        return self._physics.see(self, beams)
+
+    def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
+        """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
+        return Sight(self._view, self.place, beams).cast
 
     def eye(self, place: Place, lens: Lens) -> Eye | None:
         """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""

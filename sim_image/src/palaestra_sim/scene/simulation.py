@@ -63,7 +63,9 @@ class Simulation:
             lambda size: view(tree.root, scene.physics, size), scene.physics.film, scene.basic_step_ms
         )
         scene.physics.show(self._view)
-        self.robots = tuple(Robot(parts, scene.random_seed, scene.physics) for parts in scene.robots)
+        self.robots = tuple(
+            Robot(parts, scene.random_seed, scene.physics, self._view) for parts in scene.robots
+        )
         self.time_ms = 0
         self.mode = mode
         self.quit_status: int | None = None
@@ -228,7 +230,7 @@ class Simulation:
         self.scene.doors += fresh.doors
         self.scene.robots += fresh.robots
         self.robots += tuple(
-            Robot(parts, self.scene.random_seed, self.scene.physics) for parts in fresh.robots
+            Robot(parts, self.scene.random_seed, self.scene.physics, self._view) for parts in fresh.robots
         )
         self._assemble()
         self._arrange()

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
 from typing import Final, Protocol
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, DistanceSensorType
-from palaestra_sim.scene.devices.lidar import Lidar
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
@@ -70,21 +68,25 @@ def differences(simulation: Described) -> Iterator[str]:
     """Yield what devices and obstacles of this world have other values for than in Webots."""
     robots = [robot.parts for robot in simulation.robots if robot.parts.arguments is not None]
     devices = [row for robot in robots for row in robot.devices.rows.values()]
-    infrared = sum(
-        isinstance(it, DistanceSensor) and it.type == DistanceSensorType.INFRA_RED for _, it in devices
-    )
+    types = Counter(it.type for _, it in devices if isinstance(it, DistanceSensor))
     lidars = sum(kind.node == "Lidar" for kind, _ in devices)
     outlines = [node for node in simulation.tree.nodes.values() if node.outline]
     meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
-    if infrared:
-        yield f"{infrared} infra-red DistanceSensor: colors do not count, rays meet boundingObjects"
+    if infrared := types[DistanceSensorType.INFRA_RED]:
+        yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
+    if sonars := types[DistanceSensorType.SONAR]:
+        yield f"{sonars} sonar DistanceSensor: an obstacle counts at every angle"
     if lidars:
-        yield f"{lidars} Lidar: rays meet boundingObjects, not shapes"
+        yield f"{lidars} Lidar: rays pass the robot itself"
     if meshes:
         yield f"{meshes} IndexedFaceSet as boundingObject: the box around its points"
-    beams = [it.beams for _, it in devices if isinstance(it, DistanceSensor)]
-    beams += [layer for _, it in devices if isinstance(it, Lidar) for layer in it.beams]
-    sloped = any(not beam.level for beam in chain.from_iterable(beams))
+    rays = (
+        beam
+        for _, it in devices
+        if isinstance(it, DistanceSensor) and it.type != DistanceSensorType.INFRA_RED
+        for beam in it.beams
+    )
+    sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
 

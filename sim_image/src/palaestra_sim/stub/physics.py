@@ -18,6 +18,7 @@ from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.sight import Sight
 from palaestra_sim.scene.surroundings import Surroundings
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
@@ -44,6 +45,7 @@ class StubPhysics:
         self._solids: tuple[Shape, ...] = ()
         self._level: dict[Figure, list[_Level]] = {}
         self._sloped: dict[Figure, list[SlopedBeams]] = {}
+        self._view: View
 
     def body(self, build: Build) -> StubBody:
         """Return the body of a robot: upright cylinders, between its heights."""
@@ -107,11 +109,17 @@ class StubPhysics:
             return lambda: cast((body.x, body.y, body.c, body.s))
         return lambda: cast(frame())
 
+    def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        sight = Sight(self._view, figure.place, beams)
+        return lambda: [glance.distance_m for glance in sight.cast()]
+
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Do nothing: without masses a force moves nothing; see `abilities`."""
 
     def show(self, view: View) -> None:
-        """Do nothing: there are no pictures."""
+        """Take what lidars see of the world; there are no pictures."""
+        self._view = view
 
     def eye(self, place: Place, lens: Lens) -> None:
         """Return None: there are no pictures."""

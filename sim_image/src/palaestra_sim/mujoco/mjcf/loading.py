@@ -15,6 +15,7 @@ from palaestra_sim.mujoco.mjcf.simulation import MjcfSimulation
 from palaestra_sim.mujoco.mjcf.tree import ModelTree, grow
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.arguments import read_arguments
+from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import LeaveOut, Reading
@@ -65,7 +66,9 @@ def _robot(tree: ModelTree, equipment: Equipment, description: Description, leav
         body=None,
         arguments=arguments,
     )
-    return Robot(parts, 0, MujocoPhysics())  # nothing asks this physics: sensors read the model
+    return Robot(
+        parts, 0, MujocoPhysics(), View(tree.scene.root)
+    )  # nothing asks this physics: sensors read the model
 
 
 def _compiled(world_path: Path) -> Any:

@@ -1,15 +1,15 @@
 """DistanceSensor: its rays, and the lookup table that their length goes through.
 
 Several rays are a cone around the first axis. A sonar measures the nearest one. The others measure the
-average, in which a ray counts less the more it is off the axis. Neither the color of an obstacle
-(infra-red) nor the angle at which a ray meets it (sonar) matters here. Source: WbDistanceSensor.cpp of
-Webots.
+average, in which a ray counts less the more it is off the axis. Infra-red rays meet shapes, the others
+boundingObjects; the darker what they meet is, the farther it seems. Source: docs/reference/distancesensor.md
+and WbDistanceSensor.cpp of Webots.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import islice
@@ -20,6 +20,7 @@ from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.devices.response import table_rows, table_service
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.scene.sight import Glance
 from palaestra_sim.seam import Row
 
 _MOST_RAYS: Final = 10_000  # each is cast at every step
@@ -49,9 +50,11 @@ class DistanceSensorType(IntEnum):
     LASER = 3
 
 
+# In any case of letters.
 _TYPES: Final = {
     "generic": DistanceSensorType.GENERIC,
     "infra-red": DistanceSensorType.INFRA_RED,
+    "infrared": DistanceSensorType.INFRA_RED,
     "sonar": DistanceSensorType.SONAR,
     "laser": DistanceSensorType.LASER,
 }
@@ -72,14 +75,14 @@ class DistanceSensor:
 
 
 def _read(part: Part) -> DistanceSensor:
-    type_name = part.text("type", "generic")
+    type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
     if part.number("resolution", -1.0) != -1.0:
         part.lack("a distance sensor with a resolution")
     table = lookup_table(*table_rows(part, _TABLE, "distances"))
     aperture_rad = part.number("aperture", 1.5708)
-    rays = int(part.number("numberOfRays", 1.0))
+    rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))  # as in Webots, which warns
     if rays > _MOST_RAYS:
         part.refuse(f"a distance sensor with {rays} rays", f"use 1 to {_MOST_RAYS}")
         rays = 1
@@ -142,6 +145,8 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
+    if any(sensor.type is DistanceSensorType.INFRA_RED for sensor in sensors):
+        return _with_infrared(sensors, robot)
     cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
     gauss = robot.gauss
 
@@ -162,10 +167,39 @@ def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     return sample
 
 
+def _with_infrared(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
+    """Return the sample of sensors of which some are infra-red."""
+    infrared = [it for it in sensors if it.type is DistanceSensorType.INFRA_RED]
+    others = [it for it in sensors if it.type is not DistanceSensorType.INFRA_RED]
+    cast: Callable[[], Sequence[float]] = tuple
+    if others:
+        cast = robot.look([beam for sensor in others for beam in sensor.beams])
+    reflect = robot.reflect([beam for sensor in infrared for beam in sensor.beams])
+    gauss = robot.gauss
+
+    def sample() -> None:
+        distances, glances = iter(cast()), iter(reflect())
+        for sensor in sensors:
+            rays = len(sensor.beams)
+            if sensor.type is DistanceSensorType.INFRA_RED:
+                measured_m = _reflected(sensor, list(islice(glances, rays)))
+            else:
+                measured_m = _measured(sensor, list(islice(distances, rays)))
+            sensor.value = sensor.table.response(measured_m, gauss)
+
+    return sample
+
+
 def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
     if sensor.type is DistanceSensorType.SONAR:
         return min(distances_m)
     return sum(distance * weight for distance, weight in zip(distances_m, sensor.weights, strict=True))
+
+
+def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
+    """Return the average distance, divided by the average share of the light that comes back."""
+    light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
+    return _measured(sensor, [it.distance_m for it in glances]) / light
 
 
 def _services(sensor: DistanceSensor) -> tuple[Row, ...]:

@@ -21,6 +21,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.sight import Glance
 from palaestra_sim.seam import Fields, Row
 
 
@@ -161,6 +162,14 @@ class Carrier(Protocol):
 
     def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
         """Return a function that returns how far each beam travels now, in meters."""
+        ...
+
+    def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        ...
+
+    def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
+        """Return a function that returns what each infra-red beam meets now."""
         ...
 
     def eye(self, place: Place, lens: Lens) -> Eye | None:

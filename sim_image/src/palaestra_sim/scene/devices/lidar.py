@@ -170,7 +170,7 @@ def _layers(info: dict[str, Any]) -> Iterator[tuple[Vector, ...]]:
 
 
 def _sampler(lidars: Sequence[Lidar], robot: Carrier) -> Sample:
-    casts = [(lidar, [robot.look(beams) for beams in lidar.beams]) for lidar in lidars]
+    casts = [(lidar, [robot.see(beams) for beams in lidar.beams]) for lidar in lidars]
     gauss = robot.gauss
 
     def sample() -> None:
