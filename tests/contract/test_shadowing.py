@@ -28,12 +28,16 @@ NEEDED = (
 UNAVOIDABLE = {"encodings", "__future__"}
 
 
+# The library imports these to find out which system this is.
+OF_WINDOWS = {"msvcrt", "nt", "winreg", "_winapi"}
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a file for every module of the standard library that can be shadowed."""
     made = tmp_path_factory.mktemp("own")
     for name in {*sys.stdlib_module_names, *NEEDED} - UNAVOIDABLE:
-        if find_spec(name):  # the library's names of other systems are free on this one
+        if find_spec(name) or name in OF_WINDOWS:
             (made / f"{name}.py").write_text(TRAP)
     return made
 
@@ -65,6 +69,22 @@ def test_each_program_starts_or_names_the_files(program, folder):
         assert out == ""
     else:
         assert (code, out.partition(":")[0]) == (0, "usage"), err
+
+
+@pytest.mark.parametrize("name", ["re", "fnmatch", "msvcrt", "queue"])
+@pytest.mark.parametrize("program", ["palaestra", "palaestra-train"])
+def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_path):
+    """The start of Python imports some, without an error, and keeps them in modules that it has imported."""
+    (tmp_path / f"{name}.py").write_text("x = 1\n")
+    arguments = ("plan", JOB) if program == "palaestra" else ("--help",)
+
+    code, _, err = ran(program, tmp_path, *arguments)
+
+    if program in WITH_CODE_OF_USERS:
+        assert code == 2
+        assert f"{tmp_path}/{name}.py: shadows the module {name} of Python's standard library" in err
+    else:
+        assert code == 0, err
 
 
 def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):

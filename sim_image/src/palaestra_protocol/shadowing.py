@@ -78,10 +78,22 @@ def _ahead() -> list[str]:
 def _import_last(folders: list[str]) -> None:
     """Import from these folders last, and forget modules that the start of Python has imported from them."""
     _put_last(folders)
-    for folder in folders:
-        for name, file, _ in _hidden(folder, _others(folders)):
-            if name in sys.modules and getattr(sys.modules[name], "__file__", None) == file:
-                del sys.modules[name]
+    others = _others(folders)
+    for name, file, _ in [each for folder in folders for each in _hidden(folder, others)]:
+        if name in sys.modules and getattr(sys.modules[name], "__file__", None) == file:
+            _forget(name)
+        if name in sys.stdlib_module_names and _spec(name, others) is None:
+            vars(sys)["modules"][name] = None  # its import fails, as it should here
+
+
+def _forget(name: str) -> None:
+    """Let the next import load a module anew, and with it those of the standard library that hold it."""
+    module = sys.modules.pop(name)
+    library = os.path.dirname(os.__file__)
+    for other, holder in list(sys.modules.items()):
+        file = getattr(holder, "__file__", None) or ""
+        if os.path.dirname(file) == library and any(value is module for value in vars(holder).values()):
+            _forget(other)
 
 
 def _put_last(folders: list[str]) -> None:
@@ -117,8 +129,10 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
     found = []
     for name in sorted(filter(str.isidentifier, names)):
         mine, other = _spec(name, [folder]), _spec(name, others)
-        # A folder without `__init__.py` shadows nothing, but may be shadowed.
-        if mine and mine.origin and other and not _same(mine.origin, other.origin):
+        # A folder without `__init__.py` shadows nothing, but may be shadowed. The library tries to import
+        # some modules, such as msvcrt, to find out which system this is.
+        hides = not _same(mine.origin, other.origin) if mine and mine.origin and other else False
+        if mine and mine.origin and (hides or (other is None and name in sys.stdlib_module_names)):
             found.append((name, mine.origin, folder))
     return found
 

@@ -129,8 +129,7 @@ def train_and_leave() -> int:
     """Run `palaestra-train` as a program: it ends soon, also if a thread of the job's code goes on."""
     code = train()
     end_undisturbed()
-    leave_after(LEFT_S, code)
-    return code
+    return _leaving(code)
 
 
 def evaluate(arguments: Sequence[str] | None = None) -> int:
@@ -146,14 +145,18 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     configure_logs()
     try:
-        result = _evaluate(chosen.run, chosen.episodes, chosen.seeds)
+        _evaluate(chosen.run, chosen.episodes, chosen.seeds)
     except KeyboardInterrupt:
         log.error("ended by Ctrl-C")
         return KEYBOARD_INTERRUPT
     except (TrainerError, OSError, SystemExit) as error:  # the environment may end the program
         return _code_of_refusal(error)
-    sys.stdout.write(json.dumps(result) + "\n")
     return ExitCode.DONE
+
+
+def evaluate_and_leave() -> int:
+    """Run `palaestra-eval` as a program: it ends soon, also if a thread of the job's code goes on."""
+    return _leaving(evaluate())
 
 
 def export(arguments: Sequence[str] | None = None) -> int:
@@ -175,12 +178,23 @@ def export(arguments: Sequence[str] | None = None) -> int:
     return ExitCode.DONE
 
 
+def export_and_leave() -> int:
+    """Run `palaestra-export` as a program: it ends soon, also if a thread of the job's code goes on."""
+    return _leaving(export())
+
+
+def _leaving(code: int) -> int:
+    sys.stdout.flush()
+    leave_after(LEFT_S, code)
+    return code
+
+
 def _code_of_refusal(error: Exception | SystemExit) -> int:
     code = _refuse(error)
     return code if code in {ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET} else UNEXPECTED
 
 
-def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
+def _evaluate(folder: Path, episodes: int, stream: str) -> None:
     directory = RunDirectory(folder)
     configuration = load(directory.configuration)
     in_pod = CONFIG_VARIABLE in os.environ
@@ -191,7 +205,12 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
         from palaestra_trainer.simulators.connect import connect_here, connect_members
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)
-    return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
+    measure(configuration, directory.model, members, episodes=episodes, stream=stream, report=_write_result)
+
+
+def _write_result(result: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(result) + "\n")
+    sys.stdout.flush()
 
 
 def _parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentParser:

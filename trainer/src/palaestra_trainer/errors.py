@@ -125,6 +125,13 @@ class SimulatorDead(SimulatorFault, ConnectionError):
     kind = "dead"
 
 
+class SimulatorRefused(SimulatorDead):
+    """Its process ended with the exit code by which a program refuses what it is given.
+
+    If two processes in a row refuse in the same words before the run's first step, the job is wrong.
+    """
+
+
 class SimulatorHung(SimulatorFault, TimeoutError):
     """It is connected and does not answer within the deadline."""
 

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+import structlog
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from palaestra_protocol.pod.status import Cause
@@ -297,12 +298,29 @@ def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, direc
     assert steps[-1] >= 100
 
 
-def test_measuring_needs_a_model_and_somebody_who_evaluates(job, directory):
-    """Each with its own remedy."""
+def test_measuring_needs_a_model(job, directory):
+    """With the remedy."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         measure(job(), directory.model, lambda _: [], episodes=1, stream="B")
-    with pytest.raises(ConfigurationError, match="none has role Evaluate"):
-        measure(job(evaluators=0), directory.model, lambda _: [], episodes=1, stream="B")
+
+
+def test_a_policy_is_measured_where_it_collected_if_nobody_evaluates(play, job, directory, make_member):
+    """The end of a run prints the command, also for a job without role Evaluate; its world is named."""
+    play(job(evaluators=0))
+    reported = []
+
+    with structlog.testing.capture_logs() as logs:
+        result = measure(
+            job(evaluators=0),
+            directory.model,
+            lambda given: [make_member(each.name) for each in given.simulators],
+            episodes=2,
+            stream="B",
+            report=reported.append,
+        )
+
+    assert reported == [result]
+    assert [line["name"] for line in logs if "has role Evaluate" in line["event"]] == ["collect-0"]
 
 
 def test_a_restored_policy_is_the_policy_that_was_saved(play, job, directory, make_member):

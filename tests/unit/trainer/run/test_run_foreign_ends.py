@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import gymnasium
@@ -161,26 +162,45 @@ def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
     assert left == ["word", 75]
 
 
+def test_nobody_watches_for_steps_while_everything_is_stopped(play):
+    """A `close` that took longer than `stallDeadlineSeconds` made a stall of a complete run."""
+    watching = []
+
+    def close():
+        for thread in [each for each in threading.enumerate() if each.name == "watchdog"]:
+            thread.join(20)  # it ends at once if it was asked to
+            watching.append(thread.is_alive())
+
+    code, _, _ = play(at_close=close)
+
+    assert code == 0
+    assert not any(watching)
+
+
 LIVES_ON = """
 import sys, threading, time
 from palaestra_trainer import cli
 from palaestra_trainer.telemetry.logs import configure_logs
 configure_logs()
-cli.train, cli.LEFT_S = lambda: 75, 1.0
+program = sys.argv[1]
+setattr(cli, program, lambda: 75)
+cli.LEFT_S = 1.0
 threading.Thread(target=time.sleep, args=(300,), name="mine").start()
-code = cli.train_and_leave()
+code = getattr(cli, program + "_and_leave")()
 print("ended", flush=True)
 sys.exit(code)
 """
 
 
-def test_a_thread_that_lives_on_does_not_keep_the_program():
-    """It ends soon with its code, whatever signals come; the thread is named."""
+@pytest.mark.parametrize("name", ["train", "evaluate", "export"])
+def test_a_thread_that_lives_on_does_not_keep_the_program(name):
+    """It ends soon with its code, the trainer whatever signals come; the thread is named."""
     with subprocess.Popen(
-        [sys.executable, "-c", LIVES_ON], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", LIVES_ON, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:
         assert program.stdout.readline() == "ended\n"
-        program.send_signal(signal.SIGTERM)
+        if name == "train":
+            program.send_signal(signal.SIGTERM)
         began = time.monotonic()
         said = program.stderr.read()
 

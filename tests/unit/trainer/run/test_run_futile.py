@@ -60,6 +60,24 @@ def test_a_rollout_of_more_steps_than_the_run_is_told(play):
     assert "nothing was learned" not in word
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "line"),
+    [
+        ("DQN", {"train_freq": 1000}, "1000 steps come before each update"),
+        ("REINFORCE", {"episodes_per_update": 1000}, "1000 episodes are more than the run has"),
+        ("DQN", {"train_freq": [100, "episode"]}, "the run took more steps, because an update is due later"),
+    ],
+)
+def test_updates_that_are_rarer_than_the_steps_are_told(play, name, given, line):
+    """Of a run of two minutes the policy was updated once, and no line said so."""
+    off_policy = {"learning_starts": 4, "buffer_size": 100, "batch_size": 4} if name == "DQN" else {}
+
+    code, _, warned = play(name, **off_policy, **given)
+
+    assert code == 0
+    assert line in warned
+
+
 def test_a_run_that_learns_says_nothing_of_it(play):
     """The control."""
     assert play("DQN", learning_starts=10, buffer_size=100, batch_size=4) == (

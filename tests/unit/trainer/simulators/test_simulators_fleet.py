@@ -18,6 +18,7 @@ from palaestra_trainer.errors import (
     FaultBudgetSpent,
     SimulatorDead,
     SimulatorHung,
+    SimulatorRefused,
     WorldMisfit,
     WrongData,
 )
@@ -131,6 +132,18 @@ def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_con
 
     assert code == ExitCode.CONFIGURATION
     assert "use a multiple of the world's basicTimeStep" in last_word().reason
+    assert members["collect-0"].log.count("restart") == 1
+
+
+def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_configuration, last_word):
+    """It ends with exit code 2 each time; ten restarts would not mend PALAESTRA_STUB_FAULTS."""
+    said = "the simulator ended with code 2; it said last: there is no fault 'exit@step=45'"
+    starts = {number: SimulatorRefused("collect-0", said) for number in (1, 2, 3)}
+
+    code, members = play(make_configuration(), faults={"collect-0": {"starts": starts}})
+
+    assert code == ExitCode.CONFIGURATION
+    assert "there is no fault 'exit@step=45'" in last_word().reason
     assert members["collect-0"].log.count("restart") == 1
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import cast
 
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.type_aliases import TrainFreq, TrainFrequencyUnit
 
+from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.values import FIELD
 
 
@@ -18,8 +21,24 @@ def futile(model: BaseAlgorithm, steps: int) -> Iterator[str]:
             f"{FIELD}.learning_starts: {model.learning_starts} is not less than steps ({steps}), so nothing "
             "is learned; lower it, or raise steps"
         )
+    if isinstance(model, OffPolicyAlgorithm) and (rollout := _steps_of_rollout(model)) > steps:
+        yield (
+            f"{FIELD}.train_freq: {rollout} steps come before each update, and the run has {steps}, so it "
+            "learns once; lower it, or raise steps"
+        )
+    if isinstance(model, REINFORCE) and model.episodes_per_update >= steps:
+        yield (
+            f"{FIELD}.episodes_per_update: {model.episodes_per_update} episodes are more than the run has in "
+            f"{steps} steps, so it takes more steps, and learns once; lower it, or raise steps"
+        )
     if isinstance(model, OnPolicyAlgorithm) and (rollout := model.n_steps * model.n_envs) > steps:
         yield (
             f"{FIELD}.n_steps: a rollout is {rollout} steps ({model.n_steps} of each simulator), so the run "
             f"takes {rollout} steps, not {steps}, and learns once; lower it, or raise steps"
         )
+
+
+def _steps_of_rollout(model: OffPolicyAlgorithm) -> int:
+    """Return the steps of all members before an update; 0 if it waits for whole episodes."""
+    frequency = cast("TrainFreq", model.train_freq)
+    return frequency.frequency * model.n_envs if frequency.unit is TrainFrequencyUnit.STEP else 0

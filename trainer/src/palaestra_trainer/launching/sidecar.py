@@ -20,6 +20,7 @@ from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 
 _TIMEOUT_S = 5.0
 _POLL_S = 0.02
+_REFUSED = 2  # the exit code of our simulators for a world, an option or a variable that is wrong
 _MOST_BYTES = 65536
 _CONFLICT = 409
 
@@ -92,6 +93,11 @@ class Sidecar:
         if state.state in {SidecarState.STARTING, SidecarState.READY}:
             return None
         return state.detail or f"its state is {state.state.value}"
+
+    def refused(self) -> bool:
+        """Return whether it ended with the exit code 2, by which a program refuses what it is given."""
+        last = self.state().last_exit
+        return last is not None and last.code == _REFUSED
 
     def wait_stopped(self, deadline_s: float) -> None:
         """Return when the simulator has ended.

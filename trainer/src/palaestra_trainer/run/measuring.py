@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from palaestra_protocol.pod.terms import Role
+import structlog
+
+from palaestra_protocol.pod.terms import ExitCode, Role
 from palaestra_trainer import algorithms, checkpoint
-from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.episodes.evaluation import evaluate_on_all
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run.training import MakeMembers, use_threads
+from palaestra_trainer.run.training import STOPPED_S, MakeMembers, use_threads
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.member import NullWatcher
+from palaestra_trainer.waiting.leaving import leave_after
+
+log = structlog.get_logger(__name__)
+
+
+def _nobody(result: dict[str, Any]) -> None:
+    """Report to nobody."""
 
 
 def measure(
@@ -26,18 +36,26 @@ def measure(
     *,
     episodes: int,
     stream: str,
+    report: Callable[[dict[str, Any]], object] = _nobody,
 ) -> dict[str, Any]:
     """Return the evaluation of a run directory's model, in the first `episodes` episodes of a seed stream.
 
-    Only the configuration's evaluating simulators are created and started.
+    Only the configuration's evaluating simulators are created and started; without one, a collecting one is.
+
+    Args:
+        configuration: of the run.
+        model: the file.
+        make_members: makes the simulators.
+        episodes: how many.
+        stream: name of the seed stream.
+        report: called with the result, before simulators are stopped; if they are not after a minute, the
+            process ends.
 
     Raises:
-        ConfigurationError: the model is missing or does not fit, or no simulator evaluates.
+        ConfigurationError: the model is missing or does not fit.
         FaultBudgetSpent: a simulator broke more often than its budget allows.
     """
-    evaluating = configuration.with_role(Role.EVALUATE)
-    if not evaluating:
-        raise ConfigurationError("simulators: none has role Evaluate; give one of them that role")
+    evaluating = _evaluating(configuration)
     if not model.exists():
         raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
     use_threads()
@@ -54,8 +72,21 @@ def measure(
         checkpoint.load_tensors(model, trained)
         seeds = episode_seeds(configuration.seed, stream, episodes)
         evaluation = evaluate_on_all(algorithms.policy_of(trained), fleet.evaluating, seeds)
-    return evaluation.summary() | {
-        "seeds": stream,
-        "run_seed": configuration.seed,
-        "seconds": round(evaluation.seconds, 2),
-    }
+        result = evaluation.summary() | {
+            "seeds": stream,
+            "run_seed": configuration.seed,
+            "seconds": round(evaluation.seconds, 2),
+        }
+        report(result)
+        hurry = leave_after(STOPPED_S, ExitCode.DONE)
+    hurry.cancel()
+    return result
+
+
+def _evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
+    """Return the simulators to evaluate on: those of that role, else a collecting one."""
+    if found := configuration.with_role(Role.EVALUATE):
+        return found
+    collecting = configuration.with_role(Role.COLLECT)[0]
+    log.warning("no simulator has role Evaluate: the world is that of a collecting one", name=collecting.name)
+    return (collecting.model_copy(update={"role": Role.EVALUATE}),)

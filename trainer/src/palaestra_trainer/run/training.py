@@ -63,9 +63,10 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
+_FAR_BEYOND = 1.5  # times the steps of the job; a last rollout usually goes a little beyond
 STOPPED_S = 60.0  # for closing environments and stopping simulators
 # Code of the job's author may end the program, as by sys.exit.
-ENDING = (Exception, SystemExit, KeyboardInterrupt)
+ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +180,8 @@ class Attempt:
     def _trained(self, stack: ExitStack) -> End:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
-            learned = self._train(*self._prepare(stack))
+            with self._watchdog():  # it ends before everything is stopped, which has a time of its own
+                learned = self._train(*self._prepare(stack))
         except ENDING as error:  # the edge of the process: every end has an exit code
             return _logged(error)
         return DONE if learned else NOTHING_LEARNED
@@ -208,7 +210,6 @@ class Attempt:
         algorithms.check(configuration.algorithm)
         self._callbacks = make_callbacks(configuration.algorithm.callbacks or ())
         interruption = stack.enter_context(Interruption())
-        self._watch(stack)
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
@@ -298,8 +299,15 @@ class Attempt:
         with self._progress.spending(Cause.LEARNING):
             conductor = Conductor(run, env, resumed)
             self._learn_with_callbacks(model, conductor)
+        self._tell_if_it_took_longer()
         write_summary(self._directory, summarise(self._directory, self._progress))
         return self._algorithm.name not in algorithms.ALGORITHMS or conductor.updates_so_far() > 0
+
+    def _tell_if_it_took_longer(self) -> None:
+        """Log when an update that waits for whole episodes took the run far beyond its steps."""
+        wanted, taken = self._configuration.steps, self._progress.step
+        if taken > _FAR_BEYOND * wanted:
+            log.warning("the run took more steps, because an update is due later", wanted=wanted, taken=taken)
 
     def _forget_what_is_played_again(self) -> None:
         """Remove evaluations and curves after the resumed step, which a previous attempt wrote."""
@@ -368,13 +376,11 @@ class Attempt:
             Learner(model).check(model.num_timesteps)
             raise
 
-    def _watch(self, stack: ExitStack) -> None:
-        stack.enter_context(
-            Watchdog(
-                self._progress.idle_s,
-                self._configuration.stall_deadline_seconds,
-                lambda: write_last_word(self.last_word(stalled(self._progress))),
-            )
+    def _watchdog(self) -> Watchdog:
+        return Watchdog(
+            self._progress.idle_s,
+            self._configuration.stall_deadline_seconds,
+            lambda: write_last_word(self.last_word(stalled(self._progress))),
         )
 
 

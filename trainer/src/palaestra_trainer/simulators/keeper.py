@@ -27,6 +27,7 @@ from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,
     SimulatorFault,
+    SimulatorRefused,
     WorldMisfit,
     WrongData,
 )
@@ -271,7 +272,8 @@ class Keeper:
         """Return what a fault of another process must be equal to, to show a mistake; "" if it shows none."""
         if isinstance(fault, WorldMisfit):
             return "" if self.stepped else WorldMisfit.__name__
-        return str(fault) if isinstance(fault, WrongData) and not self.meter.stepped else ""
+        refused = isinstance(fault, WrongData | SimulatorRefused)
+        return str(fault) if refused and not self.meter.stepped else ""
 
     def _lose(self, spent: FaultBudgetSpent) -> None:
         log.error("simulator given up: the others go on", simulator=self.name, fact=str(spent))

@@ -34,6 +34,10 @@ class Attached:
         """Return why it cannot be used; called only while it does not answer."""
         return "no simulator answers under this name; start it, or remove launcher=Attached()"
 
+    def refused(self) -> bool:
+        """Return False: nobody here knows its exit code."""
+        return False
+
     def wait_stopped(self, deadline_s: float) -> None:
         """Do nothing."""
         del deadline_s

@@ -13,7 +13,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, TrainerError
+from palaestra_trainer.errors import (
+    SimulatorDead,
+    SimulatorFault,
+    SimulatorHung,
+    SimulatorRefused,
+    TrainerError,
+)
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.observer import Mode, Observer
@@ -48,6 +54,10 @@ class Launcher(Protocol):
 
     def failure(self) -> str | None:
         """Return why it is no longer running; None while it runs or starts."""
+        ...
+
+    def refused(self) -> bool:
+        """Return whether it ended with the exit code 2, by which a program refuses what it is given."""
         ...
 
     def wait_stopped(self, deadline_s: float) -> None:
@@ -156,14 +166,15 @@ class Webots:
         """Return when the simulator answers, after a start or a reload.
 
         Raises:
-            SimulatorDead: its process ended.
+            SimulatorDead: its process ended; SimulatorRefused, if that refused what it was given.
             SimulatorHung: it did not answer in time.
         """
         give_up = time.monotonic() + self._start_deadline_s
         while not self.available():
             failure = self._launcher.failure()
             if failure is not None:
-                raise SimulatorDead(self.supervisor_node_name, failure)
+                kind = SimulatorRefused if self._launcher.refused() else SimulatorDead
+                raise kind(self.supervisor_node_name, failure)
             if time.monotonic() > give_up:
                 raise SimulatorHung(
                     self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
