@@ -17,6 +17,7 @@ TrainerError
 ├── Paused               a step was requested while the simulation is paused
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed
+    │   └── SimulatorRefused  its process ended with the exit code of a wrong input
     ├── SimulatorHung    it is connected and does not answer in time
     └── WrongData        it answered with invalid data
         └── WorldMisfit  its world lacks a device or node that the program needs
