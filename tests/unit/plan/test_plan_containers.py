@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra.api.container import Resources
-from palaestra.plan import resources
+from palaestra.local.spec import read_pod
+from palaestra.plan import Images, LocalLayout, plan, resources
 
 TWO_GROUPS = [
     {"name": "collect", "role": "Collect", "count": 2},
@@ -191,6 +192,53 @@ COMMAND = [
     {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim", "{world}"]},
     {"name": "evaluate", "role": "Evaluate"},
 ]
+
+
+OF_POD = "$(PALAESTRA_POD_UID)"
+
+
+@pytest.mark.parametrize("where", ["in_cluster", "on_laptop"])
+def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
+    """A kubelet expands $(NAME) in commands, arguments and values, and the pod has variables of others."""
+    env = [{"name": "OWN", "value": OF_POD}]
+    own = {
+        "name": "own",
+        "role": "Collect",
+        "driver": "command",
+        "image": "my:1",
+        "command": ["sim", OF_POD],
+        "options": [OF_POD],
+        "world": {"file": f"/worlds/{OF_POD}/hall.wbt"},
+        "env": env,
+    }
+    job = {"simulators": [own], "trainer": {"command": ["python", OF_POD], "env": env}}
+    job["trainer"]["evaluation"] = {"everySteps": 0}
+
+    planned = containers(request.getfixturevalue(where)(**job))
+
+    texts = [
+        text
+        for each in planned.values()
+        for text in (
+            *each["command"],
+            *each.get("args", ()),
+            *(one.get("value", "") for one in each.get("env", ())),
+        )
+    ]
+    assert sum(OF_POD in text for text in texts) == 6
+    assert not [text for text in texts if OF_POD in text.replace("$$", "")]
+
+
+def test_a_run_directory_may_have_a_dollar_in_its_name(make_job):
+    """Two of them in a plan are one to whoever reads it as a kubelet does."""
+    layout = LocalLayout(images=Images.of_release("1"), job_directory="/runs/$(id)$$/job")
+    replica = plan(make_job(), layout).replicas[0]
+    pod = read_pod(replica.job["spec"]["template"], "uid")
+
+    paths = [*pod.init[1].command, *pod.main.env.values()]
+
+    assert [text for text in paths if "$(id)$$/job" in text]
+    assert not [text for text in paths if "$(id)$/job" in text or "$$(id)" in text]
 
 
 def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluster):
