@@ -185,7 +185,10 @@ def test_the_memory_that_a_job_asks_for_takes_the_place_of_mujoco_s(in_cluster):
 
     planned = containers(in_cluster(simulators=[mujoco], trainer={"evaluation": {"everySteps": 0}}))
 
-    assert planned["sim-a-0"]["resources"] == {"requests": {"cpu": "75m", "memory": "1Gi"}}
+    assert planned["sim-a-0"]["resources"] == {
+        "requests": {"cpu": "75m", "memory": "1Gi"},
+        "limits": {"memory": "2Gi"},
+    }
 
 
 COMMAND = [
@@ -300,7 +303,14 @@ def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_lap
     [
         ({}, {"requests": {"cpu": "1", "memory": "1Gi"}, "limits": {"cpu": "2"}}),
         ({"limits": {"cpu": "500m"}}, {"requests": {"memory": "1Gi"}, "limits": {"cpu": "500m"}}),
-        ({"requests": {"cpu": "8"}}, {"requests": {"memory": "1Gi", "cpu": "8"}}),
+        (
+            {"requests": {"cpu": "8"}},
+            {"requests": {"memory": "1Gi", "cpu": "8"}, "limits": {"cpu": "8"}},
+        ),
+        (
+            {"requests": {"cpu": "1500m"}, "limits": {"cpu": "3"}},
+            {"requests": {"memory": "1Gi", "cpu": "1500m"}, "limits": {"cpu": "3"}},
+        ),
     ],
 )
 def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
@@ -308,6 +318,36 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
     default = Resources(requests={"cpu": "1", "memory": "1Gi"}, limits={"cpu": "2"})
 
     assert resources.resources(Resources(**wanted), default) == planned
+
+
+@pytest.mark.parametrize(
+    ("requested", "limit"),
+    [
+        pytest.param("1Gi", "2Gi", id="less than the default"),
+        pytest.param("2048Mi", "2Gi", id="as much in another unit"),
+        pytest.param("3G", "3G", id="more"),
+    ],
+)
+@pytest.mark.parametrize("container", ["trainer", "sim-collect-0"])
+def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, requested, limit):
+    """The author of a job could otherwise use all memory of a node, and end the pods of others there."""
+    wanted = {"resources": {"requests": {"memory": requested}}}
+    group = {"name": "collect", "role": "Collect"} | (wanted if container != "trainer" else {})
+    trainer = {"evaluation": {"everySteps": 0}} | (wanted if container == "trainer" else {})
+
+    planned = containers(in_cluster(simulators=[group], trainer=trainer))[container]["resources"]
+
+    assert (planned["requests"]["memory"], planned["limits"]["memory"]) == (requested, limit)
+
+
+def test_every_container_has_a_limit_of_its_memory(in_cluster):
+    """Whatever a job asks for."""
+    requests = {"resources": {"requests": {"memory": "1Gi", "cpu": "2"}}}
+    groups = [{**group, **requests} for group in TWO_GROUPS]
+
+    planned = containers(in_cluster(simulators=groups, trainer=requests))
+
+    assert all("memory" in each["resources"]["limits"] for each in planned.values())
 
 
 STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "evaluate", "role": "Evaluate"}]
@@ -363,13 +403,18 @@ def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
 
 
 @pytest.mark.parametrize(
-    ("limits", "size"), [({"memory": "6Gi"}, {"sizeLimit": "6Gi"}), ({"cpu": "2"}, None)]
+    ("wanted", "size"),
+    [
+        ({"limits": {"memory": "6Gi"}}, "6Gi"),
+        ({"limits": {"cpu": "2"}}, "2Gi"),
+        ({"requests": {"memory": "3Gi"}}, "3Gi"),
+    ],
 )
-def test_the_trainer_shares_memory_within_its_limit(in_cluster, limits, size):
+def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
     """Workers of a DataLoader or an AsyncVectorEnv need more than the 64 MiB of a container runtime."""
-    planned = in_cluster(trainer={"resources": {"limits": limits}})
+    planned = in_cluster(trainer={"resources": wanted})
     volumes = planned.replicas[0].job["spec"]["template"]["spec"]["volumes"]
     mounts = {each["mountPath"]: each["name"] for each in containers(planned)["trainer"]["volumeMounts"]}
 
     [volume] = [each["emptyDir"] for each in volumes if each["name"] == mounts["/dev/shm"]]
-    assert volume == {"medium": "Memory", **(size or {"sizeLimit": "2Gi"})}
+    assert volume == {"medium": "Memory", "sizeLimit": size}

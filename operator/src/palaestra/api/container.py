@@ -69,4 +69,6 @@ class Resources(ApiModel):
     requests."""
 
     limits: Quantities = Field(default={})
-    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads."""
+    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads. If
+    only `requests` names CPU or memory, Palaestra's default limit stays, raised to the request if that is
+    more."""
