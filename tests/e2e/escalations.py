@@ -256,6 +256,13 @@ HELD = (
         "SecretNotForJobs",
     ),
     Field(
+        "a pull secret of this namespace",
+        "Its images would run, and be read.",
+        "spec.imagePullSecrets",
+        [{"name": "words"}],
+        "SecretNotForJobs",
+    ),
+    Field(
         "a ConfigMap of this namespace",
         "Its text would be in the replica's.",
         "spec.simulators.0.world",

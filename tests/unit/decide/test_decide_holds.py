@@ -75,6 +75,15 @@ def held(scene):
             id="a Secret of somebody else",
         ),
         pytest.param(
+            {"imagePullSecrets": [{"name": "keys"}]},
+            {("Secret", "keys"): {"metadata": {"name": "keys"}}},
+            "SecretNotForJobs",
+            "spec.imagePullSecrets[0]: Secret keys is not for jobs, or the operator has no "
+            'permission to read its labels; label it palaestra.dev/for-jobs: "true" and bind the role '
+            "palaestra-job-secrets in this namespace",
+            id="a pull Secret of somebody else",
+        ),
+        pytest.param(
             {"storage": {"existingClaim": "runs"}},
             {},
             "ClaimMissing",
@@ -132,6 +141,7 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
     [
         ({"simulators": WORLD}, "ConfigMap", "worlds"),
         ({"trainer": SECRET}, "Secret", "keys"),
+        ({"imagePullSecrets": [{"name": "keys"}]}, "Secret", "keys"),
         ({"storage": {"existingClaim": "runs"}}, "PersistentVolumeClaim", "runs"),
         ({"trainer": INITIAL}, "PersistentVolumeClaim", "runs"),
     ],

@@ -187,13 +187,13 @@ ROWS: dict[Reason, Row] = {
     Reason.SECRET_MISSING: Row(
         "{field}: Secret {name} does not exist in this namespace; "
         'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
-        "the Secret of a variable does not exist",
+        "the Secret of a variable or of `imagePullSecrets` does not exist",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.SECRET_NOT_FOR_JOBS: Row(
         "{field}: Secret {name} is not for jobs, or the operator has no permission to read its labels; "
         'label it palaestra.dev/for-jobs: "true" and bind the role palaestra-job-secrets in this namespace',
-        "a job may read only Secrets with the label, and the operator must be allowed to check it",
+        "a job may use only Secrets with the label, and the operator must be allowed to check it",
         "ask the owner of the Secret to set the label and to bind the role `palaestra-job-secrets`: see "
         "Secrets below",
     ),
