@@ -40,6 +40,11 @@ MODES: dict[str, Values] = {
         "jobs": {
             "allowedPodLabels": ["example.com/"],
             "allowedPodAnnotations": ["example.com/", "note"],
+            "allowedPriorityClasses": ["urgent"],
+            "allowedRuntimeClasses": ["nvidia"],
+            "allowedTolerations": ["dedicated", "example.com/"],
+            "allowedAffinityNamespaces": ["storage"],
+            "allowedAntiAffinityLabels": ["palaestra.dev/job"],
             "nodeSelector": {"kubernetes.io/os": "linux"},
         },
         "serviceAccount": {"create": False, "name": "existing"},

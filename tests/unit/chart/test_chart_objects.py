@@ -12,6 +12,7 @@ import yaml
 import palaestra.api
 from palaestra.api.crd import crd
 from palaestra.cli import operator
+from palaestra.cli.operator import ALLOWANCES
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
 from palaestra_trainer.run.tensorboard_link import FOLDER
@@ -155,14 +156,19 @@ def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
     """In the words of its command line; by default nothing is allowed and nothing asked for."""
     closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
 
-    assert closed.allowed_pod_labels == ["example.com/"]
-    assert closed.allowed_pod_annotations == ["example.com/", "note"]
+    allowances = [field for _, field, *_ in ALLOWANCES]
+    assert {field: getattr(closed, field) for field in allowances} == {
+        "pod_labels": ["example.com/"],
+        "pod_annotations": ["example.com/", "note"],
+        "priority_classes": ["urgent"],
+        "runtime_classes": ["nvidia"],
+        "tolerations": ["dedicated", "example.com/"],
+        "affinity_namespaces": ["storage"],
+        "anti_affinity_labels": ["palaestra.dev/job"],
+    }
+    assert {field: getattr(default, field) for field in allowances} == {field: [] for field in allowances}
     assert dict(closed.node_selector) == {"kubernetes.io/os": "linux"}
-    assert (default.allowed_pod_labels, default.allowed_pod_annotations, default.node_selector) == (
-        [],
-        [],
-        [],
-    )
+    assert default.node_selector == []
 
 
 def test_the_operator_s_defaults_are_those_of_its_release(one):

@@ -8,7 +8,7 @@ import pytest
 from palaestra.api.status import Phase
 from palaestra.decide import Create, accept, prepare, wants_whole, worlds_to_check
 from palaestra.observe import Lacking, Objects, observe, references
-from palaestra.plan import Verdict
+from palaestra.plan import Allowed, Verdict
 from tests.e2e.escalations import METADATA
 
 INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
@@ -268,7 +268,7 @@ def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scen
 def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, key, holds):
     """A part of a domain may be somebody else's."""
     scene = make_scene(scheduling={"podAnnotations": {key: "x"}})
-    scene.layout = replace(scene.layout, allowed_pod_annotations=allowed, allowed_pod_labels=())
+    scene.layout = replace(scene.layout, allowed=Allowed(pod_annotations=allowed))
 
     scene.settle()
 
@@ -281,7 +281,8 @@ def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_lo
     scene.settle()
     assert held(scene)[0] == "PodMetadataNotAllowed"
 
-    default, scene.layout = scene.layout, replace(scene.layout, allowed_pod_labels=("example.com/",))
+    allowed = Allowed(pod_labels=("example.com/",))
+    default, scene.layout = scene.layout, replace(scene.layout, allowed=allowed)
     decision = scene.settle()
     labels = decision.actions[-1].object["spec"]["template"]["metadata"]["labels"]
     scene.layout = default

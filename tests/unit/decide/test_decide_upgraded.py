@@ -5,7 +5,16 @@ import pytest
 from palaestra.api.status import Phase
 
 # What this release no longer accepts in a new job.
+ANTI_AFFINITY = {
+    "requiredDuringSchedulingIgnoredDuringExecution": [
+        {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
+    ]
+}
 ACCEPTED_EARLIER = {
+    "a priority": {"scheduling": {"priorityClassName": "urgent"}},
+    "a runtime": {"scheduling": {"runtimeClassName": "kata"}},
+    "a toleration": {"scheduling": {"tolerations": [{"key": "dedicated", "operator": "Exists"}]}},
+    "an anti-affinity": {"scheduling": {"affinity": {"podAntiAffinity": ANTI_AFFINITY}}},
     "a pull Secret without the label": {"imagePullSecrets": [{"name": "registry"}]},
 }
 

@@ -69,8 +69,14 @@ def threads(planned: Planned) -> int:
 
 def asks_for_gpu(wanted: Resources) -> bool:
     """Return whether requests or limits name a GPU, such as nvidia.com/gpu, and more than none of it."""
-    quantities = (*wanted.requests.items(), *wanted.limits.items())
-    return any(name.endswith("/gpu") and Decimal(_split(quantity)[0]) > 0 for name, quantity in quantities)
+    names = (*wanted.requests, *wanted.limits)
+    return any(name.endswith("/gpu") and asks_for(name, wanted) for name in names)
+
+
+def asks_for(resource: str, wanted: Resources) -> bool:
+    """Return whether requests or limits name a resource, and more than none of it."""
+    quantities = (wanted.requests.get(resource, "0"), wanted.limits.get(resource, "0"))
+    return any(_amount(quantity) > 0 for quantity in quantities)
 
 
 def _amount(quantity: str) -> Decimal:
