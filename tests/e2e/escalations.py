@@ -211,6 +211,13 @@ REFUSED = (
         "spec.simulators[0].name",
     ),
     Field(
+        "a password in an address",
+        "Everybody who may read TrainingJobs reads it.",
+        "spec.trainer.env",
+        [{"name": "MLFLOW_TRACKING_URI", "value": "http://me:secret@tracking.example.com"}],
+        "contains a password in an address",
+    ),
+    Field(
         "a master elsewhere",
         "The operator's settings of a trainer are its own.",
         "spec.trainer.env",

@@ -204,6 +204,22 @@ def test_what_nobody_can_mend_fails_at_once(make_scene):
     assert decision.actions == ()
 
 
+def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
+    """It is compromised: everybody who may read TrainingJobs has seen it."""
+    option = {"name": "my:Tracker", "options": {"uri": "http://me:secret@tracking.example.com"}}
+    scene = make_scene(trainer={"algorithm": {"callbacks": [option]}})
+
+    decision = scene.settle()
+
+    assert (scene.status.phase, decision.actions) == (Phase.FAILED, ())
+    reason, message = held(scene)
+    assert reason == "InvalidSpec"
+    assert message == (
+        "spec.trainer.algorithm.callbacks[0].options: contains a password in an address; "
+        "pass it in an environment variable with secretKeyRef"
+    )
+
+
 def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scene):
     """Its copy is in the job's own ConfigMap."""
     scene = make_scene(simulators=WORLD)

@@ -10,7 +10,9 @@ ANTI_AFFINITY = {
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
     ]
 }
+ADDRESS = "http://me:secret@tracking.example.com"
 ACCEPTED_EARLIER = {
+    "a password": {"trainer": {"env": [{"name": "MLFLOW_TRACKING_URI", "value": ADDRESS}]}},
     "a priority": {"scheduling": {"priorityClassName": "urgent"}},
     "a runtime": {"scheduling": {"runtimeClassName": "kata"}},
     "a toleration": {"scheduling": {"tolerations": [{"key": "dedicated", "operator": "Exists"}]}},

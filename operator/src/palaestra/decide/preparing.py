@@ -7,7 +7,7 @@ release, has no effect on it.
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from palaestra.api import TrainingJob
+from palaestra.api import TrainingJob, broken_guards
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL
 from palaestra.decide.allowing import not_allowed
@@ -92,10 +92,16 @@ def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout)
 
 
 def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
-    """Return the first hold; what the installation allows is checked before acceptance only."""
-    if job.status.release is None and (hold := not_allowed(job, layout.allowed)) is not None:
+    """Return the first hold; what a new job may ask for is checked before acceptance only."""
+    if job.status.release is None and (hold := _held_as_new(job, layout)) is not None:
         return hold
     return next((found for check in HOLDS if (found := check(job, observed))), None)
+
+
+def _held_as_new(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
+    if problems := broken_guards(job):
+        return held(Reason.INVALID_SPEC, final=True, problem="; ".join(problems))
+    return not_allowed(job, layout.allowed)
 
 
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
