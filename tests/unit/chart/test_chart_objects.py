@@ -360,6 +360,26 @@ def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
     assert not re.fullmatch(keep["regex"], "ros")
 
 
+def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
+    """A program of a job's author answers there, and could give Prometheus a million series."""
+    bounded = one("monitored", "PodMonitor", "palaestra-training")["spec"]
+    [none] = [
+        each
+        for each in objects(
+            {
+                "monitoring": {
+                    "podMonitor": {"enabled": True, "sampleLimit": 0, "labelLimit": 0, "bodySizeLimit": 0}
+                }
+            }
+        )
+        if each["kind"] == "PodMonitor"
+    ]
+
+    limits = {name: bounded.get(name) for name in ("sampleLimit", "labelLimit", "bodySizeLimit")}
+    assert limits == {"sampleLimit": 2000, "labelLimit": 32, "bodySizeLimit": "1MB"}
+    assert not limits.keys() & none["spec"].keys()
+
+
 def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm
     """One number, in four places."""
     chart = yaml.safe_load((CHART / "Chart.yaml").read_text())
