@@ -36,6 +36,7 @@ MODES: dict[str, Values] = {
             "affinity": {"nodeAffinity": {}},
             "podAnnotations": {"example.com/team": "robots"},
             "podLabels": {"team": "robots"},
+            "hostUsers": False,
         },
         "jobs": {
             "allowedPodLabels": ["example.com/"],
@@ -46,6 +47,7 @@ MODES: dict[str, Values] = {
             "allowedAffinityNamespaces": ["storage"],
             "allowedAntiAffinityLabels": ["palaestra.dev/job"],
             "nodeSelector": {"kubernetes.io/os": "linux"},
+            "hostUsers": False,
         },
         "serviceAccount": {"create": False, "name": "existing"},
     },

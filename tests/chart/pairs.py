@@ -56,6 +56,7 @@ OTHERS: dict[str, Any] = {
     "jobs.allowedAffinityNamespaces": ["storage"],
     "jobs.allowedAntiAffinityLabels": ["palaestra.dev/job"],
     "jobs.nodeSelector": LABELS,
+    "jobs.hostUsers": False,
     "test.enabled": False,
     "test.namespace": "elsewhere",
     "test.deadlineSeconds": 60,

@@ -169,6 +169,15 @@ def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
     assert {field: getattr(default, field) for field in allowances} == {field: [] for field in allowances}
     assert dict(closed.node_selector) == {"kubernetes.io/os": "linux"}
     assert default.node_selector == []
+    assert (closed.host_users, default.host_users) == (False, True)
+
+
+def test_a_pod_has_a_user_namespace_only_where_it_is_asked_for(one):
+    """A node without support for it never starts the pod."""
+    closed, default = (one(mode, "Deployment")["spec"]["template"]["spec"] for mode in ("closed", "default"))
+
+    assert closed["hostUsers"] is False
+    assert "hostUsers" not in default
 
 
 def test_the_operator_s_defaults_are_those_of_its_release(one):

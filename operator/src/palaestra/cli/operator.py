@@ -63,6 +63,7 @@ def add(commands: Commands) -> None:
     )
     _add_cluster(parser)
     _add_pods(parser)
+    _add_users(parser)
     _add_images(parser)
 
 
@@ -114,6 +115,15 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="label that the nodes of training pods must have, unless a job sets another value; "
         "may be repeated; default: none",
+    )
+
+
+def _add_users(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--host-users",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="give training pods the users of their nodes; no: a user namespace for each pod; default: yes",
     )
 
 
@@ -185,6 +195,7 @@ def _operator(options: argparse.Namespace) -> int:
             leader_elect=options.leader_elect,
             metrics_address=address(options.metrics_address),
             node_selector=dict(options.node_selector),
+            host_users=options.host_users,
             allowed=Allowed(**{field: tuple(getattr(options, field)) for _, field, *_ in ALLOWANCES}),
             kubeconfig=options.kubeconfig,
             context=options.context,

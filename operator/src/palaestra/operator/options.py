@@ -27,6 +27,7 @@ class Options:
         leader_elect: whether to wait for the Lease.
         metrics_address: host and port of /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
+        host_users: whether training pods have the users of their nodes; if not, each has a user namespace.
         allowed: what jobs may ask for beyond their own pods.
         kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
@@ -41,6 +42,7 @@ class Options:
     leader_elect: bool = True
     metrics_address: Address = METRICS_ADDRESS
     node_selector: Mapping[str, str] = field(default_factory=dict)
+    host_users: bool = True
     allowed: Allowed = field(default_factory=Allowed)
     kubeconfig: str | None = None
     context: str | None = None

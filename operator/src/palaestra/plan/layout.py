@@ -128,6 +128,11 @@ class Layout(Protocol):
         """Labels that the node of every pod must have, unless the job gives such a label itself."""
         ...
 
+    @property
+    def host_users(self) -> bool:
+        """Whether the users in a pod are those of its node; False: each pod has a user namespace."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -152,6 +157,7 @@ class ClusterLayout:
     operator_namespace: str = "palaestra-system"
     monitoring_namespace: str = "monitoring"
     node_selector: Mapping[str, str] = field(default_factory=dict)
+    host_users: bool = True
     allowed: Allowed = Allowed()
 
     def places(self, uid: str, replica: int, container: str) -> Places:
@@ -188,6 +194,7 @@ class LocalLayout:
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
+    host_users: bool = True
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the places of one container, all below `<job_directory>/<replica>`."""

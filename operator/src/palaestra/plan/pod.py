@@ -39,6 +39,7 @@ def pod_template(
             "restartPolicy": "Never",
             "automountServiceAccountToken": False,
             "enableServiceLinks": False,
+            **({} if replica.layout.host_users else {"hostUsers": False}),
             "terminationGracePeriodSeconds": GRACE_S,
             "securityContext": {**UNPRIVILEGED, "fsGroup": USER, "fsGroupChangePolicy": "OnRootMismatch"},
             **_scheduling(replica),
