@@ -219,7 +219,7 @@ ROWS: dict[Reason, Row] = {
         "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)); the job then starts",
     ),
     Reason.SCHEDULING_NOT_ALLOWED: Row(
-        "{field}: {fact} is not allowed in this cluster; {remedy}, or create a new TrainingJob without it",
+        "{field}: {fact} is not allowed in this cluster; {remedy}",
         "a priority, a runtime class, a toleration or an affinity to other pods affects what others run; an "
         "installation allows only those that it names",
         "allow what the message names with the value of the chart that it names "

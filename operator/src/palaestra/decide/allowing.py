@@ -33,9 +33,9 @@ def pod_metadata_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
         ("podLabels", "allowedPodLabels", scheduling.pod_labels, allowed.pod_labels),
         ("podAnnotations", "allowedPodAnnotations", scheduling.pod_annotations, allowed.pod_annotations),
     ):
-        if refused := next((key for key in sorted(keys) if not _allows(known, key)), None):
+        if refused := [key for key in sorted(keys) if not _allows(known, key)]:
             where = f"spec.scheduling.{field}"
-            return held(Reason.POD_METADATA_NOT_ALLOWED, field=where, key=refused, value=f"jobs.{value}")
+            return held(Reason.POD_METADATA_NOT_ALLOWED, field=where, key=refused[0], value=f"jobs.{value}")
     return None
 
 
@@ -70,10 +70,10 @@ def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold 
     terms = (term for kind, strength in product(KINDS, STRENGTHS) for term in _terms(job, kind, strength))
     for where, term in terms:
         if term.get("namespaceSelector") is not None:
-            remedy = "name the namespaces in `namespaces`"
+            remedy = "create a new TrainingJob that names the namespaces"
             return _not_allowed(f"{where}.namespaceSelector", "an affinity to selected namespaces", remedy)
-        if refused := next((name for name in _listed(term, "namespaces") if name not in known), None):
-            fact = f"affinity to pods of namespace {refused}"
+        if refused := [name for name in _listed(term, "namespaces") if name not in known]:
+            fact = f"affinity to pods of namespace {refused[0]}"
             return _to_allow(f"{where}.namespaces", fact, "allowedAffinityNamespaces")
     return None
 
@@ -84,8 +84,8 @@ def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold 
         selector = term.get("labelSelector")
         if selector is not None and not _selects_own(job, term) and not _selects_allowed(selector, allowed):
             remedy = (
-                f"select the job's own pods by {JOB_LABEL}: {job.metadata.name}, or allow a label of the "
-                "selector with the chart's value jobs.allowedAntiAffinityLabels"
+                f"create a new TrainingJob that selects its own pods by {JOB_LABEL}: {job.metadata.name}, or "
+                "allow a label of the selector with the chart's value jobs.allowedAntiAffinityLabels"
             )
             fact = "a required anti-affinity to pods of other jobs"
             return _not_allowed(f"{where}.labelSelector", fact, remedy)
@@ -109,7 +109,8 @@ def not_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def _to_allow(field: str, fact: str, value: str) -> Hold:
-    return _not_allowed(field, fact, f"allow it with the chart's value jobs.{value}")
+    remedy = f"allow it with the chart's value jobs.{value}, or create a new TrainingJob without it"
+    return _not_allowed(field, fact, remedy)
 
 
 def _not_allowed(field: str, fact: str, remedy: str) -> Hold:
