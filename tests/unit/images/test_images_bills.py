@@ -3,6 +3,7 @@
 import io
 import json
 import tarfile
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -34,11 +35,11 @@ def add(archive, name, content):
     archive.addfile(member, io.BytesIO(content))
 
 
-def layer(**files):
-    """Return a layer: the bytes of a tar archive of files, by their paths."""
+def layer(*files):
+    """Return a layer: the bytes of a tar archive of files, each with its path and its text."""
     written = io.BytesIO()
     with tarfile.open(fileobj=written, mode="w") as archive:
-        for path, text in files.items():
+        for path, text in files:
             add(archive, path, text.encode())
     return written.getvalue()
 
@@ -73,8 +74,8 @@ def listed(bill):
 
 def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
     """A scanner finds by it what is affected by a new vulnerability."""
-    debian = layer(**{"var/lib/dpkg/status": STATUS})
-    built = image(debian, layer(**dict([metadata("Ruamel.Yaml"), metadata("numpy", "2.5")])))
+    debian = layer(("var/lib/dpkg/status", STATUS))
+    built = image(debian, layer(metadata("Ruamel.Yaml"), metadata("numpy", "2.5")))
 
     bill = bills.of_image(built)
 
@@ -90,30 +91,26 @@ def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
 
 def test_a_package_that_a_later_layer_removes_is_not_listed(image):
     """The trainer's image is built with some that it does not keep."""
-    path, text = metadata("hatchling")
-    folder = path.rpartition("/")[0]
-    kept = metadata("numpy")
-    removed = f"{folder.rpartition('/')[0]}/.wh.{folder.rpartition('/')[2]}"
+    installed = layer(metadata("hatchling"), metadata("numpy"))
+    removal = layer((f"{SITE}/.wh.hatchling-1.2.dist-info", ""))
 
-    bill = bills.of_image(image(layer(**{path: text, kept[0]: kept[1]}), layer(**{removed: ""})))
+    bill = bills.of_image(image(installed, removal))
 
     assert listed(bill) == ["pkg:pypi/numpy@1.2"]
 
 
 def test_a_folder_that_a_later_layer_replaces_is_not_listed(image):
     """The layer's mark stands for all that was in the folder."""
-    first, second = metadata("numpy"), metadata("numpy", "2.5")
+    replacement = layer((f"{SITE}/.wh..wh..opq", ""), metadata("numpy", "2.5"))
 
-    bill = bills.of_image(
-        image(layer(**dict([first])), layer(**{f"{SITE}/.wh..wh..opq": "", second[0]: second[1]}))
-    )
+    bill = bills.of_image(image(layer(metadata("numpy")), replacement))
 
     assert listed(bill) == ["pkg:pypi/numpy@2.5"]
 
 
 def test_a_bill_is_the_same_for_the_same_image_and_goes_with_its_archive(image):
     """It can be compared, and says nothing of an image that is gone."""
-    built = image(layer(**dict([metadata("numpy")])))
+    built = image(layer(metadata("numpy")))
     first = bills.of_image(built).read_text()
     old = built.archive.with_name("operator-old.tar.cdx.json")
     old.write_text("{}")
@@ -136,7 +133,7 @@ def test_a_bill_of_a_wheel_lists_what_it_was_tested_with(tmp_path):
     """With the hashes of the lock, by which a person can install the same."""
     sim, trainer, operator = bills.of_wheels(ROOT, tmp_path, "x86_64")
 
-    assert "pkg:pypi/palaestra-sim@0.1.0" in listed(operator)
+    assert f"pkg:pypi/palaestra-sim@{version('palaestra-sim')}" in listed(operator)
     assert any(url.startswith("pkg:pypi/stable-baselines3@") for url in listed(trainer))
     assert not any(url.startswith("pkg:pypi/pytest@") for url in (*listed(sim), *listed(operator)))
     hashes = [component.get("hashes") for component in json.loads(operator.read_text())["components"]]
