@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from tests.e2e.allowances import allow
 from tests.e2e.askers import Asker
 from tests.e2e.beside import BESIDE, Stories
 from tests.e2e.cluster import Cluster, Object
 from tests.e2e.evictions import Evictions
 from tests.e2e.jobs import make_job
 from tests.e2e.long_run import LongRun
-from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace, unique
+from tests.e2e.namespace import Namespace, unique
 
 CHOSEN = "PALAESTRA_E2E"  # set to confirm that the cluster of $KUBECONFIG is for tests
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
@@ -77,7 +78,7 @@ def cluster() -> Iterator[Cluster]:
     kubectl = shutil.which("kubectl")
     assert kubectl, "kubectl is not on the PATH; `make e2e` builds it"
     with Cluster(kubectl) as reached:
-        reached.rolled_out(SYSTEM, OPERATOR)
+        allow(reached)
         yield reached
 
 

@@ -211,6 +211,13 @@ REFUSED = (
         "spec.simulators[0].name",
     ),
     Field(
+        "a password in an address",
+        "Everybody who may read TrainingJobs reads it.",
+        "spec.trainer.env",
+        [{"name": "MLFLOW_TRACKING_URI", "value": "http://me:secret@tracking.example.com"}],
+        "contains a password in an address",
+    ),
+    Field(
         "a master elsewhere",
         "The operator's settings of a trainer are its own.",
         "spec.trainer.env",
@@ -246,13 +253,62 @@ UNKNOWN = (
     ),
 )
 
-# Accepted as a request, and not carried out: nobody has opened to jobs what they name.
+_APART = "spec.scheduling.affinity"
+_REQUIRED = "requiredDuringSchedulingIgnoredDuringExecution"
+
+# Accepted as a request, and not carried out: nobody has opened what they name, or allowed what they ask.
 HELD = (
+    Field(
+        "a cluster of its own",
+        "Keeps the pods of all tenants off every node.",
+        _APART,
+        {
+            "podAntiAffinity": {
+                _REQUIRED: [{"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}]
+            }
+        },
+        "SchedulingNotAllowed",
+    ),
+    Field(
+        "a node of its own",
+        "Keeps the pods of its namespace off a node.",
+        _APART,
+        {"podAntiAffinity": {_REQUIRED: [{"labelSelector": {}, "topologyKey": "kubernetes.io/hostname"}]}},
+        "SchedulingNotAllowed",
+    ),
+    Field(
+        "a priority",
+        "Pushes pods of others off their nodes.",
+        "spec.scheduling.priorityClassName",
+        "production",
+        "SchedulingNotAllowed",
+    ),
+    Field(
+        "a runtime",
+        "Isolates its containers less, or gives them devices.",
+        "spec.scheduling.runtimeClassName",
+        "kata",
+        "SchedulingNotAllowed",
+    ),
+    Field(
+        "nodes of another team",
+        "A taint reserves them.",
+        "spec.scheduling.tolerations",
+        [{"key": "dedicated", "operator": "Exists"}],
+        "SchedulingNotAllowed",
+    ),
     Field(
         "a secret of this namespace",
         "Its value would be in the pod's environment.",
         "spec.trainer.env",
         [{"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}],
+        "SecretNotForJobs",
+    ),
+    Field(
+        "a pull secret of this namespace",
+        "Its images would run, and be read.",
+        "spec.imagePullSecrets",
+        [{"name": "words"}],
         "SecretNotForJobs",
     ),
     Field(

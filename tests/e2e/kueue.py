@@ -28,6 +28,7 @@ MADE_S = 120
 _BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # on two cores
 _FROM_THE_MODULE = """
 helm() {
+  [[ $2 != palaestra ]] || return 0 # tests/e2e/allowances.py has allowed the class already
   [[ $1 == install ]] || { command helm "$@"; return; }
   command helm "${@/#oci:*/$CHART}" --set "$SETTING"
 }

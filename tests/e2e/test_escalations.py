@@ -225,13 +225,6 @@ def test_a_node_selector_goes_past_no_taint(planned, plain):
     assert "tolerations" not in unnamed(made)
 
 
-def test_a_runtime_class_confines_no_less(planned, plain):
-    """A class is the cluster's, what a container may do in it is not the author's."""
-    made = planned(authors("in-kata", ("spec.scheduling.runtimeClassName", "kata")))
-
-    assert unnamed(made) == {**unnamed(plain), "runtimeClassName": "kata"}
-
-
 def test_strings_stay_strings(planned, plain):
     """Whatever they look like to YAML, to a shell or to a template."""
     numbered = dict(enumerate(TEXTS))

@@ -14,6 +14,7 @@ import yaml
 
 from tests.chart.definitions import kinds_of_prometheus
 from tests.chart.helm import ROOT
+from tests.e2e.allowances import allow
 from tests.e2e.jobs import WAIT, make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
 from tests.e2e.served import (
@@ -44,6 +45,7 @@ PROMISED = {
     "Monitoring": {OPERATOR: 2},
     "Locked down": {OPERATOR: 2},
     "What pods may carry": {OPERATOR: 2},
+    "What pods may ask for": {OPERATOR: 2},
     "TensorBoard and notebooks": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
     "Upgrade": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
     "Uninstall": {},
@@ -89,7 +91,7 @@ def untouched(cluster, terminal):
             with suppress(subprocess.TimeoutExpired):
                 terminal.try_(each, TYPED_S)
         terminal.type_in("kubectl apply --server-side --filename manifests/install.yaml", TYPED_S)
-        cluster.rolled_out(SYSTEM, OPERATOR)
+        allow(cluster)
 
 
 def running(cluster):

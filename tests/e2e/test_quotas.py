@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from tests.e2e.allowances import LIMITED, MISSING, URGENT
 from tests.e2e.cluster import Object
 from tests.e2e.jobs import LITTLE, make_job
 from tests.e2e.namespace import LONG_S, Namespace, named
 
 pytestmark = [pytest.mark.after_the_kills, pytest.mark.timeout(1200)]
 
-MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
 OF_LIMITED = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [LIMITED]}]}
 PLACE = "palaestra.dev/place"  # a resource of which there is one
 IN_PLACE = {"resources": {"requests": {**LITTLE["requests"], PLACE: "1"}, "limits": {PLACE: "1"}}}

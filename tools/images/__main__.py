@@ -1,11 +1,11 @@
-"""`make images`: build what has changed, and say where the archives are."""
+"""`make images`: build what has changed, and say where archives and bills of materials are."""
 
 import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from tools.images import cache
+from tools.images import bills, cache
 from tools.images.building import Built, Workshop, say
 from tools.images.engines import Buildah, Docker
 from tools.images.errors import ImagesError
@@ -30,18 +30,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             engine = Docker.here() or Buildah.here(folder, ROOT)
             workshop = Workshop(root=ROOT, engine=engine, folder=folder)
             built = {name: workshop.build(known[name], options.tag) for name in options.names or known}
+            of_images = {name: bills.of_image(image) for name, image in built.items()}
+            of_wheels = bills.of_wheels(ROOT, folder, workshop.machine)
     except ImagesError as error:
         say(str(error))
         return 1
     except KeyboardInterrupt:
         return INTERRUPTED
     for name, image in built.items():
-        sys.stdout.write(f"{name}={image.archive}\n" if options.archives else _row(image))
+        sys.stdout.write(f"{name}={image.archive}\n" if options.archives else _row(image, of_images[name]))
+    if not options.archives:
+        sys.stdout.writelines(f"{bill}\n" for bill in of_wheels)
     return 0
 
 
-def _row(image: Built) -> str:
-    return f"{image.reference}  {image.archive.stat().st_size / 1e6:,.0f} MB  {image.archive}\n"
+def _row(image: Built, bill: Path) -> str:
+    return f"{image.reference}  {image.archive.stat().st_size / 1e6:,.0f} MB  {image.archive}  {bill}\n"
 
 
 def _parser() -> argparse.ArgumentParser:

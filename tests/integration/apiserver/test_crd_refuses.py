@@ -124,6 +124,13 @@ WRONG = [
     ),
     ("spec.simulators.0.env", [{"name": "A-B", "value": "x"}], "env[0].name"),
     ("spec.simulators.0.resources", {"requests": {"cpu": "lots"}}, "resources.requests.cpu"),
+    (
+        "spec.simulators.0.env",
+        [{"name": "PROXY", "value": "http://me:secret@proxy:3128"}],
+        "env[0].value.*contains a password in an address; put the value into a Secret",
+    ),
+    ("spec.simulators.0.options", ["--to=http://me:s@h"], "simulators[0].options.*contains a password"),
+    ("spec.trainer.command", ["curl", "http://me:s@h"], "spec.trainer.command.*contains a password"),
     ("spec.trainer.steps", 0, "spec.trainer.steps"),
     ("spec.trainer.environment.id", "Move To Target", "spec.trainer.environment.id"),
     ("spec.trainer.environment.reward", "Medium", "spec.trainer.environment.reward: Unsupported value"),

@@ -62,7 +62,7 @@ def refused(replica):
 
 def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place):
     """The API server refuses the next one as it is applied; the operator never has to hold it."""
-    example, _ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
+    example, *_ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
     [counted] = [name for name in example["spec"]["hard"] if name.startswith("count/")]
     few = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
     place.create(QUOTAS, few | {"spec": {"hard": {counted: "1"}}})
@@ -71,6 +71,56 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
 
     with pytest.raises(Forbidden, match=f"exceeded quota: few, requested: {counted}=1"):
         place.train("second")
+
+
+def pod_apart(name, **term):
+    """Return a pod with a required anti-affinity, as any controller may create it."""
+    terms = [{"topologyKey": "kubernetes.io/os", "labelSelector": {}, **term}]
+    affinity = {"podAntiAffinity": {"requiredDuringSchedulingIgnoredDuringExecution": terms}}
+    spec = {"containers": [{"name": "main", "image": "theirs"}], "affinity": affinity}
+    return {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": name}, "spec": spec}
+
+
+def test_the_quota_of_the_examples_refuses_an_affinity_to_other_namespaces(place):
+    """It holds for pods of all controllers; the operator's own check is for TrainingJobs only."""
+    _, example, _ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
+    place.create(QUOTAS, {**example, "metadata": {"name": "none-left"}})
+    eventually(lambda: place.get(QUOTAS, "none-left").get("status", {}).get("hard"))
+    place.create(PODS, pod_apart("within"))
+
+    with pytest.raises(Forbidden, match="exceeded quota: none-left"):
+        place.create(PODS, pod_apart("beyond", namespaceSelector={}))
+
+
+OF_OTHERS = {"matchExpressions": [{"key": "palaestra.dev/job", "operator": "Exists"}]}
+ALONE = {"requiredDuringSchedulingIgnoredDuringExecution": [
+    {"topologyKey": "kubernetes.io/hostname", "labelSelector": OF_OTHERS}
+]}  # fmt: skip
+
+
+def test_what_affects_others_waits_until_it_is_allowed_and_stays_when_it_no_longer_is(place, start):
+    """An upgrade whose rules are stricter must not end a job, nor keep its pods from being replaced."""
+    scheduling = {"affinity": {"podAntiAffinity": ALONE}, "runtimeClassName": "kata"}
+    first = start("--allow-runtime-class=kata")
+    place.train(scheduling=scheduling)
+    eventually(lambda: place.condition("Accepted").get("reason") == "SchedulingNotAllowed")
+    assert place.all(JOBS, "job") == []
+    first.kill()
+
+    second = start("--allow-runtime-class=kata", "--allow-anti-affinity-label=palaestra.dev/job")
+    [job] = eventually(lambda: place.all(JOBS, "job"))
+    second.kill()
+    place.api.delete(JOBS, place.name, job["metadata"]["name"])
+    start()
+    [again] = eventually(lambda: [it for it in place.all(JOBS, "job") if uid(it) != uid(job)], 60)
+
+    assert place.condition("Accepted")["status"] == "True"
+    assert again["spec"]["template"]["spec"]["affinity"] == {"podAntiAffinity": ALONE}
+
+
+def uid(found):
+    """Return the uid of an object."""
+    return found["metadata"]["uid"]
 
 
 def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
@@ -100,6 +150,22 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
     [pod] = place.pods(deadline_s=60)
     assert "valueFrom" in str(pod["spec"]["containers"][0]["env"])
+
+
+def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_it(place, start, installed):
+    """Its images would run, and be read, by people to whom its owner did not give it."""
+    open_secrets(installed, place)
+    place.create(SECRETS, {**SECRET, "metadata": {"name": "token"}})
+    start()
+    place.train(imagePullSecrets=[{"name": "token"}])
+    eventually(lambda: place.condition("Accepted").get("reason") == "SecretNotForJobs")
+    assert place.all(JOBS, "job") == []
+
+    place.api.merge(SECRETS, place.name, "token", {"metadata": {"labels": SECRET["metadata"]["labels"]}})
+
+    [job] = eventually(lambda: place.all(JOBS, "job"), 60)
+    assert job["spec"]["template"]["spec"]["imagePullSecrets"] == [{"name": "token"}]
+    assert place.status()["release"]["pullSecretsForJobs"] is True
 
 
 def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):

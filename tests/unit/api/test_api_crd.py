@@ -157,7 +157,7 @@ def test_rules_stand_where_the_models_have_them() -> None:
             at = at["properties"][name]
             at = at.get("items", at)
         told = {rule["message"] for rule in at.get("x-kubernetes-validations", [])} - {FROZEN}
-        assert told == {rule.message for rule in model.rules if rule.cel}, path
+        assert told == {rule.message for rule in (*model.rules, *model.guards) if rule.cel}, path
 
 
 def test_a_rule_names_a_field_that_the_object_has() -> None:

@@ -12,6 +12,7 @@ import yaml
 import palaestra.api
 from palaestra.api.crd import crd
 from palaestra.cli import operator
+from palaestra.cli.operator import ALLOWANCES
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
 from palaestra_trainer.run.tensorboard_link import FOLDER
@@ -155,14 +156,28 @@ def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
     """In the words of its command line; by default nothing is allowed and nothing asked for."""
     closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
 
-    assert closed.allowed_pod_labels == ["example.com/"]
-    assert closed.allowed_pod_annotations == ["example.com/", "note"]
+    allowances = [field for _, field, *_ in ALLOWANCES]
+    assert {field: getattr(closed, field) for field in allowances} == {
+        "pod_labels": ["example.com/"],
+        "pod_annotations": ["example.com/", "note"],
+        "priority_classes": ["urgent"],
+        "runtime_classes": ["nvidia"],
+        "tolerations": ["dedicated", "example.com/"],
+        "affinity_namespaces": ["storage"],
+        "anti_affinity_labels": ["palaestra.dev/job"],
+    }
+    assert {field: getattr(default, field) for field in allowances} == {field: [] for field in allowances}
     assert dict(closed.node_selector) == {"kubernetes.io/os": "linux"}
-    assert (default.allowed_pod_labels, default.allowed_pod_annotations, default.node_selector) == (
-        [],
-        [],
-        [],
-    )
+    assert default.node_selector == []
+    assert (closed.host_users, default.host_users) == (False, True)
+
+
+def test_a_pod_has_a_user_namespace_only_where_it_is_asked_for(one):
+    """A node without support for it never starts the pod."""
+    closed, default = (one(mode, "Deployment")["spec"]["template"]["spec"] for mode in ("closed", "default"))
+
+    assert closed["hostUsers"] is False
+    assert "hostUsers" not in default
 
 
 def test_the_operator_s_defaults_are_those_of_its_release(one):
@@ -352,6 +367,26 @@ def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
     assert re.fullmatch(keep["regex"], "metrics")
     assert re.fullmatch(keep["regex"], "sim-31")
     assert not re.fullmatch(keep["regex"], "ros")
+
+
+def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
+    """A program of a job's author answers there, and could give Prometheus a million series."""
+    bounded = one("monitored", "PodMonitor", "palaestra-training")["spec"]
+    [none] = [
+        each
+        for each in objects(
+            {
+                "monitoring": {
+                    "podMonitor": {"enabled": True, "sampleLimit": 0, "labelLimit": 0, "bodySizeLimit": 0}
+                }
+            }
+        )
+        if each["kind"] == "PodMonitor"
+    ]
+
+    limits = {name: bounded.get(name) for name in ("sampleLimit", "labelLimit", "bodySizeLimit")}
+    assert limits == {"sampleLimit": 2000, "labelLimit": 32, "bodySizeLimit": "1MB"}
+    assert not limits.keys() & none["spec"].keys()
 
 
 def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm

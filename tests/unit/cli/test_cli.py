@@ -297,6 +297,10 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
         ("operator --resync=nan", "--resync: nan is refused; give a finite number"),
         ("operator --allow-pod-label=*", f"--allow-pod-label: '*' is not a key; {A_KEY}"),
         (
+            "operator --allow-priority-class=High",
+            "--allow-priority-class: 'High' is not the name of an object; use a-z, 0-9, '-' and '.'",
+        ),
+        (
             "operator --node-selector=gpu",
             "--node-selector: 'gpu' is not a label; use a label such as kubernetes.io/arch=amd64",
         ),

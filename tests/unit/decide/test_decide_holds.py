@@ -8,7 +8,7 @@ import pytest
 from palaestra.api.status import Phase
 from palaestra.decide import Create, accept, prepare, wants_whole, worlds_to_check
 from palaestra.observe import Lacking, Objects, observe, references
-from palaestra.plan import Verdict
+from palaestra.plan import Allowed, Verdict
 from tests.e2e.escalations import METADATA
 
 INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
@@ -75,6 +75,15 @@ def held(scene):
             id="a Secret of somebody else",
         ),
         pytest.param(
+            {"imagePullSecrets": [{"name": "keys"}]},
+            {("Secret", "keys"): {"metadata": {"name": "keys"}}},
+            "SecretNotForJobs",
+            "spec.imagePullSecrets[0]: Secret keys is not for jobs, or the operator has no "
+            'permission to read its labels; label it palaestra.dev/for-jobs: "true" and bind the role '
+            "palaestra-job-secrets in this namespace",
+            id="a pull Secret of somebody else",
+        ),
+        pytest.param(
             {"storage": {"existingClaim": "runs"}},
             {},
             "ClaimMissing",
@@ -132,6 +141,7 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
     [
         ({"simulators": WORLD}, "ConfigMap", "worlds"),
         ({"trainer": SECRET}, "Secret", "keys"),
+        ({"imagePullSecrets": [{"name": "keys"}]}, "Secret", "keys"),
         ({"storage": {"existingClaim": "runs"}}, "PersistentVolumeClaim", "runs"),
         ({"trainer": INITIAL}, "PersistentVolumeClaim", "runs"),
     ],
@@ -192,6 +202,22 @@ def test_what_nobody_can_mend_fails_at_once(make_scene):
     assert held(scene)[0] == "WorldInvalid"
     assert scene.status.conditions[-1].message.startswith("spec.simulators[0].world.inline:")
     assert decision.actions == ()
+
+
+def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
+    """It is compromised: everybody who may read TrainingJobs has seen it."""
+    option = {"name": "my:Tracker", "options": {"uri": "http://me:secret@tracking.example.com"}}
+    scene = make_scene(trainer={"algorithm": {"callbacks": [option]}})
+
+    decision = scene.settle()
+
+    assert (scene.status.phase, decision.actions) == (Phase.FAILED, ())
+    reason, message = held(scene)
+    assert reason == "InvalidSpec"
+    assert message == (
+        "spec.trainer.algorithm.callbacks[0].options: contains a password in an address; "
+        "pass it in an environment variable with secretKeyRef"
+    )
 
 
 def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scene):
@@ -258,7 +284,7 @@ def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scen
 def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, key, holds):
     """A part of a domain may be somebody else's."""
     scene = make_scene(scheduling={"podAnnotations": {key: "x"}})
-    scene.layout = replace(scene.layout, allowed_pod_annotations=allowed, allowed_pod_labels=())
+    scene.layout = replace(scene.layout, allowed=Allowed(pod_annotations=allowed))
 
     scene.settle()
 
@@ -271,7 +297,8 @@ def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_lo
     scene.settle()
     assert held(scene)[0] == "PodMetadataNotAllowed"
 
-    default, scene.layout = scene.layout, replace(scene.layout, allowed_pod_labels=("example.com/",))
+    allowed = Allowed(pod_labels=("example.com/",))
+    default, scene.layout = scene.layout, replace(scene.layout, allowed=allowed)
     decision = scene.settle()
     labels = decision.actions[-1].object["spec"]["template"]["metadata"]["labels"]
     scene.layout = default

@@ -144,6 +144,7 @@ THERE = {
 }
 USES = [
     pytest.param("Secret", "keys", {"trainer": SECRET}, id="a Secret"),
+    pytest.param("Secret", "keys", {"imagePullSecrets": [{"name": "keys"}]}, id="a pull Secret"),
     pytest.param("PersistentVolumeClaim", "runs", {"storage": {"existingClaim": "runs"}}, id="a claim"),
     pytest.param(
         "ConfigMap",

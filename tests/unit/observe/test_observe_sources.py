@@ -19,11 +19,13 @@ def test_worlds_secrets_and_claims_are_named_with_their_fields(make_job):
         ],
         trainer={"env": [{"name": "B", "value": "1"}, *SECRET["env"]]},
         storage={"existingClaim": "runs"},
+        imagePullSecrets=[{"name": "keys"}, {"name": "registry"}],
     )
 
     assert [(each.kind, each.name, each.field) for each in references(job)] == [
         (SourceKind.CONFIG_MAP, "worlds", "spec.simulators[0].world.configMap"),
         (SourceKind.SECRET, "keys", "spec.trainer.env[1].secretKeyRef"),
+        (SourceKind.SECRET, "registry", "spec.imagePullSecrets[1]"),
         (SourceKind.CLAIM, "runs", "spec.storage.existingClaim"),
     ]
 

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra.api.container import Resources
-from palaestra.plan import resources
+from palaestra.local.spec import read_pod
+from palaestra.plan import Images, LocalLayout, plan, resources
 
 TWO_GROUPS = [
     {"name": "collect", "role": "Collect", "count": 2},
@@ -184,13 +185,63 @@ def test_the_memory_that_a_job_asks_for_takes_the_place_of_mujoco_s(in_cluster):
 
     planned = containers(in_cluster(simulators=[mujoco], trainer={"evaluation": {"everySteps": 0}}))
 
-    assert planned["sim-a-0"]["resources"] == {"requests": {"cpu": "75m", "memory": "1Gi"}}
+    assert planned["sim-a-0"]["resources"] == {
+        "requests": {"cpu": "75m", "memory": "1Gi"},
+        "limits": {"memory": "2Gi"},
+    }
 
 
 COMMAND = [
     {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim", "{world}"]},
     {"name": "evaluate", "role": "Evaluate"},
 ]
+
+
+OF_POD = "$(PALAESTRA_POD_UID)"
+
+
+@pytest.mark.parametrize("where", ["in_cluster", "on_laptop"])
+def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
+    """A kubelet expands $(NAME) in commands, arguments and values, and the pod has variables of others."""
+    env = [{"name": "OWN", "value": OF_POD}]
+    own = {
+        "name": "own",
+        "role": "Collect",
+        "driver": "command",
+        "image": "my:1",
+        "command": ["sim", OF_POD],
+        "options": [OF_POD],
+        "world": {"file": f"/worlds/{OF_POD}/hall.wbt"},
+        "env": env,
+    }
+    job = {"simulators": [own], "trainer": {"command": ["python", OF_POD], "env": env}}
+    job["trainer"]["evaluation"] = {"everySteps": 0}
+
+    planned = containers(request.getfixturevalue(where)(**job))
+
+    texts = [
+        text
+        for each in planned.values()
+        for text in (
+            *each["command"],
+            *each.get("args", ()),
+            *(one.get("value", "") for one in each.get("env", ())),
+        )
+    ]
+    assert sum(OF_POD in text for text in texts) == 6
+    assert not [text for text in texts if OF_POD in text.replace("$$", "")]
+
+
+def test_a_run_directory_may_have_a_dollar_in_its_name(make_job):
+    """Two of them in a plan are one to whoever reads it as a kubelet does."""
+    layout = LocalLayout(images=Images.of_release("1"), job_directory="/runs/$(id)$$/job")
+    replica = plan(make_job(), layout).replicas[0]
+    pod = read_pod(replica.job["spec"]["template"], "uid")
+
+    paths = [*pod.init[1].command, *pod.main.env.values()]
+
+    assert [text for text in paths if "$(id)$$/job" in text]
+    assert not [text for text in paths if "$(id)$/job" in text or "$$(id)" in text]
 
 
 def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluster):
@@ -252,7 +303,14 @@ def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_lap
     [
         ({}, {"requests": {"cpu": "1", "memory": "1Gi"}, "limits": {"cpu": "2"}}),
         ({"limits": {"cpu": "500m"}}, {"requests": {"memory": "1Gi"}, "limits": {"cpu": "500m"}}),
-        ({"requests": {"cpu": "8"}}, {"requests": {"memory": "1Gi", "cpu": "8"}}),
+        (
+            {"requests": {"cpu": "8"}},
+            {"requests": {"memory": "1Gi", "cpu": "8"}, "limits": {"cpu": "8"}},
+        ),
+        (
+            {"requests": {"cpu": "1500m"}, "limits": {"cpu": "3"}},
+            {"requests": {"memory": "1Gi", "cpu": "1500m"}, "limits": {"cpu": "3"}},
+        ),
     ],
 )
 def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
@@ -260,6 +318,36 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
     default = Resources(requests={"cpu": "1", "memory": "1Gi"}, limits={"cpu": "2"})
 
     assert resources.resources(Resources(**wanted), default) == planned
+
+
+@pytest.mark.parametrize(
+    ("requested", "limit"),
+    [
+        pytest.param("1Gi", "2Gi", id="less than the default"),
+        pytest.param("2048Mi", "2Gi", id="as much in another unit"),
+        pytest.param("3G", "3G", id="more"),
+    ],
+)
+@pytest.mark.parametrize("container", ["trainer", "sim-collect-0"])
+def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, requested, limit):
+    """The author of a job could otherwise use all memory of a node, and end the pods of others there."""
+    wanted = {"resources": {"requests": {"memory": requested}}}
+    group = {"name": "collect", "role": "Collect"} | (wanted if container != "trainer" else {})
+    trainer = {"evaluation": {"everySteps": 0}} | (wanted if container == "trainer" else {})
+
+    planned = containers(in_cluster(simulators=[group], trainer=trainer))[container]["resources"]
+
+    assert (planned["requests"]["memory"], planned["limits"]["memory"]) == (requested, limit)
+
+
+def test_every_container_has_a_limit_of_its_memory(in_cluster):
+    """Whatever a job asks for."""
+    requests = {"resources": {"requests": {"memory": "1Gi", "cpu": "2"}}}
+    groups = [{**group, **requests} for group in TWO_GROUPS]
+
+    planned = containers(in_cluster(simulators=groups, trainer=requests))
+
+    assert all("memory" in each["resources"]["limits"] for each in planned.values())
 
 
 STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "evaluate", "role": "Evaluate"}]
@@ -315,13 +403,18 @@ def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
 
 
 @pytest.mark.parametrize(
-    ("limits", "size"), [({"memory": "6Gi"}, {"sizeLimit": "6Gi"}), ({"cpu": "2"}, None)]
+    ("wanted", "size"),
+    [
+        ({"limits": {"memory": "6Gi"}}, "6Gi"),
+        ({"limits": {"cpu": "2"}}, "2Gi"),
+        ({"requests": {"memory": "3Gi"}}, "3Gi"),
+    ],
 )
-def test_the_trainer_shares_memory_within_its_limit(in_cluster, limits, size):
+def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
     """Workers of a DataLoader or an AsyncVectorEnv need more than the 64 MiB of a container runtime."""
-    planned = in_cluster(trainer={"resources": {"limits": limits}})
+    planned = in_cluster(trainer={"resources": wanted})
     volumes = planned.replicas[0].job["spec"]["template"]["spec"]["volumes"]
     mounts = {each["mountPath"]: each["name"] for each in containers(planned)["trainer"]["volumeMounts"]}
 
     [volume] = [each["emptyDir"] for each in volumes if each["name"] == mounts["/dev/shm"]]
-    assert volume == {"medium": "Memory", **(size or {"sizeLimit": "2Gi"})}
+    assert volume == {"medium": "Memory", "sizeLimit": size}

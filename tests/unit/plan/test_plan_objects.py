@@ -216,6 +216,14 @@ def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
     assert spec["nodeSelector"] == {"kubernetes.io/arch": "arm64", "pool": "robots"}
 
 
+def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(make_job, in_cluster):
+    """A process that leaves its container is then nobody on the node."""
+    layout = ClusterLayout(images=LAYOUT.images, host_users=False)
+
+    assert pod(plan(make_job(), layout))["hostUsers"] is False
+    assert "hostUsers" not in pod(in_cluster())
+
+
 def test_scheduling_reaches_the_pod(in_cluster):
     """What a platform engineer sets is passed on as it is."""
     planned = in_cluster(

@@ -5,7 +5,7 @@ from them. No module here uses a cluster, a file or a clock.
 """
 
 from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob
-from palaestra.api.loading import as_data, dump, load, validate
+from palaestra.api.loading import as_data, broken_guards, dump, load, validate
 from palaestra.api.scheduling import Scheduling
 from palaestra.api.simulators import Driver, SimulatorGroup, World
 from palaestra.api.status import Status
@@ -29,6 +29,7 @@ __all__ = [
     "TrainingJob",
     "World",
     "as_data",
+    "broken_guards",
     "dump",
     "load",
     "validate",

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from palaestra.api.fields import VARIABLE, FileKey, NamedList, ObjectName, Quantities, Sentence
 from palaestra.api.model import ApiModel, Rule
+from palaestra.api.passwords import NO_PASSWORD_IN_VALUE
 
 
 class SecretKey(ApiModel):
@@ -29,7 +30,8 @@ class Variable(ApiModel):
     """Name of the variable."""
 
     value: Sentence | None = None
-    """Value of the variable; absent if `secretKeyRef` is set. `$(OTHER)` is not expanded."""
+    """Value of the variable; absent if `secretKeyRef` is set. `$(OTHER)` is not expanded. In a cluster, an
+    address with a password is refused."""
 
     secret_key_ref: SecretKey | None = None
     """Key of a Secret that contains the value; absent if `value` is set."""
@@ -56,6 +58,7 @@ class Variable(ApiModel):
             ),
         ),
     )
+    guards = (NO_PASSWORD_IN_VALUE,)
 
 
 Environment = Annotated[NamedList[Variable], Field(max_length=32)]
@@ -69,4 +72,6 @@ class Resources(ApiModel):
     requests."""
 
     limits: Quantities = Field(default={})
-    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads."""
+    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads. If
+    only `requests` names CPU or memory, Palaestra's default limit stays, raised to the request if that is
+    more."""

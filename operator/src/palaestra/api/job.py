@@ -86,7 +86,11 @@ class Metadata(ApiModel):
 
 
 class PullSecret(ApiModel):
-    """A Secret for pulling images."""
+    """A Secret for pulling images.
+
+    The Secret must have the label `palaestra.dev/for-jobs: "true"`. Otherwise an author of TrainingJobs could
+    run images to which they have no access.
+    """
 
     name: ObjectName
     """Name of the Secret, in the job's own namespace."""

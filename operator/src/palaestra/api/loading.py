@@ -69,6 +69,16 @@ def validate(data: Any, name: str = "job") -> TrainingJob:
     return job
 
 
+def broken_guards(job: TrainingJob) -> tuple[str, ...]:
+    """Return a line for each guard that a job breaks: its field, the fact and the remedy."""
+    return tuple(
+        f"{shown((*place, *guard.field.split('.')))}: {guard.message}"
+        for place, part in objects(job)
+        for guard in part.guards
+        if not guard.holds(part)
+    )
+
+
 def dump(job: TrainingJob) -> str:
     """Return the job as YAML with its defaults; absent fields are omitted."""
     return write(as_data(job))

@@ -55,7 +55,12 @@ class RulesBroken(ValueError):
 
 
 class ApiModel(BaseModel):
-    """One object of the API: camelCase in YAML, snake_case in Python, frozen; unknown fields are refused."""
+    """One object of the API: camelCase in YAML, snake_case in Python, frozen; unknown fields are refused.
+
+    Every reader of a job checks the `rules` of its objects. `guards` are for new jobs of a cluster: an API
+    server checks them when a job is created, and the operator until it accepts a job. A rule that is added
+    later is a guard, so that it ends no job that an earlier release accepted.
+    """
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -68,6 +73,7 @@ class ApiModel(BaseModel):
     )
 
     rules: ClassVar[tuple[Rule, ...]] = ()
+    guards: ClassVar[tuple[Rule, ...]] = ()
 
     @model_validator(mode="after")
     def _follow_the_rules(self, info: ValidationInfo) -> Self:
@@ -82,10 +88,9 @@ class ApiModel(BaseModel):
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         schema = handler(core_schema)
-        if cls.rules:
-            handler.resolve_ref_schema(schema)["x-kubernetes-validations"] = [
-                rule.validation() for rule in cls.rules if rule.cel
-            ]
+        rules = [rule.validation() for rule in (*cls.rules, *cls.guards) if rule.cel]
+        if rules:
+            handler.resolve_ref_schema(schema)["x-kubernetes-validations"] = rules
         return schema
 
 

@@ -33,6 +33,7 @@ class Reason(StrEnum):
     CLAIM_MISSING = "ClaimMissing"
     CLAIM_NOT_FOR_JOBS = "ClaimNotForJobs"
     POD_METADATA_NOT_ALLOWED = "PodMetadataNotAllowed"
+    SCHEDULING_NOT_ALLOWED = "SchedulingNotAllowed"
     NO_KUEUE = "NoKueue"
     NAME_TAKEN = "NameTaken"
     OLD_POD_TERMINATING = "OldPodTerminating"
@@ -96,6 +97,7 @@ HELD = frozenset(
     {
         Reason.INVALID_SPEC,
         Reason.POD_METADATA_NOT_ALLOWED,
+        Reason.SCHEDULING_NOT_ALLOWED,
         Reason.NO_KUEUE,
         Reason.WORLD_MISSING,
         Reason.WORLD_INVALID,
@@ -187,13 +189,13 @@ ROWS: dict[Reason, Row] = {
     Reason.SECRET_MISSING: Row(
         "{field}: Secret {name} does not exist in this namespace; "
         'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
-        "the Secret of a variable does not exist",
+        "the Secret of a variable or of `imagePullSecrets` does not exist",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.SECRET_NOT_FOR_JOBS: Row(
         "{field}: Secret {name} is not for jobs, or the operator has no permission to read its labels; "
         'label it palaestra.dev/for-jobs: "true" and bind the role palaestra-job-secrets in this namespace',
-        "a job may read only Secrets with the label, and the operator must be allowed to check it",
+        "a job may use only Secrets with the label, and the operator must be allowed to check it",
         "ask the owner of the Secret to set the label and to bind the role `palaestra-job-secrets`: see "
         "Secrets below",
     ),
@@ -215,6 +217,13 @@ ROWS: dict[Reason, Row] = {
         "permission to create pods must not set them; an installation allows only the keys that it names",
         "add the key, or its domain with a `/` at the end, to `jobs.allowedPodLabels` or "
         "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)); the job then starts",
+    ),
+    Reason.SCHEDULING_NOT_ALLOWED: Row(
+        "{field}: {fact} is not allowed in this cluster; {remedy}",
+        "a priority, a runtime class, a toleration or an affinity to other pods affects what others run; an "
+        "installation allows only those that it names",
+        "allow what the message names with the value of the chart that it names "
+        "([install](install.md#what-pods-may-ask-for)); the job then starts",
     ),
     Reason.NO_KUEUE: Row(
         "spec.scheduling.queueName: this cluster has no Kueue; install it, or create a job without a queue",

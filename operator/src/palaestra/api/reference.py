@@ -55,11 +55,11 @@ def _section(path: tuple[str, ...], at: Schema) -> Iterator[str]:
 
 def _rules(path: tuple[str, ...]) -> Iterator[str]:
     model = model_at(TrainingJob, tuple(piece.removesuffix("[]") for piece in path))
-    if model is None or not model.rules:
+    if model is None or not (model.rules or model.guards):
         return
     yield "A job that breaks a rule is refused with one of these messages:"
     yield ""
-    for rule in model.rules:
+    for rule in (*model.rules, *model.guards):
         yield f"- `{rule.field}`: {rule.message}" if rule.field else f"- {rule.message}"
     yield ""
 

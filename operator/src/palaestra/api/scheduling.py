@@ -94,19 +94,24 @@ class Scheduling(ApiModel):
     """Kueue queue; Kueue then starts and suspends the job. Absent: the job starts without a queue."""
 
     priority_class_name: ObjectName | None = None
-    """Priority class of the pods, not one that begins with `system-`; absent: the cluster's default."""
+    """Priority class of the pods, not one that begins with `system-`; absent: the cluster's default. The
+    cluster's installation must allow it (`jobs.allowedPriorityClasses`)."""
 
     node_selector: LabelMap = Field(default={})
     """Labels that a node must have."""
 
     tolerations: Annotated[Listed[Toleration], Field(max_length=16)] = ()
-    """Node taints that the pods tolerate."""
+    """Node taints that the pods tolerate. The cluster's installation must allow each key
+    (`jobs.allowedTolerations`), unless the job requests an extended resource of that name."""
 
     affinity: FreeObject = Field(default={})
-    """Affinity of the pods, as in a pod."""
+    """Affinity of the pods, as in a pod. Terms about pods may select those of the job's own namespace, and a
+    required anti-affinity only pods of the job itself (`palaestra.dev/job: NAME`), unless the cluster's
+    installation allows more (`jobs.allowedAffinityNamespaces`, `jobs.allowedAntiAffinityLabels`)."""
 
     runtime_class_name: ObjectName | None = None
-    """Runtime class of the pods, such as `nvidia`; absent: the cluster's default."""
+    """Runtime class of the pods, such as `nvidia`; absent: the cluster's default. The cluster's installation
+    must allow it (`jobs.allowedRuntimeClasses`)."""
 
     pod_labels: LabelMap = Field(default={})
     """Additional pod labels. Each key needs a domain of yours, such as `example.com/team`, because Services

@@ -20,6 +20,7 @@ from palaestra.api.fields import (
     Words,
 )
 from palaestra.api.model import ApiModel, Rule
+from palaestra.api.passwords import NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS
 from palaestra_protocol.pod.terms import Role
 
 
@@ -211,3 +212,4 @@ class SimulatorGroup(ApiModel):
             message="is more than count; lower it or raise count",
         ),
     )
+    guards = (NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS)

@@ -265,6 +265,10 @@ class Release(Reported):
     webots: Image
     """Image of Webots, which Palaestra does not build yet."""
 
+    pull_secrets_for_jobs: bool | None = None
+    """`true`: the Secrets of `imagePullSecrets` had the label `palaestra.dev/for-jobs: "true"` at acceptance,
+    and need it for each new pod. Absent: the job names none, or an older release accepted it."""
+
 
 class Status(Reported):
     """Status of a TrainingJob, written by the operator only."""

@@ -21,6 +21,7 @@ from palaestra.api.fields import (
     Words,
 )
 from palaestra.api.model import ApiModel, Rule
+from palaestra.api.passwords import NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_OPTIONS
 
 OWN_TASKS = frozenset(
     {"MoveToTargetEnv-v0", "MoveToTargetGoalEnv-v0", "SeeTarget-v0", "Deliver-v0", "Navigate-v0"}
@@ -58,6 +59,8 @@ class EnvironmentWrapper(ApiModel):
     options: FreeObject = Field(default={})
     """Keyword arguments of the class."""
 
+    guards = (NO_PASSWORD_IN_OPTIONS,)
+
 
 class Task(ApiModel):
     """The gymnasium environment."""
@@ -78,6 +81,8 @@ class Task(ApiModel):
     frame_stack: Annotated[int, Field(ge=2, le=64)] | None = None
     """Number of newest observations that the policy gets as one, in the layout of Stable-Baselines3's
     VecFrameStack, after all wrappers; absent: the newest only."""
+
+    guards = (NO_PASSWORD_IN_OPTIONS,)
 
 
 Bound = Annotated[float, Field(gt=0, le=1_000_000)]
@@ -131,6 +136,8 @@ class Callback(ApiModel):
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the class."""
+
+    guards = (NO_PASSWORD_IN_OPTIONS,)
 
 
 class Algorithm(ApiModel):
@@ -290,3 +297,4 @@ class Trainer(ApiModel):
         *(_needs(name, "continuous", "discrete") for name in ("SAC", "TD3", "DDPG", "TQC", "CrossQ")),
         *(_needs(name, "discrete", "continuous") for name in ("DQN", "QRDQN")),
     )
+    guards = (NO_PASSWORD_IN_COMMAND,)

@@ -8,7 +8,7 @@ from palaestra.cli.parsing import Commands, command
 from palaestra.cluster import own_namespace
 from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
-from palaestra.plan import Images
+from palaestra.plan import Allowed, Images
 from palaestra_protocol.numbers import seconds, whole
 
 OPERATOR = """\
@@ -19,8 +19,30 @@ standard error. Exits within 2 s of SIGTERM. Of several operators, one leads and
 
 NAME = r"[A-Za-z0-9]([-A-Za-z0-9_.]{0,61}[A-Za-z0-9])?"
 DOMAIN = r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?/"
+OBJECT = re.compile(r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?")
 ALLOWED = re.compile(rf"({DOMAIN})?{NAME}|{DOMAIN}")
 NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
+
+# What jobs may ask for if the installation allows it: option, field of Allowed, kind of value, meaning.
+ALLOWANCES = (
+    ("pod-label", "pod_labels", "KEY", "label that jobs may set on their pods"),
+    ("pod-annotation", "pod_annotations", "KEY", "annotation that jobs may set on their pods"),
+    ("priority-class", "priority_classes", "NAME", "PriorityClass that jobs may have"),
+    ("runtime-class", "runtime_classes", "NAME", "RuntimeClass that jobs may have"),
+    ("toleration", "tolerations", "KEY", "taint that jobs may tolerate"),
+    (
+        "affinity-namespace",
+        "affinity_namespaces",
+        "NAME",
+        "namespace to whose pods jobs may have an affinity",
+    ),
+    (
+        "anti-affinity-label",
+        "anti_affinity_labels",
+        "KEY",
+        "label by which a required anti-affinity may select pods of other jobs",
+    ),
+)
 
 
 def add(commands: Commands) -> None:
@@ -41,6 +63,7 @@ def add(commands: Commands) -> None:
     )
     _add_cluster(parser)
     _add_pods(parser)
+    _add_users(parser)
     _add_images(parser)
 
 
@@ -71,16 +94,17 @@ def _add_looking(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_pods(parser: argparse.ArgumentParser) -> None:
-    for kind in ("label", "annotation"):
+    for option, field, metavar, meaning in ALLOWANCES:
+        keys = metavar == "KEY"
         parser.add_argument(
-            f"--allow-pod-{kind}",
-            metavar="KEY",
-            type=_allowed,
-            dest=f"allowed_pod_{kind}s",
+            f"--allow-{option}",
+            metavar=metavar,
+            type=_key if keys else _name,
+            dest=field,
             action="append",
             default=[],
-            help=f"{kind} that jobs may set on their pods, or its domain with a / at the end; "
-            "may be repeated; default: none",
+            help=f"{meaning}{', or its domain with a / at the end' if keys else ''}; may be repeated; "
+            "default: none",
         )
     parser.add_argument(
         "--node-selector",
@@ -94,7 +118,22 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _allowed(text: str) -> str:
+def _add_users(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--host-users",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="give training pods the users of their nodes; no: a user namespace for each pod; default: yes",
+    )
+
+
+def _name(text: str) -> str:
+    if not OBJECT.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not the name of an object; use a-z, 0-9, '-' and '.'")
+    return text
+
+
+def _key(text: str) -> str:
     if not ALLOWED.fullmatch(text):
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a key; use a key such as example.com/team, or a domain such as example.com/"
@@ -156,8 +195,8 @@ def _operator(options: argparse.Namespace) -> int:
             leader_elect=options.leader_elect,
             metrics_address=address(options.metrics_address),
             node_selector=dict(options.node_selector),
-            allowed_pod_labels=tuple(options.allowed_pod_labels),
-            allowed_pod_annotations=tuple(options.allowed_pod_annotations),
+            host_users=options.host_users,
+            allowed=Allowed(**{field: tuple(getattr(options, field)) for _, field, *_ in ALLOWANCES}),
             kubeconfig=options.kubeconfig,
             context=options.context,
         )

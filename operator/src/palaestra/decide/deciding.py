@@ -188,4 +188,5 @@ def _release(job: TrainingJob, prepared: Prepared) -> Release | None:
         stub=images.stub,
         mujoco=images.mujoco if needs_mujoco else None,
         webots=images.webots,
+        pull_secrets_for_jobs=True if job.spec.image_pull_secrets else None,
     )

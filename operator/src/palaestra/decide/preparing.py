@@ -7,10 +7,11 @@ release, has no effect on it.
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from palaestra.api import TrainingJob
-from palaestra.api.reasons import Reason, say
+from palaestra.api import TrainingJob, broken_guards
+from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL
-from palaestra.decide.conditions import Explanation
+from palaestra.decide.allowing import not_allowed
+from palaestra.decide.holding import Hold, held
 from palaestra.decide.suspending import to_resume
 from palaestra.errors import WorldCheckTooCostly, WorldRefused, WorldUnchecked
 from palaestra.observe.reading import part
@@ -20,14 +21,6 @@ from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKin
 from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
 from palaestra.plan.claim import former_name
 from palaestra_sim.errors import WorldError
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hold:
-    """A cause that keeps a job from being planned; if it is `final`, nothing can remove it."""
-
-    explanation: Explanation
-    final: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,14 +71,14 @@ def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Pre
         )
         return Prepared(plan=planned, images=layout.images)
     except WorldUnchecked:
-        return Prepared(hold=_hold(Reason.CHECKING_WORLDS))
+        return Prepared(hold=held(Reason.CHECKING_WORLDS))
     except WorldCheckTooCostly as error:
-        return Prepared(hold=_hold(Reason.WORLD_TOO_COSTLY, final=True, problem=error))
+        return Prepared(hold=held(Reason.WORLD_TOO_COSTLY, final=True, problem=error))
     except (WorldError, WorldRefused) as error:
         mendable = any(group.world.config_map for group in job.spec.simulators)
-        return Prepared(hold=_hold(Reason.WORLD_INVALID, final=not mendable, problem=error))
+        return Prepared(hold=held(Reason.WORLD_INVALID, final=not mendable, problem=error))
     except PlanError as error:
-        return Prepared(hold=_hold(Reason.INVALID_SPEC, final=True, problem=error))
+        return Prepared(hold=held(Reason.INVALID_SPEC, final=True, problem=error))
 
 
 def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> tuple[GivenWorld, ...]:
@@ -99,10 +92,16 @@ def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout)
 
 
 def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
-    """Return the first hold; pod labels and annotations are checked before acceptance only."""
-    if job.status.release is None and (hold := pod_metadata_is_allowed(job, layout)) is not None:
+    """Return the first hold; what a new job may ask for is checked before acceptance only."""
+    if job.status.release is None and (hold := _held_as_new(job, layout)) is not None:
         return hold
     return next((found for check in HOLDS if (found := check(job, observed))), None)
+
+
+def _held_as_new(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
+    if problems := broken_guards(job):
+        return held(Reason.INVALID_SPEC, final=True, problem="; ".join(problems))
+    return not_allowed(job, layout.allowed)
 
 
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
@@ -128,41 +127,17 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
     return tuple(replica for replica in observed.replicas if replica.index not in ended)
 
 
-def pod_metadata_is_allowed(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
-    """Other controllers act on labels and annotations of pods, so the installation has to allow them."""
-    scheduling = job.spec.scheduling
-    for field, value, keys, allowed in (
-        ("podLabels", "allowedPodLabels", scheduling.pod_labels, layout.allowed_pod_labels),
-        (
-            "podAnnotations",
-            "allowedPodAnnotations",
-            scheduling.pod_annotations,
-            layout.allowed_pod_annotations,
-        ),
-    ):
-        if refused := next((key for key in sorted(keys) if not _allows(allowed, key)), None):
-            where = f"spec.scheduling.{field}"
-            return _hold(Reason.POD_METADATA_NOT_ALLOWED, field=where, key=refused, value=f"jobs.{value}")
-    return None
-
-
-def _allows(allowed: tuple[str, ...], key: str) -> bool:
-    """Return whether a key is among `allowed`, itself or by its domain."""
-    domain, slash, _ = key.partition("/")
-    return key in allowed or (bool(slash) and f"{domain}/" in allowed)
-
-
 def worlds_are_checked(job: TrainingJob, observed: Observed) -> Hold | None:
     """The check of a large world takes seconds, and those of one namespace wait for each other."""
     del job
-    return _hold(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
+    return held(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
 
 
 def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
     """Without Kueue, a job with a queue would wait forever."""
     if job.spec.scheduling.queue_name is None or observed.kueue:
         return None
-    return _hold(Reason.NO_KUEUE)
+    return held(Reason.NO_KUEUE)
 
 
 def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -191,13 +166,13 @@ def _missing(source: Source, observed: Observed) -> Hold | None:
         return None
     fact = f"{source.kind} {source.name} does not exist in this namespace"
     reason = _MISSING.get(source.kind, Reason.WORLD_MISSING)
-    return _hold(reason, field=source.field, name=source.name, fact=fact, remedy=_CREATE)
+    return held(reason, field=source.field, name=source.name, fact=fact, remedy=_CREATE)
 
 
 def _closed(source: Source, observed: Observed) -> Hold | None:
     if open_to_jobs(observed.sources.get(source)):
         return None
-    return _hold(_NOT_FOR_JOBS[source.kind], field=source.field, name=source.name)
+    return held(_NOT_FOR_JOBS[source.kind], field=source.field, name=source.name)
 
 
 def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -205,7 +180,7 @@ def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
     for field, name, key in _world_keys(job):
         if _world(observed, name, key) is None:
             fact = f"ConfigMap {name} has no key {key}"
-            return _hold(Reason.WORLD_MISSING, field=field, fact=fact, remedy="add it")
+            return held(Reason.WORLD_MISSING, field=field, fact=fact, remedy="add it")
     return None
 
 
@@ -216,10 +191,6 @@ HOLDS: tuple[Check, ...] = (
     sources_are_for_jobs,
     worlds_have_their_keys,
 )
-
-
-def _hold(reason: Reason, *, final: bool = False, **facts: object) -> Hold:
-    return Hold(explanation=Explanation(reason=reason, message=say(reason, **facts)), final=final)
 
 
 def complete(job: TrainingJob, observed: Observed) -> bool:

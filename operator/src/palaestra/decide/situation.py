@@ -9,7 +9,7 @@ from palaestra.api.reasons import Reason, say
 from palaestra.api.status import Phase, ReplicaStatus
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import Counted
-from palaestra.decide.preparing import Hold
+from palaestra.decide.holding import Hold
 from palaestra.decide.times import Times, Wait
 from palaestra.observe.views import ContainerView, PodView, ReplicaObserved
 

@@ -10,8 +10,8 @@ FOR_JOBS = "palaestra.dev/for-jobs"
 
 
 def references(job: TrainingJob) -> tuple[Source, ...]:
-    """Return every object of the job's namespace to which its spec refers, each once."""
-    return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_claims(job))))
+    """Return every object of the job's namespace that must be open to jobs for its spec, each once."""
+    return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_pull_secrets(job), *_claims(job))))
 
 
 def open_to_jobs(raw: object) -> bool:
@@ -32,6 +32,15 @@ def _secrets(job: TrainingJob) -> Iterator[Source]:
     yield from _of_variables(job.spec.trainer.env, "spec.trainer")
     for place, group in enumerate(job.spec.simulators):
         yield from _of_variables(group.env, f"spec.simulators[{place}]")
+
+
+def _pull_secrets(job: TrainingJob) -> Iterator[Source]:
+    """Yield the Secrets for pulling images; an earlier release accepted them without the label."""
+    release = job.status.release
+    if release is None or release.pull_secrets_for_jobs:
+        for place, secret in enumerate(job.spec.image_pull_secrets):
+            field = f"spec.imagePullSecrets[{place}]"
+            yield Source(kind=SourceKind.SECRET, name=secret.name, field=field)
 
 
 def _of_variables(env: tuple[Variable, ...], owner: str) -> Iterator[Source]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from palaestra.errors import PalaestraError
-from palaestra.plan import Images
+from palaestra.plan import Allowed, Images
 from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import MOST_PORT
 
@@ -27,8 +27,8 @@ class Options:
         leader_elect: whether to wait for the Lease.
         metrics_address: host and port of /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
-        allowed_pod_labels: keys, or domains that end in `/`, of labels that jobs may give their pods.
-        allowed_pod_annotations: the same of annotations.
+        host_users: whether training pods have the users of their nodes; if not, each has a user namespace.
+        allowed: what jobs may ask for beyond their own pods.
         kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
@@ -42,8 +42,8 @@ class Options:
     leader_elect: bool = True
     metrics_address: Address = METRICS_ADDRESS
     node_selector: Mapping[str, str] = field(default_factory=dict)
-    allowed_pod_labels: tuple[str, ...] = ()
-    allowed_pod_annotations: tuple[str, ...] = ()
+    host_users: bool = True
+    allowed: Allowed = field(default_factory=Allowed)
     kubeconfig: str | None = None
     context: str | None = None
 

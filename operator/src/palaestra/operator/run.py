@@ -195,6 +195,6 @@ def _layout(options: Options) -> ClusterLayout:
         operator_namespace=options.operator_namespace,
         monitoring_namespace=options.monitoring_namespace,
         node_selector=options.node_selector,
-        allowed_pod_labels=options.allowed_pod_labels,
-        allowed_pod_annotations=options.allowed_pod_annotations,
+        host_users=options.host_users,
+        allowed=options.allowed,
     )

@@ -83,18 +83,19 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
 
 
 def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> list[str]:
-    """Return the options of a sidecar."""
+    """Return the options of a sidecar, none of which refers to a variable."""
     group, layout = simulator.group, replica.layout
-    return [
+    words = [
         f"--driver={group.driver.value}",
         f"--world={world}",
         f"--work={replica.places(simulator.container).scratch}/work",
         f"--control={LOOPBACK}:{layout.ports.control[simulator.place]}",
         f"--health={layout.health_host}:{layout.ports.health[simulator.place]}",
         *_identity(simulator),
-        *(f"--option={literal(option)}" for option in group.options),
-        *(("--", *map(literal, group.command)) if group.command else ()),
+        *(f"--option={option}" for option in group.options),
+        *(("--", *group.command) if group.command else ()),
     ]
+    return [literal(word) for word in words]
 
 
 def trainer(replica: Replica) -> Container:
@@ -175,7 +176,10 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
         **({"PALAESTRA_TERMINATION_LOG": places.termination} if container == TRAINER else {}),
     }
     uid = {"valueFrom": {"fieldRef": {"fieldPath": "metadata.uid"}}}
-    return {**{name: {"value": value} for name, value in variables.items()}, "PALAESTRA_POD_UID": uid}
+    return {
+        **{name: {"value": literal(value)} for name, value in variables.items()},
+        "PALAESTRA_POD_UID": uid,
+    }
 
 
 def _mounts(replica: Replica, container: str, places: Places) -> list[dict[str, Any]]:

@@ -66,6 +66,30 @@ class Places:
     initial: str | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowed:
+    """What the jobs of a cluster may ask for beyond their own pods, as its installation allows it.
+
+    Attributes:
+        pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
+        pod_annotations: the same of annotations.
+        priority_classes: names.
+        runtime_classes: names.
+        tolerations: keys of taints, or domains that end in `/`.
+        affinity_namespaces: names of namespaces to whose pods a job may have an affinity, besides its own.
+        anti_affinity_labels: keys of labels by which a required anti-affinity may select pods of other jobs,
+            or domains that end in `/`.
+    """
+
+    pod_labels: tuple[str, ...] = ()
+    pod_annotations: tuple[str, ...] = ()
+    priority_classes: tuple[str, ...] = ()
+    runtime_classes: tuple[str, ...] = ()
+    tolerations: tuple[str, ...] = ()
+    affinity_namespaces: tuple[str, ...] = ()
+    anti_affinity_labels: tuple[str, ...] = ()
+
+
 class Layout(Protocol):
     """A cluster's or a laptop's."""
 
@@ -104,6 +128,11 @@ class Layout(Protocol):
         """Labels that the node of every pod must have, unless the job gives such a label itself."""
         ...
 
+    @property
+    def host_users(self) -> bool:
+        """Whether the users in a pod are those of its node; False: each pod has a user namespace."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -119,11 +148,7 @@ class Layout(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
-    """Every pod has a network and a file system of its own, so places and ports are always the same.
-
-    `allowed_pod_labels` and `allowed_pod_annotations` are what jobs may put on their pods: keys, or domains
-    that end in `/`.
-    """
+    """Every pod has a network and a file system of its own, so places and ports are always the same."""
 
     images: Images
     ports: Ports = Ports()
@@ -132,8 +157,8 @@ class ClusterLayout:
     operator_namespace: str = "palaestra-system"
     monitoring_namespace: str = "monitoring"
     node_selector: Mapping[str, str] = field(default_factory=dict)
-    allowed_pod_labels: tuple[str, ...] = ()
-    allowed_pod_annotations: tuple[str, ...] = ()
+    host_users: bool = True
+    allowed: Allowed = Allowed()
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the same places for every container; runs are kept apart by the job's uid."""
@@ -169,6 +194,7 @@ class LocalLayout:
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
+    host_users: bool = True
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the places of one container, all below `<job_directory>/<replica>`."""

@@ -39,6 +39,7 @@ def pod_template(
             "restartPolicy": "Never",
             "automountServiceAccountToken": False,
             "enableServiceLinks": False,
+            **({} if replica.layout.host_users else {"hostUsers": False}),
             "terminationGracePeriodSeconds": GRACE_S,
             "securityContext": {**UNPRIVILEGED, "fsGroup": USER, "fsGroupChangePolicy": "OnRootMismatch"},
             **_scheduling(replica),
@@ -75,21 +76,21 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
     return fields
 
 
-def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str | None]:
+def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
     """Return the size of each container's shared memory by the name of its volume.
 
-    The trainer's own memory limit bounds what it shares with its workers; None: it has no limit.
+    The trainer's own memory limit bounds what it shares with its workers.
     """
-    whole = {shared_memory(TRAINER): main["resources"].get("limits", {}).get("memory")}
-    return whole | {
-        shared_memory(simulator.container): twice(MEMORY_SIZE) if simulator.group.standby else MEMORY_SIZE
-        for simulator in replica.simulators
+    return {
+        shared_memory(TRAINER): main["resources"]["limits"]["memory"],
+        **{
+            shared_memory(simulator.container): twice(MEMORY_SIZE) if simulator.group.standby else MEMORY_SIZE
+            for simulator in replica.simulators
+        },
     }
 
 
-def _empty_volumes(
-    containers: list[dict[str, Any]], memory: Mapping[str, str | None]
-) -> list[dict[str, Any]]:
+def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return an empty volume for every mount that has no other: each container has its own."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [
@@ -98,8 +99,7 @@ def _empty_volumes(
     ]
 
 
-def _empty(name: str, memory: Mapping[str, str | None]) -> dict[str, Any]:
+def _empty(name: str, memory: Mapping[str, str]) -> dict[str, Any]:
     if name in memory:
-        size = memory[name]
-        return {"medium": "Memory", **({} if size is None else {"sizeLimit": size})}
+        return {"medium": "Memory", "sizeLimit": memory[name]}
     return {"sizeLimit": SCRATCH_SIZE}

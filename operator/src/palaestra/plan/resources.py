@@ -5,14 +5,11 @@ asks for 425m. Small networks learn no faster with a second thread, so the train
 """
 
 import math
-from collections.abc import Mapping
 from decimal import Decimal
 
 from palaestra.api.container import Resources
 
-Quantities = Mapping[str, str]
-CORES = {"m": 0.001, "": 1.0, "k": 1000.0}  # what CPUs are counted in
-BYTES: dict[str, Decimal | int] = {
+UNITS: dict[str, Decimal | int] = {
     "m": Decimal("0.001"),
     "": 1, "k": 10**3, "M": 10**6, "G": 10**9, "T": 10**12, "P": 10**15,
     "Ki": 2**10, "Mi": 2**20, "Gi": 2**30, "Ti": 2**40, "Pi": 2**50,
@@ -28,17 +25,18 @@ TRAINER = Resources(requests={"cpu": "250m", "memory": "768Mi"}, limits={"cpu": 
 
 
 def resources(wanted: Resources, default: Resources) -> Planned:
-    """Return what the job asks for, with defaults for the resources that it does not mention."""
-    mentioned = wanted.requests.keys() | wanted.limits.keys()
+    """Return what the job asks for, with defaults for what it does not name.
 
-    def merged(defaults: Quantities, given: Quantities) -> dict[str, str]:
-        kept = {name: value for name, value in defaults.items() if name not in mentioned}
-        return {**kept, **given}
-
-    planned = {
-        "requests": merged(default.requests, wanted.requests),
-        "limits": merged(default.limits, wanted.limits),
+    If a job names only the request of a resource, the default limit stays, raised to the request if that is
+    more: without a limit, one container could use all memory of its node. If a job names only a limit, there
+    is no default request, because an API server then requests the limit.
+    """
+    requests = {name: value for name, value in default.requests.items() if name not in wanted.limits}
+    limits = {
+        name: max(value, wanted.requests.get(name, value), key=_amount)
+        for name, value in default.limits.items()
     }
+    planned = {"requests": {**requests, **wanted.requests}, "limits": {**limits, **wanted.limits}}
     return {field: value for field, value in planned.items() if value}
 
 
@@ -61,20 +59,30 @@ def twice(quantity: str) -> str:
 
 def in_bytes(memory: str) -> int:
     """Return how many bytes an amount of memory such as 400Mi is."""
-    number, unit = _split(memory)
-    return int(Decimal(number) * BYTES[unit])
+    return int(_amount(memory))
 
 
 def threads(planned: Planned) -> int:
     """Return how many threads the CPU limit is good for, 1 where there is none."""
-    number, unit = _split(planned.get("limits", {}).get("cpu", "1"))
-    return max(math.ceil(float(number) * CORES[unit]), 1)
+    return max(math.ceil(_amount(planned.get("limits", {}).get("cpu", "1"))), 1)
 
 
 def asks_for_gpu(wanted: Resources) -> bool:
     """Return whether requests or limits name a GPU, such as nvidia.com/gpu, and more than none of it."""
-    quantities = (*wanted.requests.items(), *wanted.limits.items())
-    return any(name.endswith("/gpu") and Decimal(_split(quantity)[0]) > 0 for name, quantity in quantities)
+    names = (*wanted.requests, *wanted.limits)
+    return any(name.endswith("/gpu") and asks_for(name, wanted) for name in names)
+
+
+def asks_for(resource: str, wanted: Resources) -> bool:
+    """Return whether requests or limits name a resource, and more than none of it."""
+    quantities = (wanted.requests.get(resource, "0"), wanted.limits.get(resource, "0"))
+    return any(_amount(quantity) > 0 for quantity in quantities)
+
+
+def _amount(quantity: str) -> Decimal:
+    """Return the number of a quantity in its base unit: cores or bytes."""
+    number, unit = _split(quantity)
+    return Decimal(number) * UNITS[unit]
 
 
 def _split(quantity: str) -> tuple[str, str]:

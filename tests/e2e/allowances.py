@@ -1,0 +1,20 @@
+"""What the tests' installation allows jobs; by default, as in manifests/install.yaml, it allows nothing."""
+
+from tests.e2e.cluster import Cluster
+from tests.e2e.namespace import OPERATOR, SYSTEM
+
+MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
+OF_THE_PAGE = "urgent"  # of docs/queues.md
+OPTIONS = tuple(f"--allow-priority-class={name}" for name in (MISSING, LIMITED, URGENT, OF_THE_PAGE))
+
+
+def allow(cluster: Cluster) -> None:
+    """Let jobs have the priority classes of the tests, and wait until the operator has started with them."""
+    deployment = cluster.get("deployments", SYSTEM, OPERATOR)
+    assert deployment is not None, "Palaestra is not installed"
+    [container] = deployment["spec"]["template"]["spec"]["containers"]
+    if missing := [option for option in OPTIONS if option not in container["command"]]:
+        wanted = {**container, "command": [*container["command"], *missing]}
+        template = {"spec": {"containers": [wanted]}}
+        cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"template": template}})
+    cluster.rolled_out(SYSTEM, OPERATOR)

@@ -1,0 +1,119 @@
+"""Guards, the rules about new jobs of a cluster: what breaks each, and what does not."""
+
+import re
+
+import pytest
+
+from palaestra.api import TrainingJob, broken_guards, validate
+from palaestra.api.tree import fields_of, walk
+
+URI = "http://alice:S3CR%40ET@tracking.example.com:5000/mlflow"
+IN_VALUE = "contains a password in an address; put the value into a Secret and use secretKeyRef"
+ELSEWHERE = "contains a password in an address; pass it in an environment variable with secretKeyRef"
+GROUP = {"name": "collect", "role": "Collect"}
+OWN = {**GROUP, "driver": "command", "image": "my:1"}
+GUARDS = {
+    f"{'.'.join(path)}: {guard.field}": (model, guard)
+    for path, model in walk(TrainingJob)
+    for guard in model.guards
+}
+
+# Where an address may be, and the one line about its password.
+BROKEN = {
+    "a variable of the trainer": (
+        {"trainer": {"env": [{"name": "MLFLOW_TRACKING_URI", "value": URI}]}},
+        f"spec.trainer.env[0].value: {IN_VALUE}",
+    ),
+    "a variable of a simulator": (
+        {"simulators": [{**GROUP, "env": [{"name": "PROXY", "value": f"via {URI}"}]}]},
+        f"spec.simulators[0].env[0].value: {IN_VALUE}",
+    ),
+    "the option of a callback": (
+        {"trainer": {"algorithm": {"callbacks": [{"name": "my:Tracker", "options": {"uri": URI}}]}}},
+        f"spec.trainer.algorithm.callbacks[0].options: {ELSEWHERE}",
+    ),
+    "the option of an environment": (
+        {"trainer": {"environment": {"id": "My-v0", "options": {"stores": [{"at": URI}]}}}},
+        f"spec.trainer.environment.options: {ELSEWHERE}",
+    ),
+    "the option of a wrapper": (
+        {"trainer": {"environment": {"wrappers": [{"name": "my:Wrapper", "options": {URI: 1}}]}}},
+        f"spec.trainer.environment.wrappers[0].options: {ELSEWHERE}",
+    ),
+    "a program in the trainer": (
+        {"trainer": {"command": ["bash", "-c", f"curl {URI}"]}},
+        f"spec.trainer.command: {ELSEWHERE}",
+    ),
+    "a simulator of one's own": (
+        {"simulators": [{**OWN, "command": ["sim", URI]}]},
+        f"spec.simulators[0].command: {ELSEWHERE}",
+    ),
+    "an option of a simulator": (
+        {"simulators": [{**GROUP, "options": [f"--to={URI}"]}]},
+        f"spec.simulators[0].options: {ELSEWHERE}",
+    ),
+}
+
+
+def job(spec):
+    """Return a job that evaluates nothing."""
+    trainer = {"evaluation": {"everySteps": 0}, **spec.get("trainer", {})}
+    return validate(
+        {
+            "apiVersion": "palaestra.dev/v1alpha1",
+            "kind": "TrainingJob",
+            "metadata": {"name": "job"},
+            "spec": {"simulators": [GROUP], **spec, "trainer": trainer},
+        }
+    )
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_an_address_with_a_password_is_reported_without_it(name):
+    """Field, fact and remedy; the line goes into a status, which more people read."""
+    spec, line = BROKEN[name]
+
+    assert broken_guards(job(spec)) == (line,)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "http://tracking.example.com:5000",
+        "http://alice@tracking.example.com",
+        "http://[::1]:5000/a@b",
+        "https://host:443/users/a@b",
+        "https://$USER:$TOKEN@host",
+        "https://$USER:${TOKEN}@host",
+        "https://{user}:{token}@host",
+        "alice:secret@host",
+        "see http://host and mail: me@host",
+    ],
+)
+def test_an_address_without_a_password_is_not_reported(value):
+    """A port, a user's name, a mail address and the variables of a shell are none."""
+    assert broken_guards(job({"trainer": {"env": [{"name": "A", "value": value}]}})) == ()
+
+
+def test_every_guard_is_broken_by_an_example_here():
+    """A guard that nobody has seen refuse is a guess."""
+    fields = {
+        re.sub(r"\[\d+\]", "", line.split(": ")[0]).removeprefix("spec.") for _, line in BROKEN.values()
+    }
+    guarded = {
+        ".".join((*path, guard.field)).removeprefix("spec.")
+        for path, model in walk(TrainingJob)
+        for guard in model.guards
+    }
+
+    assert fields == guarded
+
+
+@pytest.mark.parametrize("name", GUARDS)
+def test_a_guard_reads_a_field_of_its_object(name):
+    """A renamed field must not leave its old name behind in an expression."""
+    model, guard = GUARDS[name]
+
+    read = {*re.findall(r"\bself[.](\w+)", guard.cel), *guard.reads, guard.field}
+
+    assert read <= set(fields_of(model))

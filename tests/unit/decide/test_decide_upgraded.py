@@ -1,0 +1,74 @@
+"""A job that an earlier release accepted goes on, whatever a new rule says about its spec."""
+
+import pytest
+
+from palaestra.api.status import Phase
+
+# What this release no longer accepts in a new job.
+ANTI_AFFINITY = {
+    "requiredDuringSchedulingIgnoredDuringExecution": [
+        {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
+    ]
+}
+ADDRESS = "http://me:secret@tracking.example.com"
+ACCEPTED_EARLIER = {
+    "a password": {"trainer": {"env": [{"name": "MLFLOW_TRACKING_URI", "value": ADDRESS}]}},
+    "a priority": {"scheduling": {"priorityClassName": "urgent"}},
+    "a runtime": {"scheduling": {"runtimeClassName": "kata"}},
+    "a toleration": {"scheduling": {"tolerations": [{"key": "dedicated", "operator": "Exists"}]}},
+    "an anti-affinity": {"scheduling": {"affinity": {"podAntiAffinity": ANTI_AFFINITY}}},
+    "a pull Secret without the label": {"imagePullSecrets": [{"name": "registry"}]},
+}
+
+
+@pytest.fixture(params=ACCEPTED_EARLIER)
+def upgraded(request, make_scene):
+    """A job that trains, accepted by a release without the rule that its spec breaks."""
+    scene = make_scene()
+    scene.settle()
+    scene.running_pod()
+    scene.settle()
+    scene.raw["spec"] |= ACCEPTED_EARLIER[request.param]
+    return scene
+
+
+def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
+    """The control: without it, the tests below would show nothing."""
+    scene = make_scene(**upgraded.raw["spec"])
+
+    decision = scene.settle()
+
+    assert scene.status.conditions[0].status == "False"
+    assert not [each for each in decision.actions if each.object["kind"] == "Job"]
+
+
+def test_it_runs_on(upgraded):
+    """The operator that comes with the upgrade changes nothing about it."""
+    upgraded.restart()
+
+    decision = upgraded.settle()
+
+    assert (upgraded.status.phase, decision.actions) == (Phase.RUNNING, ())
+    assert upgraded.status.conditions[0].status == "True"
+
+
+def test_it_is_suspended_and_resumed(upgraded):
+    """Each is a change of the spec, and of a field that may change."""
+    for generation, suspend in enumerate((True, False), 2):
+        upgraded.raw["spec"]["suspend"] = suspend
+        upgraded.raw["metadata"]["generation"] = generation
+
+        decision = upgraded.settle()
+
+        assert [each.suspend for each in decision.actions] == [suspend]
+
+
+def test_its_replica_is_planned_again(upgraded):
+    """Its Job was deleted by somebody, and its spec is as it was at acceptance."""
+    upgraded.objects["pods"].clear()
+    upgraded.objects["jobs"].clear()
+
+    decision = upgraded.settle()
+
+    assert [each.object["kind"] for each in decision.actions] == ["Job"]
+    assert upgraded.status.phase is not Phase.FAILED
