@@ -173,7 +173,6 @@ def test_the_other_sensors_have_the_units_of_webots(load):
             (FORCE, '<framelinvel name="v" objtype="body" objname="cart"/>'),
             "the sensor 'v' of type framelinvel is no device of Webots; leave it out",
         ),
-        ((FORCE, '<jointpos name="push" joint="hinge"/>'), "a second device is called 'push'; rename one"),
         (('<adhesion body="cart" ctrlrange="0 1"/>',), "the actuator 'actuator0' is no motor of Webots"),
         (
             (FORCE, "", ("<custom>", '<custom><text name="device:sensor/x" data="y"/>')),
@@ -190,6 +189,15 @@ def test_what_cannot_be_a_device_is_refused_before_anything_starts(load, texts, 
         load(*texts)
 
 
+def test_devices_of_one_name_are_told_apart(load):
+    """Names are unique in a section of a model; servos have a position and a velocity term without names."""
+    servo = '<position joint="slider" kp="20"/><velocity joint="slider" kv="1"/>'
+
+    found = kinds(load(servo + FORCE, '<jointpos name="push" joint="hinge"/>'))
+
+    assert {"slider_position", "slider_velocity", "push", "push_jointpos"} <= set(found)
+
+
 def test_a_sensor_without_a_device_is_left_out_by_its_type(load):
     """The trainer logs it, and the status of the job has it."""
     simulation = load(
@@ -204,7 +212,7 @@ def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
     """An included file may name files too."""
     (tmp_path / "part.xml").write_text('<mujoco><asset><mesh file="/etc/x.obj"/></asset></mujoco>')
 
-    with pytest.raises(WorldError, match=r"part\.xml:1:16: '/etc/x.obj' is outside of the folder"):
+    with pytest.raises(WorldError, match=r"part\.xml:1:16: '/etc/x.obj' is outside of the project"):
         load(FORCE, "", ("<worldbody>", '<include file="part.xml"/><worldbody>'))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra_sim.world import RunIdentity, WorldError, check, generate, rename, robots, suffix
-from palaestra_sim.world.mjcf import describe
+from palaestra_sim.world.mjcf import describe, whole_step_ms
 
 IDENTITY = RunIdentity(job="balance", replica=0, group="collect", index=1)
 NAMED = b"""<?xml version="1.0"?>
@@ -103,20 +103,56 @@ def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
         check(source)
 
 
-@pytest.mark.parametrize("path", ["/etc/passwd", "../secret.obj", "a/../../b.obj", "file:x", "a\\b.obj"])
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "../../secret.obj", "a/../../../b.obj", "file:x", "a\\b.obj"]
+)
 @pytest.mark.parametrize("element", ['<mesh file="{}"/>', '<texture fileback="{}"/>'])
 def test_a_file_outside_of_the_folder_is_refused(path, element):
     """A model of a stranger must not read files of the pod."""
     source = with_custom(b"", f"<asset>{element.format(path)}</asset>".encode())
 
-    with pytest.raises(WorldError, match="is outside of the folder of the world; name a file beside"):
+    with pytest.raises(WorldError, match="is outside of the project of the world; name a file beside"):
         check(source, relative_addresses=True)
 
 
 def test_a_folder_of_meshes_outside_is_refused():
     """Its files would be outside too."""
-    with pytest.raises(WorldError, match="'/usr' is outside of the folder"):
+    with pytest.raises(WorldError, match="'/usr' is outside of the project"):
         check(with_custom(b"", b'<compiler meshdir="/usr"/>'), relative_addresses=True)
+
+
+def test_a_folder_of_meshes_beside_that_of_the_world_is_the_usual_layout():
+    """Those of gymnasium-robotics and of many labs; a folder and a file together leave the project, too."""
+    assets = b'<asset><mesh file="arm.stl"/></asset>'
+    check(with_custom(b"", b'<compiler meshdir="../stls/fetch"/>' + assets), relative_addresses=True)
+
+    both = b'<compiler meshdir=".."/>' + assets.replace(b"arm", b"../arm")
+    with pytest.raises(WorldError, match=r"'../arm.stl' is outside of the project"):
+        check(with_custom(b"", both), relative_addresses=True)
+
+
+@pytest.mark.parametrize(("timestep", "near"), [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013")])
+def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
+    """A basic step of two seconds was taken, at which no robot could be driven."""
+    with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
+        check(with_custom(b"", f'<option timestep="{timestep}"/>'.encode()))
+
+
+@pytest.mark.parametrize(
+    ("timestep", "step_ms"),
+    [
+        ("0.002", 2),
+        ("0.0041666", 25),
+        ("0.00416666", 25),
+        ("0.0166667", 50),
+        ("0.00833333", 25),
+        ("0.00333333", 10),
+        ("0.0025", 5),
+    ],
+)
+def test_a_rounded_timestep_makes_the_step_that_is_meant(timestep, step_ms):
+    """1/240, 1/60, 1/120 and 1/300 of a second have no end in decimals."""
+    assert whole_step_ms(float(timestep)) == step_ms
 
 
 def test_files_beside_the_world_need_a_world_with_a_file():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,9 +25,11 @@ from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.world import mjcf
 from palaestra_sim.world.mjcf import Description
+from palaestra_sim.world.mjcf.elements import Element
 from palaestra_sim.world.source import Source
 
 _LINE: Final = re.compile(r"\bline (\d+)")
+_INSIDE: Final = "put it beside the world, or beside the folder of the world"
 
 
 def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> MjcfSimulation:
@@ -39,8 +43,10 @@ def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> Mjc
     leave_out = leave_out or LeaveOut()
     mjcf.check(source, world_path.name, relative_addresses=True)
     description = mjcf.describe(source, world_path.name)
-    if error := refusal(_stray_parts(world_path.parent, description)):
+    collected = _Parts(world_path.absolute().parent, description)
+    if error := refusal(chain(collected.read(), collected.beside_the_root())):
         raise error
+    description = mjcf.with_parts(description, collected.roots)
     compiled = _compiled(world_path)
     model = Model(compiled, _keyframe(compiled, description))
     basic_step_ms = _basic_step_ms(compiled, description)
@@ -86,24 +92,60 @@ def _compiled(world_path: Path) -> Any:
         raise WorldError(world_path.name, int(line[1]) if line else 1, 1, text, remedy) from None
 
 
-def _stray_parts(folder: Path, description: Description) -> Iterator[WorldError]:
-    """Yield what is wrong with the files of which MuJoCo reads more elements, and with what they include."""
-    folders = ["", *(path for _, path in mjcf.named_folders(description.root))]
-    waiting = [(description.source, description.root)]
-    seen: set[Path] = set()
-    while waiting:
-        source, root = waiting.pop()
-        for part in mjcf.parts(root):
-            file = next((it for at in folders if (it := folder / at / part).is_file()), None)
-            if file is None:
-                fact = f"the file {part!r}, of which the model consists too, is missing"
-                yield source.error(root.start, fact, "put it beside the world")
-            elif file not in seen:
-                seen.add(file)
-                inner = Source(data=file.read_bytes(), name=part)
-                elements = mjcf.read(inner)
-                yield from mjcf.strays(inner, elements)
-                waiting.append((inner, elements))
+class _Parts:
+    """The other files of which MuJoCo reads elements, and what they include.
+
+    MuJoCo looks for such a file beside the world, then in the folders that the world names, then beside the
+    file that includes it.
+
+    Attributes:
+        roots: the elements of the files that were read.
+    """
+
+    def __init__(self, folder: Path, description: Description) -> None:
+        self.roots: list[Element] = []
+        self._folder = folder
+        self._description = description
+        self._named = ["", *(path for _, path in mjcf.named_folders(description.root))]
+
+    def read(self) -> Iterator[WorldError]:
+        """Read all files; yield what is wrong with them, and with what they include."""
+        description = self._description
+        waiting = [("", description.source, description.root)]
+        seen: set[Path] = set()
+        while waiting:
+            beside, source, root = waiting.pop()
+            for part in mjcf.parts(root):
+                found = self._found(part, beside)
+                if found is None:
+                    fact = f"the file {part!r}, of which the model consists too, is missing"
+                    yield source.error(root.start, fact, "put it beside the world, or beside this file")
+                elif not mjcf.in_project(found):
+                    yield source.error(
+                        root.start, f"{part!r} is outside of the project of the world", _INSIDE
+                    )
+                elif (file := self._folder / found) not in seen:
+                    seen.add(file)
+                    inner = Source(data=file.read_bytes(), name=part)
+                    elements = mjcf.read(inner)
+                    self.roots.append(elements)
+                    yield from mjcf.strays(inner, elements, self._named, includes=False)
+                    waiting.append((posixpath.dirname(found), inner, elements))
+
+    def beside_the_root(self) -> Iterator[WorldError]:
+        """Yield what leaves the folder of a world whose project would be the whole file system."""
+        if self._folder.parent.parent != self._folder.parent:
+            return
+        description = self._description
+        for element, path in (*mjcf.named_files(description.root), *mjcf.named_folders(description.root)):
+            if not mjcf.in_project(posixpath.join("..", path)):
+                fact = f"{path!r} is outside of the folder of the world"
+                yield description.source.error(element.start, fact, "put the world one folder deeper")
+
+    def _found(self, part: str, beside: str) -> str | None:
+        """Return the path of the first file that there is, from the world's folder."""
+        paths = (posixpath.normpath(posixpath.join(at, part)) for at in (*self._named, beside))
+        return next((path for path in paths if (self._folder / path).is_file()), None)
 
 
 def _keyframe(model: Any, description: Description) -> int | None:
@@ -120,9 +162,14 @@ def _keyframe(model: Any, description: Description) -> int | None:
 
 def _basic_step_ms(model: Any, description: Description) -> int:
     """Return the basic step; the timestep may come from another file of the model."""
-    step_ms = description.basic_step_ms or mjcf.whole_step_ms(float(model.opt.timestep))
-    if step_ms is None or not mjcf.fits(step_ms, float(model.opt.timestep)):
-        fact = f"the basic step does not fit the timestep of {float(model.opt.timestep):g} s"
-        remedy = 'write <numeric name="basicTimeStep" data="..."/> in <custom>, a multiple in whole ms'
+    timestep_s = float(model.opt.timestep)
+    step_ms = description.basic_step_ms or mjcf.whole_step_ms(timestep_s)
+    if step_ms is None:
+        shorter, longer = mjcf.fitting_timesteps_s(timestep_s)
+        fact = f"no short basic step of whole milliseconds fits the timestep of {timestep_s:g} s"
+        raise description.error("", "", fact, f"write a timestep of {shorter:g} or {longer:g}")
+    if not mjcf.fits(step_ms, timestep_s):
+        fact = f"basicTimeStep {step_ms:g} is no multiple of the timestep of {timestep_s:g} s in whole ms"
+        remedy = f"write {mjcf.whole_step_ms(timestep_s) or 'another'}"
         raise description.error("custom", "basicTimeStep", fact, remedy)
     return int(step_ms)

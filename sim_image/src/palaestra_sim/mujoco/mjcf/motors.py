@@ -197,6 +197,12 @@ def control_of(model: Any, index: int) -> tuple[Control, float] | None:
     return Control.FORCE, 1.0 / (float(gain[0]) * gear)
 
 
+def kind_of(model: Any, index: int) -> str:
+    """Return a word for what the control of an actuator is."""
+    control = control_of(model, index)
+    return "actuator" if control is None else control[0].name.lower()
+
+
 def gear_of(model: Any, index: int) -> float:
     """Return the force at the joint for a force of 1 of the actuator; at a site, in its direction."""
     gear: list[float] = model.actuator_gear[index].tolist()

@@ -72,6 +72,7 @@ class _Fitter:
         self._names = dict(description.devices)
         self._known: set[str] = set()
         self._shafts: dict[int, Shaft] = {}
+        self._defaults = _actuator_names(model.model)
         self._found = Equipment()
 
     def fit(self) -> Equipment:
@@ -83,7 +84,8 @@ class _Fitter:
         for index in range(model.nsensor):
             self._add_sensor(index)
         for index in range(model.ncam):
-            name = self._name(_CAMERA, model.camera(index).name or f"camera{index}")
+            own = model.camera(index).name or f"camera{index}"
+            name = self._name(_CAMERA, own, f"{own}_camera")
             if name is not None:
                 found = camera(self._model, index, name)
                 self._add(_CAMERA, found.kind, found.device, None)
@@ -94,8 +96,8 @@ class _Fitter:
         model = self._model.model
         joint = motors.joint_of(model, index)
         own = model.actuator(index).name
-        default = own or ("" if joint is None else model.jnt(joint).name) or f"actuator{index}"
-        name = self._name(_ACTUATOR, default)
+        default = self._defaults[index]
+        name = self._name(_ACTUATOR, default, f"{default}_actuator")
         if name is None:
             return
         control = motors.control_of(model, index)
@@ -121,7 +123,7 @@ class _Fitter:
         what, which = int(model.sensor_objtype[index]), int(model.sensor_objid[index])
         own = model.sensor(index).name
         target = mujoco.mj_id2name(model, what, which) if which >= 0 else None
-        name = self._name(_SENSOR, own or f"{target or index}_{type_name}")
+        name = self._name(_SENSOR, own or f"{target or index}_{type_name}", f"{own}_{type_name}")
         if name is None:
             return
         start = int(model.sensor_adr[index])
@@ -158,10 +160,15 @@ class _Fitter:
             self._found.joints[name] = joint
         return True
 
-    def _name(self, section: str, default: str) -> str | None:
-        """Return the name of a device; None if the robot shall not have it."""
+    def _name(self, section: str, default: str, other: str) -> str | None:
+        """Return the name of a device; None if the robot shall not have it.
+
+        Names in a model are unique in a section; a device whose name another section has too gets `other`.
+        """
         key = f"{section}/{default}"
         self._known.add(key)
+        if key not in self._names and default in self._found.devices.rows:
+            return other
         name = self._names.get(key, default)
         return None if name == LEFT_OUT else name
 
@@ -200,3 +207,22 @@ class _Fitter:
             controls[index] = value
 
         return write
+
+
+def _actuator_names(model: Any) -> list[str]:
+    """Return the name of each actuator: its own, else that of its joint, else its number.
+
+    Several actuators of one joint without names, such as a position and a velocity servo, have their kinds in
+    their names, or else their numbers.
+    """
+    joints = [motors.joint_of(model, index) for index in range(model.nu)]
+    plain = [
+        model.actuator(index).name or ("" if joint is None else model.jnt(joint).name) or f"actuator{index}"
+        for index, joint in enumerate(joints)
+    ]
+    unclear = [plain.count(name) > 1 and not model.actuator(index).name for index, name in enumerate(plain)]
+    kinds = [
+        f"{name}_{motors.kind_of(model, index)}" if unclear[index] else name
+        for index, name in enumerate(plain)
+    ]
+    return [f"{name}{index}" if kinds.count(name) > 1 else name for index, name in enumerate(kinds)]

@@ -63,6 +63,7 @@ class MjcfSimulation:
         self._states = BodyStates(model, tree.bodies)
         self._step_s = basic_step_ms / 1000.0
         self._steps = round(self._step_s / float(model.model.opt.timestep))
+        model.model.opt.timestep = self._step_s / self._steps  # a file may round 1/240 s
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
 

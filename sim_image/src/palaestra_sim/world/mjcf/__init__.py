@@ -10,9 +10,18 @@ Pure text, as all of `world`: MuJoCo itself is not needed to check or to name su
 """
 
 from palaestra_sim.world.mjcf.checks import check
-from palaestra_sim.world.mjcf.description import LEFT_OUT, Description, describe, fits, is_mjcf, whole_step_ms
+from palaestra_sim.world.mjcf.description import (
+    LEFT_OUT,
+    Description,
+    describe,
+    fits,
+    fitting_timesteps_s,
+    is_mjcf,
+    whole_step_ms,
+    with_parts,
+)
 from palaestra_sim.world.mjcf.elements import read
-from palaestra_sim.world.mjcf.files import named_folders, parts, stays_inside, strays
+from palaestra_sim.world.mjcf.files import in_project, named_files, named_folders, parts, strays
 from palaestra_sim.world.mjcf.naming import generate, rename, robots
 
 __all__ = [
@@ -21,14 +30,17 @@ __all__ = [
     "check",
     "describe",
     "fits",
+    "fitting_timesteps_s",
     "generate",
+    "in_project",
     "is_mjcf",
+    "named_files",
     "named_folders",
     "parts",
     "read",
     "rename",
     "robots",
-    "stays_inside",
     "strays",
     "whole_step_ms",
+    "with_parts",
 ]

@@ -19,9 +19,10 @@ from palaestra_sim.world.mjcf.description import (
     custom,
     describe,
     fits,
+    fitting_timesteps_s,
     whole_step_ms,
 )
-from palaestra_sim.world.mjcf.files import named_files, parts, stays_inside, strays
+from palaestra_sim.world.mjcf.files import in_project, named_files, parts, strays
 
 _ROS_REMAPPING: Final = re.compile(r"__\w+:=")
 
@@ -64,7 +65,12 @@ def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
 
 
 def unfit_step(found: Description) -> Iterator[WorldError]:
-    """The basic step is no whole number of milliseconds and of MuJoCo's steps."""
+    """The basic step is no whole number of milliseconds and of MuJoCo's steps.
+
+    Another file of the model may set the timestep; then MuJoCo's own model decides, when it is loaded.
+    """
+    if parts(found.root):
+        return
     timestep_s, step_ms = found.timestep_s, found.basic_step_ms
     element = found.numbers.get(BASIC_STEP)
     if not timestep_s > 0.0:
@@ -72,9 +78,10 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
         yield found.source.error(option.start, "the timestep is no positive number", "write seconds")
     elif step_ms is None or element is None:
         if whole_step_ms(timestep_s) is None:
-            fact = f"no whole number of milliseconds fits the timestep of {timestep_s:g} s"
+            fact = f"no short basic step of whole milliseconds fits the timestep of {timestep_s:g} s"
+            shorter, longer = fitting_timesteps_s(timestep_s)
             option = next(found.root.named("option"))
-            yield found.source.error(option.start, fact, "change it, for example to 0.002")
+            yield found.source.error(option.start, fact, f"write {shorter:g} or {longer:g}")
     elif not fits(step_ms, timestep_s):
         fact = f"basicTimeStep {step_ms:g} is no multiple of the timestep of {timestep_s:g} s in whole ms"
         yield found.source.error(element.start, fact, f"write {whole_step_ms(timestep_s) or 'another'}")
@@ -93,14 +100,14 @@ def unknown_devices(found: Description) -> Iterator[WorldError]:
 
 
 def files_elsewhere(found: Description) -> Iterator[WorldError]:
-    """A name of a file leads out of the folder of the world."""
+    """A name of a file leads out of the project of the world."""
     yield from strays(found.source, found.root)
 
 
 def relative_address(found: Description) -> Iterator[WorldError]:
     """The model names a file, but the world has none and so no folder."""
     for element, path in named_files(found.root):
-        if stays_inside(path):
+        if in_project(path):
             fact = f"{path!r} is relative to the file of the world, and this one has none"
             yield found.source.error(element.start, fact, "give the world as a file (world.file)")
 

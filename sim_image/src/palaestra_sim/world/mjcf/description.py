@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 from palaestra_sim.errors import WorldError
@@ -31,8 +31,8 @@ DEVICE: Final = "device:"
 LEFT_OUT: Final = "-"  # the name of a device that the robot shall not have
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
-_MOST_STEPS: Final = 1000
-_NEAR: Final = 1e-6
+_LONGEST_MS: Final = 100  # of a basic step that no world asks for; robots move a few times as often
+_NEAR: Final = 1e-4  # relative: 0.0041666 s is 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
@@ -128,11 +128,7 @@ def custom(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
 
 def whole_step_ms(timestep_s: float) -> int | None:
     """Return the shortest time of whole milliseconds and whole steps of MuJoCo; None if it is too long."""
-    for steps in range(1, _MOST_STEPS + 1):
-        step_ms = steps * timestep_s * 1000.0
-        if round(step_ms) >= 1 and abs(step_ms - round(step_ms)) < _NEAR * step_ms:
-            return round(step_ms)
-    return None
+    return next((step_ms for step_ms in range(1, _LONGEST_MS + 1) if fits(step_ms, timestep_s)), None)
 
 
 def fits(step_ms: float, timestep_s: float) -> bool:
@@ -141,6 +137,28 @@ def fits(step_ms: float, timestep_s: float) -> bool:
         return False
     steps = step_ms / (timestep_s * 1000.0)
     return round(steps) >= 1 and abs(steps - round(steps)) < _NEAR * steps
+
+
+def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
+    """Return the nearest shorter and longer timestep of which some make a short basic step."""
+    ms = timestep_s * 1000.0
+    if ms >= 1.0:
+        return int(ms) / 1000.0, (int(ms) + 1) / 1000.0
+    steps = int(1.0 / ms)
+    return 0.001 / (steps + 1), 0.001 / steps
+
+
+def with_parts(description: Description, parts: Iterable[Element]) -> Description:
+    """Return the description of a model that consists of more files, whose `custom` counts too.
+
+    An element of another file has its place at the root of this one, in errors.
+    """
+    texts, numbers = dict(description.texts), dict(description.numbers)
+    for root in parts:
+        for tag, found in (("text", texts), ("numeric", numbers)):
+            for name, element in custom(root, tag):
+                found.setdefault(name, replace(element, start=description.root.start))
+    return replace(description, texts=texts, numbers=numbers)
 
 
 def _by_name(root: Element, tag: str) -> dict[str, Element]:

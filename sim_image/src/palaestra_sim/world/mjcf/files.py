@@ -1,13 +1,13 @@
 """The files that a model names: meshes, textures, parts of the model.
 
-MuJoCo opens what the attributes of a model name, wherever it is. A name may lead nowhere but into the folder
-of the world: no absolute path, and no `..` that leaves a folder.
+MuJoCo opens what the attributes of a model name, wherever it is. A name may lead nowhere but into the project
+of the world, which is the folder around that of the world, as for Webots.
 """
 
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from palaestra_sim.errors import WorldError
@@ -18,7 +18,9 @@ _FILES: Final = frozenset(
     ("file", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
 )
 _FOLDERS: Final = frozenset(("assetdir", "meshdir", "texturedir"))
-_INSIDE: Final = "name a file beside the world or in a folder there, without .. and without a leading slash"
+_INSIDE: Final = (
+    "name a file beside the world, or beside its folder, without a leading slash and with one .. at most"
+)
 _PARTS: Final = frozenset(("include", "model"))
 
 
@@ -43,16 +45,34 @@ def parts(root: Element) -> tuple[str, ...]:
     return tuple(value for element, value in named_files(root) if element.tag in _PARTS)
 
 
-def strays(source: Source, root: Element) -> Iterator[WorldError]:
-    """Yield an error for each name in a file that leads out of the folder of the world."""
-    for element, path in (*named_files(root), *named_folders(root)):
-        if not stays_inside(path):
-            fact = f"{path!r} is outside of the folder of the world"
-            yield source.error(element.start, fact, _INSIDE)
+def strays(
+    source: Source, root: Element, folders: Iterable[str] = (), *, includes: bool = True
+) -> Iterator[WorldError]:
+    """Yield an error for each name in a file that leads out of the project of the world.
+
+    Args:
+        source: the file.
+        root: its elements.
+        folders: in which MuJoCo looks for files besides those that this file names.
+        includes: whether names of more files with elements count; they may start beside the file itself.
+    """
+    named = [path for _, path in named_folders(root)]
+    yield from _leaving(source, named_folders(root), [""])
+    files = (row for row in named_files(root) if includes or row[0].tag not in _PARTS)
+    yield from _leaving(source, files, ["", *folders, *named])
 
 
-def stays_inside(path: str) -> bool:
-    """Return whether a path leads into the folder that it starts from, or is that folder."""
+def in_project(path: str) -> bool:
+    """Return whether a path from the folder of a world leads into that folder or the one around it."""
     if "\\" in path or ":" in path or posixpath.isabs(path):
         return False
-    return posixpath.normpath(path).partition("/")[0] != ".."
+    return not f"{posixpath.normpath(path)}/".startswith("../../")
+
+
+def _leaving(
+    source: Source, named: Iterable[tuple[Element, str]], folders: Sequence[str]
+) -> Iterator[WorldError]:
+    for element, path in named:
+        if not all(in_project(path) and in_project(posixpath.join(folder, path)) for folder in folders):
+            fact = f"{path!r} is outside of the project of the world"
+            yield source.error(element.start, fact, _INSIDE)

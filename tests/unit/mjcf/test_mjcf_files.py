@@ -1,0 +1,95 @@
+"""Models of several files: where MuJoCo finds them, and what they hold."""
+
+import mujoco
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.mujoco.mjcf.loading import load as load_mjcf
+from palaestra_sim.scene.mode import Mode
+
+SCENE = """<mujoco model="cell">
+  {head}
+  <worldbody>
+    <body name="link" pos="0 0 1"><joint name="hinge" axis="0 1 0"/><geom size="0.1"/>{body}</body>
+  </worldbody>
+  <actuator><motor name="push" joint="hinge"/></actuator>
+</mujoco>
+"""
+ARGUMENTS = '<custom><text name="controllerArgs" data="--name=cell --synchronize"/>{}</custom>'
+
+
+@pytest.fixture
+def world(tmp_path):
+    """`world(head, body, **files)`: the path of a world in a project, with more files from its folder."""
+
+    def write(head="", body="", files=()):
+        folder = tmp_path / "project" / "worlds"
+        for name, text in {"scene.xml": SCENE.format(head=head, body=body), **dict(files)}.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text)
+        return folder / "scene.xml"
+
+    return write
+
+
+def test_files_are_found_where_mujoco_finds_them(world):
+    """Beside the world, then beside the file that includes them; one that leads back inside is no stray."""
+    path = world(
+        ARGUMENTS.format(""),
+        '<include file="arm/arm.xml"/>',
+        {
+            "arm/arm.xml": '<mujocoinclude><include file="gripper.xml"/></mujocoinclude>',
+            "arm/gripper.xml": '<mujocoinclude><include file="../tool.xml"/></mujocoinclude>',
+            "tool.xml": '<mujocoinclude><geom name="tool" size="0.01"/></mujocoinclude>',
+        },
+    )
+
+    simulation = load_mjcf(path, Mode.FAST)
+
+    assert mujoco.MjModel.from_xml_path(str(path)).geom("tool").id > 0
+    assert simulation.robots[0].name == "cell"
+
+
+def test_what_an_included_file_holds_counts(world):
+    """The timestep, the basic step and names of devices were those of the main file alone."""
+    custom = '<numeric name="basicTimeStep" data="6"/><text name="device:actuator/push" data="arm"/>'
+    inner = f"<mujocoinclude><option timestep='0.003'/>{ARGUMENTS.format(custom)}</mujocoinclude>"
+    path = world('<include file="defaults.xml"/>', files={"defaults.xml": inner})
+
+    simulation = load_mjcf(path, Mode.FAST)
+
+    assert simulation.basic_step_ms == 6
+    assert list(simulation.robots[0].motors) == ["arm"]
+
+
+def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
+    """The last of several options decides, wherever it is."""
+    head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'
+    inner = '<mujocoinclude><option timestep="0.003"/></mujocoinclude>'
+
+    with pytest.raises(WorldError, match=r"basicTimeStep 4 is no multiple of the timestep of 0\.003 s"):
+        load_mjcf(world(head, files={"defaults.xml": inner}), Mode.FAST)
+
+
+def test_a_file_of_elements_outside_of_the_project_is_refused(world, tmp_path):
+    """Also if it is named by an included one."""
+    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
+    inner = '<mujocoinclude><include file="../../secret.xml"/></mujocoinclude>'
+
+    with pytest.raises(WorldError, match=r"secret\.xml' is outside of the project of the world"):
+        load_mjcf(world('<include file="inner.xml"/>', files={"inner.xml": inner}), Mode.FAST)
+
+
+def test_a_rounded_timestep_is_made_exact(world):
+    """A joint that turns at 1 rad/s has turned by 1 after 1 s, or the clock runs away from the physics."""
+    turning = """<option timestep="0.0041667" gravity="0 0 0"/>
+        <keyframe><key name="home" qvel="1"/></keyframe>
+        <sensor><jointpos joint="hinge"/></sensor>"""
+    simulation = load_mjcf(
+        world(ARGUMENTS.format('<text name="keyframe" data="home"/>') + turning), Mode.FAST
+    )
+
+    for _ in range(40):
+        simulation.step(25)
+
+    assert simulation.robots[0].sensors["hinge_jointpos"].value == pytest.approx(1.0, abs=1e-9)
