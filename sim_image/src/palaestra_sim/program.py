@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -29,7 +29,7 @@ from palaestra_sim.scene.loading import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.reading import LeaveOut
-from palaestra_sim.scene.summary import differences, silent_devices, summary
+from palaestra_sim.scene.summary import differences, lacks, silent_devices, summary
 from palaestra_sim.world.mjcf import is_mjcf
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
@@ -89,12 +89,16 @@ class Program:
         return _WRONG_WORLD
 
     def _check(self, options: argparse.Namespace) -> int:
-        """Print what becomes of the world; return 0 if it can be started as it is."""
-        load = self._loader(options, LeaveOut(everything=True, names=True))
+        """Print what becomes of the world; return 0 if it can be started with these options.
+
+        Without --leave-out, everything is left out that the simulator lacks, so that all of it is named.
+        """
+        chosen = _leave_out(options.leave_out) if options.leave_out else LeaveOut(everything=True)
+        load = self._loader(options, replace(chosen, names=True))
         simulation = load(options.world.absolute(), _MODES[options.mode])
-        for line in summary(simulation):
+        for line in summary(simulation, chosen=bool(options.leave_out)):
             sys.stdout.write(f"{line}\n")
-        return _WRONG_WORLD if simulation.left_out else 0
+        return _WRONG_WORLD if lacks(simulation) and not options.leave_out else 0
 
     def _simulate(self, options: argparse.Namespace) -> int:
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()

@@ -71,6 +71,31 @@ def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
     assert check('Robot { controller "ros" }')[0] == 0
 
 
+def test_what_is_left_out_by_choice_is_no_obstacle(check):
+    """The check named --leave-out as the remedy, and with it printed the same."""
+    world = "Colosseum { } Solid { boundingObject Cone { } }"
+
+    assert check(world)[0] == 2
+    assert check(world, "--leave-out", "Colosseum")[0] == 2
+    code, lines = check(world, "--leave-out", "all")
+
+    assert code == 0
+    assert lines[0] == "left out:"
+    assert "Colosseum" in lines[1]
+
+
+def test_a_field_that_a_proto_does_not_have_is_named_and_no_obstacle(check, tmp_path):
+    """As in Webots, which warns."""
+    folder = tmp_path / "protos"
+    folder.mkdir()
+    (folder / "Stool.proto").write_text(f"{HEAD}PROTO Stool [ field SFFloat size 1 ] {{ Solid {{ }} }}")
+
+    code, lines = check('EXTERNPROTO "protos/Stool.proto"\nStool { colour 1 }')
+
+    assert code == 0
+    assert lines == ["my.wbt:3:1: the PROTO Stool has no field colour; ignored, as by Webots"]
+
+
 def test_a_user_s_stand_ins_count(check, tmp_path):
     """The check is of the world as it would start."""
     table = tmp_path / "mine.toml"

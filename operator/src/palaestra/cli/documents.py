@@ -30,7 +30,7 @@ robots whose controller is "ros" change: --name= is set, --synchronize is added,
 the option --clock, the first --clock is kept.
 
 With --check, it prints what each simulator of this machine can and cannot do with the world instead, and
-starts nothing. The exit code is then 0 if each can start it as it is, 2 otherwise.
+starts nothing. The exit code is then 0 if each can start it with the options given, 2 otherwise.
 """
 CRD = "Prints the CustomResourceDefinition of TrainingJobs, as YAML."
 
@@ -56,7 +56,7 @@ def _plan(options: argparse.Namespace) -> int:
 
 def _world(options: argparse.Namespace) -> int:
     if options.check:
-        return _check(options.file)
+        return _check(options)
     if options.job is None or options.group is None:
         raise PalaestraError("--job and --group: at least one is missing; give both, or --check")
     identity = RunIdentity(
@@ -78,12 +78,15 @@ def _world(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check(file: Path) -> int:
-    """Print what each simulator makes of a world."""
-    read(file)
-    answers = check_world(file)
+def _check(options: argparse.Namespace) -> int:
+    """Print what each simulator makes of a world, with the options that it would be started with."""
+    read(options.file)
+    given = [word for name in options.leave_out for word in ("--leave-out", name)]
+    given += [word for file in options.stand_ins for word in ("--stand-ins", str(file))]
+    how = "with these options" if given else "as it is"
+    answers = check_world(options.file, given)
     for answer in answers:
-        verdict = "starts as it is" if answer.starts else "does not start as it is"
+        verdict = f"starts {how}" if answer.starts else f"does not start {how}"
         sys.stdout.write(f"{answer.driver}: {verdict}\n{indent(answer.text, '  ')}\n")
     sys.stdout.write("webots: simulates all that its own files describe; its log has the errors of a world\n")
     return 0 if all(answer.starts for answer in answers) else _NOT_AS_IT_IS
@@ -111,6 +114,21 @@ def _add_world(commands: Commands) -> None:
     parser = command(commands, "world", _world, WORLD)
     parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt, or .xml of MuJoCo)")
     parser.add_argument("--check", action="store_true", help="print what each simulator makes of it")
+    parser.add_argument(
+        "--leave-out",
+        action="append",
+        default=[],
+        metavar="TYPE",
+        help="with --check: what the simulator may leave out; repeatable, all: everything",
+    )
+    parser.add_argument(
+        "--stand-ins",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="with --check: a table of stand-ins; repeatable",
+    )
     parser.add_argument("--job", metavar="NAME", help="name of the job")
     parser.add_argument("--namespace", default="default", help="namespace of the job")
     parser.add_argument("--uid", default="", help="uid of the job in its cluster")

@@ -9,6 +9,7 @@ import asyncio
 import os
 import signal
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -28,7 +29,7 @@ class Answer:
 
     Attributes:
         driver: as in a TrainingJob.
-        starts: whether it can start the world as it is.
+        starts: whether it can start the world, with the options.
         text: its own words.
     """
 
@@ -37,19 +38,19 @@ class Answer:
     text: str
 
 
-def check_world(world: Path) -> tuple[Answer, ...]:
+def check_world(world: Path, options: Sequence[str] = ()) -> tuple[Answer, ...]:
     """Return the answer of each simulator that can check a world; without an answer it cannot start it.
 
-    The stub is always asked, others if they are installed.
+    The stub is always asked, others if they are installed; each gets the options of its start.
     """
     asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
-    return tuple(asyncio.run(_ask(driver, world)) for driver in asked)
+    return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)
 
 
-async def _ask(driver: Driver, world: Path) -> Answer:
+async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> Answer:
     program = PROGRAMS[driver]
     with tempfile.TemporaryFile() as output:
-        code = await _run([program, "--check", str(world)], output.fileno())
+        code = await _run([program, "--check", *options, str(world)], output.fileno())
         output.seek(0)
         text = output.read().decode(errors="replace").rstrip()
     if code == NOT_RUNNABLE:

@@ -120,7 +120,7 @@ class Simulation:
     @property
     def left_out(self) -> tuple[WorldError, ...]:
         """What the simulator lacks and the user left out, each with its place."""
-        return self.scene.left_out
+        return (*self.scene.left_out, *self.tree.ignored)
 
     @property
     def basic_step_ms(self) -> int:

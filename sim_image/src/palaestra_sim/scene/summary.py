@@ -30,10 +30,11 @@ class Described(Protocol):
         ...
 
 
-def summary(simulation: Described) -> Iterator[str]:
+def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all that was left out.
 
-    The world is read with everything left out that the simulator lacks, so that the rest can be described.
+    The world is read with everything left out that the simulator lacks, so that the rest can be described; or
+    with what the user has `chosen` to leave out.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
@@ -45,10 +46,16 @@ def summary(simulation: Described) -> Iterator[str]:
         yield f"devices without readings, whose enable answers failure: {silent}"
     for difference in differences(simulation):
         yield f"differs from Webots: {difference}"
-    error = refusal(simulation.left_out)
-    if error is not None:
-        yield "cannot be simulated; --leave-out leaves it out:"
+    if error := refusal(simulation.tree.ignored):
         yield from str(error).splitlines()
+    if error := refusal(lacks(simulation)):
+        yield "left out:" if chosen else "cannot be simulated; --leave-out leaves it out:"
+        yield from str(error).splitlines()
+
+
+def lacks(simulation: Described) -> list[WorldError]:
+    """Return what was left out because the simulator lacks it."""
+    return [each for each in simulation.left_out if each not in simulation.tree.ignored]
 
 
 def silent_devices(robots: Iterable[Robot]) -> str:

@@ -51,6 +51,7 @@ class Grower:
     Attributes:
         nodes: all nodes, by number.
         refused: mistakes that were found.
+        ignored: fields that do not matter, as Webots ignores them: those that a PROTO no longer has.
     """
 
     def __init__(self, descriptions: Descriptions) -> None:
@@ -59,6 +60,7 @@ class Grower:
         self._numbers = itertools.count()
         self._twins: dict[tuple[Scope, int], list[SceneNode]] = {}
         self.refused: list[WorldError] = []
+        self.ignored: list[WorldError] = []
 
     def root(self, world: World, name: str) -> SceneNode:
         """Return the root of a world's tree."""
@@ -123,7 +125,7 @@ class Grower:
         unknown = [name for name in source.fields if name not in proto.fields and " " not in name]
         for name in unknown:
             fact = f"the PROTO {proto.name} has no field {name}"
-            self.refused.append(scope.error(source, fact, "remove it, or add the field to the PROTO"))
+            self.ignored.append(scope.error(source, fact, "ignored, as by Webots"))
         inner = Scope(
             source=proto.source,
             defs=definitions((proto.body,)),

@@ -30,6 +30,7 @@ class SceneTree:
         nodes: by number.
         root: a Group that has the nodes of the file as its children.
         refused: mistakes in the file that make a node impossible, such as `USE` of a missing name.
+        ignored: fields that a PROTO does not have, each with its place.
     """
 
     def __init__(self, world: World, name: str = "world", descriptions: Descriptions | None = None) -> None:
@@ -38,6 +39,7 @@ class SceneTree:
         self.root = self._grower.root(world, name)
         self.nodes: dict[int, SceneNode] = self._grower.nodes
         self.refused: list[WorldError] = self._grower.refused
+        self.ignored: list[WorldError] = self._grower.ignored
         self._fields: dict[tuple[int, str], Field] = {}
         _mark_outlines(self.nodes.values())
 
