@@ -118,6 +118,37 @@ def test_a_laser_has_one_ray_whatever_the_file_says(begin):
     assert measured(begin(outlined, laser)) == pytest.approx(1.0)
 
 
+SONAR = """DistanceSensor {{ name "eye" type "sonar" numberOfRays {} aperture 0.6 translation 0 0 9
+  rotation {} lookupTable [ 0 0 0, 9 9 0 ] }}"""
+HIGH = wall(outline="boundingObject Box { size 0.1 99 99 }")
+
+
+@for_each("turn", [0.0, 0.1, -0.3, 0.38, 0.41, -0.6, 1.0])
+def test_a_sonar_gets_no_echo_from_a_slanted_wall(begin, turn):
+    """Beyond an angle of incidence of 22.5 degrees the value is that of the greatest distance."""
+    for axis in ("0 0 1", "0 1 0"):
+        value = measured(begin(HIGH, SONAR.format(1, f"{axis} {turn}")))
+
+        expected = 1.0 / math.cos(turn) if abs(turn) < math.pi / 8 else 9.0
+        assert value == pytest.approx(expected, 1e-5), axis
+
+
+def test_a_sonar_takes_the_nearest_of_the_rays_that_return(begin):
+    """Of three rays, one meets the wall too far off its normal; the other two are alike."""
+    value = measured(begin(HIGH, SONAR.format(3, "0 0 1 0.2")))
+
+    towards = math.cos(0.3) * math.cos(0.2) + math.sin(0.3) / 2 * math.sin(0.2)
+    assert value == pytest.approx(1.0 / towards, 1e-5)
+
+
+def test_a_sonar_hears_a_post(begin):
+    """A round surface returns the ray that meets its middle, and none that meets its side."""
+    post = "Solid {{ translation 1 {} 0 boundingObject Cylinder {{ radius 0.2 height 99 }} }}"
+
+    assert measured(begin(post.format(0), SONAR.format(1, "0 0 1 0"))) == pytest.approx(0.8, 1e-5)
+    assert measured(begin(post.format(0.15), SONAR.format(1, "0 0 1 0"))) == 9.0
+
+
 SHAPES = [
     ("Box { size 1 2 3 }", "", 1.5),
     ("Sphere { radius 0.5 }", "", 1.5),

@@ -81,8 +81,6 @@ def differences(simulation: Described) -> Iterator[str]:
     meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
     if infrared := types[DistanceSensorType.INFRA_RED]:
         yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
-    if sonars := types[DistanceSensorType.SONAR]:
-        yield f"{sonars} sonar DistanceSensor: an obstacle counts at every angle"
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
     if meshes:

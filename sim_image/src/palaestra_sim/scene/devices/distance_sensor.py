@@ -4,12 +4,15 @@ Several rays are a cone around the first axis. A sonar measures the nearest one.
 average, in which a ray counts less the more it is off the axis. Infra-red rays meet shapes, the others
 boundingObjects; the darker what they meet is, the farther it seems. Source: docs/reference/distancesensor.md
 and WbDistanceSensor.cpp of Webots.
+
+A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four rays beside
+it measure that angle, so no physics has to know normals.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import islice
@@ -18,12 +21,14 @@ from typing import Final
 from palaestra_sim.scene.beams import Beam, beam_along
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.devices.response import table_rows, table_service
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.lookup import LookupTable, lookup_table
 from palaestra_sim.scene.sight import Glance
 from palaestra_sim.seam import Row
 
 _MOST_RAYS: Final = 10_000  # each is cast at every step
+_BESIDE_M: Final = 1e-4  # how far the rays are beside that of a sonar
+_STEEPEST: Final = math.tan(math.pi / 8.0)  # of a surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
 # aperture.
@@ -62,7 +67,10 @@ _TYPES: Final = {
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class DistanceSensor:
-    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino."""
+    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
+
+    A sonar has five beams for each ray: the ray itself, and two pairs beside it.
+    """
 
     name: str
     model: str
@@ -90,12 +98,27 @@ def _read(part: Part) -> DistanceSensor:
     return DistanceSensor(
         name=part.name,
         model=part.text("model"),
-        beams=tuple(beam_along(part.place.world_pose, direction, table.reach_m) for direction in cone),
+        beams=tuple(_beams(part.place.world_pose, cone, table.reach_m, sonar=type_name == "sonar")),
         weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
         table=table,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
         aperture_rad=aperture_rad,
     )
+
+
+def _beams(pose: Pose, cone: Sequence[Vector], reach_m: float, *, sonar: bool) -> Iterator[Beam]:
+    """Yield the beams of rays in the frame of a sensor."""
+    for direction in cone:
+        yield beam_along(pose, direction, reach_m)
+        if sonar:
+            x, y, z = direction
+            level = math.hypot(x, y)
+            across = (-y / level, x / level, 0.0) if level else (0.0, 1.0, 0.0)
+            up = (-across[1] * z, across[0] * z, level) if level else (1.0, 0.0, 0.0)
+            for side in (across, up):
+                for sign in (-_BESIDE_M, _BESIDE_M):
+                    beside = pose.carry((side[0] * sign, side[1] * sign, side[2] * sign))
+                    yield beam_along(Pose(beside, pose.rotation), direction, reach_m)
 
 
 def _cone(count: int, aperture_rad: float) -> list[Vector]:
@@ -192,8 +215,21 @@ def _with_infrared(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
 
 def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
     if sensor.type is DistanceSensorType.SONAR:
-        return min(distances_m)
+        return min(_returned(distances_m), default=sensor.table.reach_m)
     return sum(distance * weight for distance, weight in zip(distances_m, sensor.weights, strict=True))
+
+
+def _returned(distances_m: Sequence[float]) -> Iterator[float]:
+    """Yield the distances of a sonar's rays that meet a surface at a small enough angle to return.
+
+    Beyond an edge, the ray on the other side decides.
+    """
+    for first in range(0, len(distances_m), 5):
+        distance, left, right, below, above = distances_m[first : first + 5]
+        across = min(abs(left - distance), abs(right - distance)) / _BESIDE_M
+        along = min(abs(below - distance), abs(above - distance)) / _BESIDE_M
+        if math.hypot(across, along) < _STEEPEST:
+            yield distance
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
