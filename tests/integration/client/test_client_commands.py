@@ -268,6 +268,18 @@ def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tel
     assert not place.get(TRAINING_JOBS, "a")["spec"].get("suspend")
 
 
+def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
+    """Else the word would wait for a later loss, and the run would begin again without one."""
+    place.train("a")
+    tell("a", "Running", replicas=[REPLICA])
+
+    code, out, [line] = typed("restart", "a")
+
+    assert (code, out) == (1, [])
+    assert line.startswith("job a: no replica has the reason RunLost, so none is restarted; ")
+    assert "annotations" not in place.get(TRAINING_JOBS, "a")["metadata"]
+
+
 def test_delete_says_what_stays(typed, place):
     """A run may be worth more than the job."""
     uid = place.train("a")["metadata"]["uid"]

@@ -2,6 +2,7 @@
 
 import pytest
 
+from palaestra import Client
 from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
 from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import stranger, world_map, world_of
@@ -204,3 +205,33 @@ def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
     eventually(lambda: place.get(TRAINING_JOBS, "job") is None)
 
     assert len(place.all(CLAIMS, "job")) == 1
+
+
+def test_a_trained_job_without_its_claim_waits_for_a_person(place, start, control_plane):
+    """A new claim is empty, and the training would begin at step 0 without a word."""
+    start()
+    place.train(backoffLimit=0)
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+    place.end(pod, 75, Termination(step=20, reason="Interrupted: SIGTERM received"))
+    eventually(lambda: place.status().get("step") == 20)
+    client = Client(namespace=place.name, kubeconfig=str(control_plane.kubeconfig))
+    client.suspend("job")
+    place.until("Suspended")
+    [claim] = place.all(CLAIMS)
+    place.api.delete(CLAIMS, place.name, claim["metadata"]["name"])
+    eventually(lambda: place.all(CLAIMS) == [])
+
+    client.resume("job")
+    eventually(lambda: place.status()["replicas"][0]["reason"] == "RunLost")
+    held = place.all(CLAIMS), place.get(JOBS, "job-0")["spec"]["suspend"]
+    client.restart("job")
+    place.pods()
+    client.close()
+
+    assert held == ([], True)
+    assert [each["metadata"]["name"] for each in place.all(CLAIMS)] == [claim["metadata"]["name"]]
+    [replica] = place.status()["replicas"]
+    assert (replica["lost"]["what"], replica["lost"]["step"]) == ("Claim", 20)
+    assert eventually(lambda: {"RunLost", "RunRestarted"} <= place.events())

@@ -125,6 +125,31 @@ class PodReference(Reported):
     """Time at which the pod was created."""
 
 
+class LostPart(StrEnum):
+    """The part of a run that is lost."""
+
+    CLAIM = "Claim"
+    RUN_DIRECTORY = "RunDirectory"
+
+
+class LostRun(Reported):
+    """A run that had trained and is lost."""
+
+    what: LostPart = Field(strict=False)
+    """`Claim`: the claim of the replica does not exist. `RunDirectory`: the run directory was empty when a
+    later attempt began."""
+
+    step: Count
+    """Step of its newest checkpoint; without a checkpoint, the highest step."""
+
+    pod: PodReference | None = None
+    """Newest pod of the lost run; absent: none is known."""
+
+    restarted: datetime | None = Field(default=None, strict=False)
+    """Time at which the operator let the replica begin again, because a person asked for it. Absent: the
+    replica waits for that."""
+
+
 class SimulatorStatus(Reported):
     """One simulator of a replica, as the trainer reports it."""
 
@@ -249,6 +274,9 @@ class ReplicaStatus(Reported):
     """Environment steps of episodes that a fault ended early, and steps repeated after an interruption, over
     all attempts; absent: not known yet."""
 
+    lost: LostRun | None = None
+    """Run that the replica has lost last; absent: none."""
+
 
 class Release(Reported):
     """The images for containers without an image of their own, fixed when the job was accepted."""
@@ -315,6 +343,10 @@ class Status(Reported):
 
     success_rate: Fraction | None = None
     """Lowest success rate of all replicas, 0 to 1; absent: no evaluation yet."""
+
+    lost_runs_restarted: Word | None = None
+    """Last value of the annotation `palaestra.dev/restart-lost-runs` that the operator obeyed; absent:
+    none."""
 
     left_out: Words | None = None
     """Nodes that the simulators leave out of their worlds because they cannot simulate them: a line for each

@@ -11,6 +11,7 @@ from typing import Any
 from palaestra.observe.jobs import REPLACED, SETTINGS, STOPPED, SUSPENDED
 from palaestra.observe.shortening import shortened
 from palaestra.plan.job import SUSPEND_SET
+from palaestra.plan.replica import RESTART_LOST_RUNS
 
 _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
@@ -21,7 +22,7 @@ _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
     "initContainerStatuses", "containerStatuses",
 )  # fmt: skip
-_ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET)
+_ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET, RESTART_LOST_RUNS)
 
 SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole one without its status
 SMALL = 65_536  # bytes, up to which a cached TrainingJob has no such annotation
