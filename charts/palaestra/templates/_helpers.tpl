@@ -76,8 +76,11 @@ readOnlyRootFilesystem: true
   resources: [pods/eviction]
   verbs: [create]
 - apiGroups: [""]
-  resources: [configmaps, persistentvolumeclaims]
+  resources: [configmaps]
   verbs: [get, list, watch, create]
+- apiGroups: [""]
+  resources: [persistentvolumeclaims]
+  verbs: [get, list, watch, create, delete] # delete: never bound, of TrainingJobs that are gone
 - apiGroups: [networking.k8s.io]
   resources: [networkpolicies]
   verbs: [list, watch, create, patch]

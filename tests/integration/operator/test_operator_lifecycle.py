@@ -62,17 +62,57 @@ def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(p
     assert place.get(JOBS, "job-0") is None
 
 
+def bound(place):
+    """Bind the claims to volumes, as a provisioner does."""
+    for claim in place.all(CLAIMS):
+        name, bind = claim["metadata"]["name"], {"status": {"phase": "Bound"}}
+        place.api.merge(CLAIMS, place.name, name, {"spec": {"volumeName": f"pv-{name}"}})
+        place.api.merge(CLAIMS, place.name, name, bind, subresource="status")
+
+
 def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
     """The run outlives the job; owner references take the rest, no finalizer of ours is needed."""
     start()
     made = place.train()
     place.pods()
+    bound(place)
 
     place.api.delete(TRAINING_JOBS, place.name, "job")
     eventually(lambda: list(map(claim_or_other, place.children())) == ["claim"])
 
     assert "finalizers" not in made["metadata"]
     assert place.get(TRAINING_JOBS, "job") is None
+
+
+def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
+    """It holds no run, and claims of jobs that never began filled the quota of the namespace."""
+    start()
+    place.train("idle", suspend=True, replicas=2)
+    place.train()
+    eventually(lambda: len(place.all(CLAIMS)) == 3)
+
+    place.api.delete(TRAINING_JOBS, place.name, "idle")
+
+    eventually(lambda: len(place.all(CLAIMS)) == 1)
+    assert len(place.all(CLAIMS, "job")) == 1
+
+
+def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place, start):
+    """Its name has the uid of the job before, so nothing would ever use it."""
+    place.train(suspend=True)
+    first = start()
+    eventually(lambda: place.all(CLAIMS))
+    [old] = place.all(CLAIMS)
+    first.stop()
+    place.api.delete(TRAINING_JOBS, place.name, "job", propagation="Foreground")
+    eventually(lambda: place.get(TRAINING_JOBS, "job") is None)
+    place.train(suspend=True)
+
+    start()
+
+    eventually(
+        lambda: [claim["metadata"]["uid"] != old["metadata"]["uid"] for claim in place.all(CLAIMS)] == [True]
+    )
 
 
 def claim_or_other(name):

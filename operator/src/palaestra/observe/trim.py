@@ -8,6 +8,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from palaestra.observe.claims import FIELDS
 from palaestra.observe.jobs import REPLACED, SETTINGS, STOPPED, SUSPENDED
 from palaestra.observe.shortening import shortened
 from palaestra.plan.job import SUSPEND_SET
@@ -40,7 +41,9 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
         return kept | {"spec": _job_spec(raw), "status": raw.get("status", {})}
     if kind == "Pod":
         return kept | {"spec": _pod_spec(raw), "status": _some(raw.get("status"), _POD_STATUS)}
-    if kind in {"ConfigMap", "PersistentVolumeClaim", "NetworkPolicy"}:
+    if kind == "PersistentVolumeClaim":
+        return kept | {"spec": _some(raw.get("spec"), FIELDS), "status": _some(raw.get("status"), ("phase",))}
+    if kind in {"ConfigMap", "NetworkPolicy"}:
         return kept
     return _measured(raw, shortened(whole(raw))) if kind == "TrainingJob" else whole(raw)
 
