@@ -41,6 +41,7 @@ MODES: dict[str, Values] = {
             "allowedPodLabels": ["example.com/"],
             "allowedPodAnnotations": ["example.com/", "note"],
             "nodeSelector": {"kubernetes.io/os": "linux"},
+            "resources": {"rosMaster": {"limits": {"cpu": 1, "memory": "128Mi"}}},
         },
         "serviceAccount": {"create": False, "name": "existing"},
     },

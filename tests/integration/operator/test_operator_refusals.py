@@ -1,5 +1,6 @@
 """Refused and missing objects, and objects that a job may not use: each has its reason in the status."""
 
+import json
 from http import HTTPStatus
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from tests.waiting import eventually
 
 PLATFORM = Path(__file__).parents[3] / "manifests" / "examples" / "platform"
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
+LIMITS = Resource(api_version="v1", kind="LimitRange", plural="limitranges")
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
 TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
 SECRET = {
@@ -71,6 +73,46 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
 
     with pytest.raises(Forbidden, match=f"exceeded quota: few, requested: {counted}=1"):
         place.train("second")
+
+
+SIZES = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}
+FLOOR = {"type": "Container", "min": SIZES["requests"], "maxLimitRequestRatio": {"memory": "2"}}
+HARD = {"requests.cpu": "8", "limits.cpu": "16", "requests.memory": "16Gi", "limits.memory": "32Gi"}
+
+
+def confined(place):
+    """Let the API server refuse containers without limits, and small and uneven ones."""
+    place.create(
+        LIMITS,
+        {
+            "apiVersion": "v1",
+            "kind": "LimitRange",
+            "metadata": {"name": "floor"},
+            "spec": {"limits": [FLOOR]},
+        },
+    )
+    limited(place, quota() | {"spec": {"hard": HARD}})
+
+
+def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
+    """Of the ROS master no field could say it, so its pod was refused for ever."""
+    confined(place)
+    start()
+    groups = [{"name": name, "role": name.title(), "resources": SIZES} for name in ("collect", "evaluate")]
+
+    place.train(simulators=groups, trainer={"resources": SIZES}, rosMaster={"resources": SIZES})
+
+    assert place.pods()
+
+
+def test_the_shortest_job_fits_a_namespace_with_limits_by_the_installation(place, start):
+    """Neither `helm test` nor a first example knows the limits of a namespace."""
+    confined(place)
+    start(*(f"--{each}-resources={json.dumps(SIZES)}" for each in ("ros-master", "simulator", "trainer")))
+
+    place.train()
+
+    assert place.pods()
 
 
 def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):

@@ -1,14 +1,17 @@
 """`palaestra operator`: reconcile the TrainingJobs of a cluster."""
 
 import argparse
+import json
 import re
 from importlib.metadata import version
 
+from palaestra.api.container import Resources
 from palaestra.cli.parsing import Commands, command
 from palaestra.cluster import own_namespace
 from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
 from palaestra.plan import Images
+from palaestra.plan.resources import Defaults
 from palaestra_protocol.numbers import seconds, whole
 
 OPERATOR = """\
@@ -92,6 +95,27 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
         help="label that the nodes of training pods must have, unless a job sets another value; "
         "may be repeated; default: none",
     )
+    for container in ("ros-master", "simulator", "trainer"):
+        parser.add_argument(
+            f"--{container}-resources",
+            metavar="JSON",
+            type=_resources,
+            default=Resources(),
+            help=f"requests and limits of each {container} of a job that mentions none, such as "
+            '{"limits": {"cpu": "500m"}}; default: those of the release',
+        )
+
+
+def _resources(text: str) -> Resources:
+    try:
+        given = json.loads(text)
+        return Resources.model_validate(
+            {field: {name: str(value) for name, value in given[field].items()} for field in given}
+        )
+    except (AttributeError, TypeError, ValueError) as error:
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is not resources; use JSON such as {{"limits": {{"cpu": "500m"}}}}'
+        ) from error
 
 
 def _allowed(text: str) -> str:
@@ -158,6 +182,11 @@ def _operator(options: argparse.Namespace) -> int:
             node_selector=dict(options.node_selector),
             allowed_pod_labels=tuple(options.allowed_pod_labels),
             allowed_pod_annotations=tuple(options.allowed_pod_annotations),
+            resources=Defaults(
+                ros_master=options.ros_master_resources,
+                simulator=options.simulator_resources,
+                trainer=options.trainer_resources,
+            ),
             kubeconfig=options.kubeconfig,
             context=options.context,
         )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from palaestra.errors import PalaestraError
 from palaestra.plan import Images
+from palaestra.plan.resources import NO_DEFAULTS, Defaults
 from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import MOST_PORT
 
@@ -29,6 +30,7 @@ class Options:
         node_selector: labels that the nodes of training pods must have.
         allowed_pod_labels: keys, or domains that end in `/`, of labels that jobs may give their pods.
         allowed_pod_annotations: the same of annotations.
+        resources: of containers of jobs that mention none.
         kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
@@ -44,6 +46,7 @@ class Options:
     node_selector: Mapping[str, str] = field(default_factory=dict)
     allowed_pod_labels: tuple[str, ...] = ()
     allowed_pod_annotations: tuple[str, ...] = ()
+    resources: Defaults = NO_DEFAULTS
     kubeconfig: str | None = None
     context: str | None = None
 

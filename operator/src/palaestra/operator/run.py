@@ -201,4 +201,5 @@ def _layout(options: Options) -> ClusterLayout:
         node_selector=options.node_selector,
         allowed_pod_labels=options.allowed_pod_labels,
         allowed_pod_annotations=options.allowed_pod_annotations,
+        resources=options.resources,
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from palaestra.errors import PlanError
+from palaestra.plan.resources import NO_DEFAULTS, Defaults
 
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
@@ -104,6 +105,11 @@ class Layout(Protocol):
         """Labels that the node of every pod must have, unless the job gives such a label itself."""
         ...
 
+    @property
+    def resources(self) -> Defaults:
+        """Requests and limits of containers of jobs that mention none."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -134,6 +140,7 @@ class ClusterLayout:
     node_selector: Mapping[str, str] = field(default_factory=dict)
     allowed_pod_labels: tuple[str, ...] = ()
     allowed_pod_annotations: tuple[str, ...] = ()
+    resources: Defaults = NO_DEFAULTS
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the same places for every container; runs are kept apart by the job's uid."""
@@ -169,6 +176,7 @@ class LocalLayout:
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
+    resources: Defaults = NO_DEFAULTS
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the places of one container, all below `<job_directory>/<replica>`."""
