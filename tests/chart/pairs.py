@@ -48,6 +48,7 @@ OTHERS: dict[str, Any] = {
     "jobs.allowedPodLabels": ["example.com/team"],
     "jobs.allowedPodAnnotations": ["example.com/"],
     "jobs.nodeSelector": LABELS,
+    "podSecurity.fixedUser": False,
     **{f"jobs.resources.{each}": RESOURCES for each in ("rosMaster", "simulator", "trainer")},
     "test.enabled": False,
     "test.namespace": "elsewhere",

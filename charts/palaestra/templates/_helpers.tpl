@@ -30,11 +30,13 @@ app.kubernetes.io/component: {{ .component }}
 {{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
 {{- end }}
 
-{{/* Pod settings that *restricted* Pod Security requires, and the user of all our images. */}}
+{{/* Pod settings that *restricted* Pod Security requires, and the user of all our images unless the cluster chooses one. */}}
 {{- define "palaestra.podSecurity" -}}
 runAsNonRoot: true
+{{- if .Values.podSecurity.fixedUser }}
 runAsUser: 65532
 runAsGroup: 65532
+{{- end }}
 seccompProfile:
   type: RuntimeDefault
 {{- end }}

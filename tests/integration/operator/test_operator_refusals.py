@@ -19,6 +19,13 @@ from tests.waiting import eventually
 PLATFORM = Path(__file__).parents[3] / "manifests" / "examples" / "platform"
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
 LIMITS = Resource(api_version="v1", kind="LimitRange", plural="limitranges")
+ADMISSION = "admissionregistration.k8s.io/v1"
+POLICIES = Resource(
+    api_version=ADMISSION, kind="ValidatingAdmissionPolicy", plural="validatingadmissionpolicies"
+)
+POLICY_BINDINGS = Resource(
+    api_version=ADMISSION, kind="ValidatingAdmissionPolicyBinding", plural="validatingadmissionpolicybindings"
+)
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
 TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
 SECRET = {
@@ -73,6 +80,62 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
 
     with pytest.raises(Forbidden, match=f"exceeded quota: few, requested: {counted}=1"):
         place.train("second")
+
+
+# OpenShift's constraint restricted-v2 refuses users outside of the range of a namespace.
+RANGE = "must be in the ranges: [1000660000, 1000669999]"
+LIKE_OPENSHIFT = {
+    "apiVersion": "admissionregistration.k8s.io/v1",
+    "kind": "ValidatingAdmissionPolicy",
+    "spec": {
+        "matchConstraints": {
+            "resourceRules": [
+                {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
+            ]
+        },
+        "validations": [
+            {
+                "expression": "!has(object.spec.securityContext) || "
+                "(!has(object.spec.securityContext.runAsUser) && !has(object.spec.securityContext.fsGroup))",
+                "message": RANGE,
+            }
+        ],
+    },
+}
+
+
+@pytest.fixture
+def like_openshift(place):
+    """Refuse pods of this namespace that name a user, as OpenShift does."""
+    name = f"like-openshift-{place.name}"
+    chosen = {"namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": place.name}}}
+    place.api.create(POLICIES, LIKE_OPENSHIFT | {"metadata": {"name": name}})
+    place.api.create(
+        POLICY_BINDINGS,
+        {
+            "apiVersion": POLICIES.api_version,
+            "kind": "ValidatingAdmissionPolicyBinding",
+            "metadata": {"name": name},
+            "spec": {"policyName": name, "validationActions": ["Deny"], "matchResources": chosen},
+        },
+    )
+    yield
+    place.api.delete(POLICY_BINDINGS, None, name)
+    place.api.delete(POLICIES, None, name)
+
+
+@pytest.mark.usefixtures("like_openshift")
+def test_pods_run_where_the_cluster_chooses_their_user(place, start):
+    """With the user of our images each of them was refused."""
+    operator = start()
+    place.train("named")
+    eventually(lambda: RANGE in str(place.status("named").get("replicas", "")), 60)
+    operator.stop()
+
+    start("--no-fixed-user")
+    place.train("chosen")
+
+    assert place.pods("chosen")
 
 
 SIZES = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}

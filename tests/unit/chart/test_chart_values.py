@@ -32,6 +32,7 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
     ("images.trainer.digest", "sha256:abc", ""),
     ("imagePullSecrets", ["registry"], "/0"),
     ("imagePullSecrets", [{"secret": "registry"}], "/0"),
+    ("podSecurity.fixedUser", 65532, ""),
     ("crds.install", "yes", ""),
     ("jobs.allowedPodLabels", "example.com/", ""),
     ("jobs.allowedPodLabels", ["/team"], "/0"),

@@ -95,6 +95,13 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
         help="label that the nodes of training pods must have, unless a job sets another value; "
         "may be repeated; default: none",
     )
+    parser.add_argument(
+        "--fixed-user",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="run training pods as user 65532; --no-fixed-user: as the user that the cluster chooses; "
+        "default: yes",
+    )
     for container in ("ros-master", "simulator", "trainer"):
         parser.add_argument(
             f"--{container}-resources",
@@ -187,6 +194,7 @@ def _operator(options: argparse.Namespace) -> int:
                 simulator=options.simulator_resources,
                 trainer=options.trainer_resources,
             ),
+            fixed_user=options.fixed_user,
             kubeconfig=options.kubeconfig,
             context=options.context,
         )

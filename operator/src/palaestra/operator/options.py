@@ -31,6 +31,7 @@ class Options:
         allowed_pod_labels: keys, or domains that end in `/`, of labels that jobs may give their pods.
         allowed_pod_annotations: the same of annotations.
         resources: of containers of jobs that mention none.
+        fixed_user: whether training pods name their user; if not, the cluster chooses one.
         kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
@@ -47,6 +48,7 @@ class Options:
     allowed_pod_labels: tuple[str, ...] = ()
     allowed_pod_annotations: tuple[str, ...] = ()
     resources: Defaults = NO_DEFAULTS
+    fixed_user: bool = True
     kubeconfig: str | None = None
     context: str | None = None
 

@@ -34,6 +34,7 @@ from palaestra.operator.tidying import Tidying
 from palaestra.operator.workers import Workers
 from palaestra.operator.writing import Writer
 from palaestra.plan import ClusterLayout
+from palaestra.plan.layout import USER
 
 log = structlog.get_logger(__name__)
 
@@ -202,4 +203,5 @@ def _layout(options: Options) -> ClusterLayout:
         allowed_pod_labels=options.allowed_pod_labels,
         allowed_pod_annotations=options.allowed_pod_annotations,
         resources=options.resources,
+        user=USER if options.fixed_user else None,
     )
