@@ -35,9 +35,12 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
     place.train("b")
     tell("b", "Running", step=12000)
 
-    code, [headings, *rows], _ = typed("get")
+    code, [headings, *rows], [unseen] = typed("get")
 
     assert code == 0
+    assert unseen.startswith(
+        "a: no operator has reconciled it; check that the operator runs and watches this"
+    )
     assert headings.split()[:6] == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET"]
     assert [row.split()[:5] for row in rows] == [["a", *"----"], ["b", "Running", "Because", "-", "12000"]]
     assert "ALGORITHM" in typed("get", "-o", "wide")[1][0]

@@ -21,6 +21,22 @@ _COLUMNS = (
     ("Algorithm", "string", ".spec.trainer.algorithm.name", "The learning algorithm", 1),
     ("Started", "date", ".status.startTime", "When the first pod started", 1),
     ("Completed", "date", ".status.completionTime", "When the last replica ended", 1),
+    ("Attempt", "integer", ".status.attempt", "Highest attempt of all replicas", 1),
+    (
+        "Restarts",
+        "integer",
+        ".status.restarts",
+        "Most failures of one replica's trainer, which count against backoffLimit",
+        1,
+    ),
+    (
+        "Checkpoint",
+        "date",
+        ".status.lastCheckpointTime",
+        "When the replica that is furthest behind saved its newest checkpoint",
+        1,
+    ),
+    ("Node", "string", ".status.nodes", "Nodes of the newest pods", 1),
     ("Age", "date", ".metadata.creationTimestamp", "When the job was created", 0),
 )
 

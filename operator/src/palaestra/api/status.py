@@ -215,6 +215,9 @@ class ReplicaStatus(Reported):
     pod: PodReference | None = None
     """Pod of the current attempt; absent: no pod yet."""
 
+    node: Word | None = None
+    """Node of the newest pod; absent: no node has been chosen yet."""
+
     step: Count | None = None
     """Environment steps trained; absent: not known yet."""
 
@@ -343,6 +346,18 @@ class Status(Reported):
 
     success_rate: Fraction | None = None
     """Lowest success rate of all replicas, 0 to 1; absent: no evaluation yet."""
+
+    attempt: Count | None = None
+    """Highest attempt of all replicas; absent: no pod yet."""
+
+    restarts: Count | None = None
+    """Most failures of one replica's trainer, which count against `backoffLimit`; absent: none."""
+
+    last_checkpoint_time: datetime | None = Field(default=None, strict=False)
+    """Oldest time at which a replica saved its newest checkpoint; absent: there is no checkpoint yet."""
+
+    nodes: Word | None = None
+    """Nodes of the newest pods, separated by commas; absent: no node has been chosen yet."""
 
     lost_runs_restarted: Word | None = None
     """Last value of the annotation `palaestra.dev/restart-lost-runs` that the operator obeyed; absent:

@@ -12,13 +12,13 @@ from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
-_OF_JOB = frozenset({"leftOut", "step", "successRate"})
+_OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
 _FIRST = frozenset(  # once present, always present
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "successInterval", "meanReturn", "stepsPerSecond", "simulators",
-     "lastCheckpoint",
+     "lastCheckpoint", "node",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
 
