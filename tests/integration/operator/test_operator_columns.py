@@ -61,6 +61,22 @@ def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubec
     assert nodes == "node-1"
 
 
+def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, control_plane):
+    """A heading with nothing below it looks like something that is missing."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+
+    described = control_plane.kubectl("-n", place.name, "describe", "trainingjob", "job").stdout
+
+    lines = described[described.index("\nStatus:") : described.index("\nEvents:")].splitlines()
+    depths = [len(line) - len(line.lstrip()) for line in lines]
+    pairs = zip(lines, depths, [*depths[1:], 0], strict=True)
+    assert [line for line, depth, below in pairs if line.endswith(":") and below <= depth and line] == []
+
+
 def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):
     """A namespace with hundreds of jobs is asked for those that run, without a download of all."""
     start()

@@ -91,8 +91,17 @@ def schema() -> Schema:
     # Generations begin at 1. Without this default, kstatus would report a job as reconciled before an
     # operator has read it.
     fields["status"]["default"] = {"observedGeneration": 0}
+    _remove_empty_defaults(fields["status"])
     plain: Schema = without_marks(whole)
     return plain
+
+
+def _remove_empty_defaults(schema: Schema) -> None:
+    """Remove defaults of lists that may be absent; `kubectl describe` would print them without content."""
+    if schema.get("default") == []:
+        del schema["default"]
+    for inner in (*schema.get("properties", {}).values(), *([schema["items"]] if "items" in schema else ())):
+        _remove_empty_defaults(inner)
 
 
 def _column(name: str, kind: str, path: str, description: str, priority: int) -> dict[str, Any]:
