@@ -239,6 +239,7 @@ def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
     start()
     place.train(ttlSecondsAfterFinished=1)
     [pod] = place.pods()
+    bound(place)
     place.run(pod)
     place.end(pod, word=DONE)
 

@@ -3,7 +3,8 @@
 import pytest
 
 from palaestra.api.reasons import Reason
-from palaestra.decide import SetSuspend
+from palaestra.decide import SetSuspend, accept, lacking_claims
+from palaestra.observe import Objects, observe
 from palaestra.plan.claim import claim_name
 from palaestra_protocol.pod.status import CheckpointStatus
 
@@ -217,3 +218,15 @@ def test_a_replica_that_has_not_trained_gets_a_new_claim(training):
 
     assert len(scene.objects["claims"]) == 1
     assert scene.replica().lost is None
+
+
+def test_a_claim_of_a_replica_that_has_ended_is_not_looked_for(training, last_word):
+    """People delete the claims of finished jobs, and the operator would send a request every ten seconds."""
+    scene, pod = training()
+    scene.end(pod, 0, last_word(step=500, reason="Completed"))
+    scene.end_job("Complete")
+    scene.settle()
+    job = accept(scene.raw)
+
+    assert scene.replica().phase == "Succeeded"
+    assert lacking_claims(job, observe(job, Objects())) == ()

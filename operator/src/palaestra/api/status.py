@@ -100,8 +100,8 @@ class Restarts(Reported):
     """Restarts of simulators after a fault, over all attempts."""
 
     disruption: Count = 0
-    """Pods replaced after a disruption (preemption, eviction, drain), or after a deletion that left the trainer
-    time to save; these do not count against `backoffLimit`."""
+    """Pods replaced after a disruption (preemption, eviction, drain), or after a deletion that left the
+    trainer time to save; these do not count against `backoffLimit`."""
 
     suspension: Count = 0
     """Pods replaced because the job was suspended and resumed."""

@@ -31,8 +31,15 @@ from palaestra.decide.decision import (
     Stop,
 )
 from palaestra.decide.fitting import fitted
-from palaestra.decide.losing import lacking_claims
-from palaestra.decide.preparing import Prepared, complete, prepare, resuming, wants_whole, worlds_to_check
+from palaestra.decide.preparing import (
+    Prepared,
+    complete,
+    lacking_claims,
+    prepare,
+    resuming,
+    wants_whole,
+    worlds_to_check,
+)
 from palaestra.decide.times import Record, Times
 from palaestra.decide.writing import as_data, write_in_s
 

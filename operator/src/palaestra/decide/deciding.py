@@ -108,6 +108,8 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
     """Return a replica with the run that it has lost; a person's word gives up a run that was shown."""
     shown, lost = found.status.lost, prepared.lost.get(found.status.index)
+    if found.status.phase in TERMINAL:
+        return found
     if lost is None:
         gone = shown is not None and shown.restarted is None  # the claim is there again
         return replace(found, status=found.status.model_copy(update={"lost": None})) if gone else found

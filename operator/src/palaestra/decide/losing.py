@@ -12,6 +12,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import LostPart, LostRun, ReplicaStatus
 from palaestra.decide.conditions import Explanation
+from palaestra.decide.counting import counted
 from palaestra.observe.views import ReplicaObserved
 from palaestra.plan.claim import claim_name, former_name
 from palaestra.plan.replica import RESTART_LOST_RUNS
@@ -21,20 +22,8 @@ def lost_runs(
     job: TrainingJob, replicas: Iterable[ReplicaObserved], present: Collection[tuple[str, str]]
 ) -> dict[int, LostRun]:
     """Return the lost runs for which a person's word is missing, by replica; `present` has the claims."""
-    known = {replica.index: replica for replica in job.status.replicas}
-    found = {
-        seen.index: _lost(job, known[seen.index], seen, present) for seen in replicas if seen.index in known
-    }
+    found = {seen.index: _lost(job, _old(job, seen), seen, present) for seen in replicas}
     return {index: lost for index, lost in found.items() if lost is not None}
-
-
-def lacking_claims(job: TrainingJob, present: Collection[tuple[str, str]]) -> tuple[str, ...]:
-    """Return the names of the claims that replicas lack although they have trained."""
-    return tuple(
-        claim_name(job.metadata.name, replica.index, job.metadata.uid or "")
-        for replica in job.status.replicas
-        if _lacks_claim(job, replica, present)
-    )
 
 
 def why_lost(job: TrainingJob, index: int, lost: LostRun) -> Explanation:
@@ -68,20 +57,27 @@ def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaSt
     return replica.model_copy(update={**dict.fromkeys(forgotten), "fruitless": 0, "lost": given_up})
 
 
+def _old(job: TrainingJob, seen: ReplicaObserved) -> ReplicaStatus:
+    known = (replica for replica in job.status.replicas if replica.index == seen.index)
+    return next(known, ReplicaStatus(index=seen.index))
+
+
 def _lost(
     job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved, present: Collection[tuple[str, str]]
 ) -> LostRun | None:
     waiting = old.lost if old.lost is not None and old.lost.restarted is None else None
-    if _lacks_claim(job, old, present):
-        return waiting or _record(LostPart.CLAIM, old)
+    if _lacks_claim(job, old, seen, present):
+        return waiting or _record(LostPart.CLAIM, old, seen)
     if waiting is not None and waiting.what is LostPart.RUN_DIRECTORY:
         return waiting
-    return _record(LostPart.RUN_DIRECTORY, old) if _is_empty(job, old, seen) else None
+    return _record(LostPart.RUN_DIRECTORY, old, seen) if _is_empty(job, old, seen) else None
 
 
-def _lacks_claim(job: TrainingJob, old: ReplicaStatus, present: Collection[tuple[str, str]]) -> bool:
+def _lacks_claim(
+    job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved, present: Collection[tuple[str, str]]
+) -> bool:
     storage = job.spec.storage
-    if storage.ephemeral or storage.existing_claim is not None or not (old.furthest_step or old.step):
+    if storage.ephemeral or storage.existing_claim is not None or not counted(old, seen).furthest_step:
         return False
     parts = (job.metadata.name, old.index, job.metadata.uid or "")
     names = (claim_name(*parts), former_name(*parts))
@@ -93,12 +89,13 @@ def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bo
 
     An ephemeral run is deleted with its pod. A program of the job's own reports no number of its attempt.
     """
-    if seen.polled is None or old.last_checkpoint is None:
+    if seen.polled is None or old.last_checkpoint is None or job.spec.storage.ephemeral:
         return False
     begins = seen.polled.status.attempt == 1 and seen.polled.status.last_checkpoint is None
-    return begins and old.attempt > 1 and not job.spec.storage.ephemeral
+    return begins and counted(old, seen).attempt > 1
 
 
-def _record(what: LostPart, old: ReplicaStatus) -> LostRun:
+def _record(what: LostPart, old: ReplicaStatus, seen: ReplicaObserved) -> LostRun:
     saved = old.last_checkpoint.step if old.last_checkpoint is not None else 0
-    return LostRun(what=what, step=saved or old.furthest_step or old.step or 0, pod=old.pod)
+    counts = counted(old, seen)
+    return LostRun(what=what, step=saved or counts.furthest_step or 0, pod=counts.pod)

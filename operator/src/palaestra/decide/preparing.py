@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
-from palaestra.api.status import TERMINAL, LostRun
+from palaestra.api.status import TERMINAL, LostPart, LostRun
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.losing import lost_runs, why_lost
 from palaestra.decide.suspending import to_resume
@@ -20,7 +20,7 @@ from palaestra.observe.shortening import Lacking
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind
 from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
-from palaestra.plan.claim import former_name
+from palaestra.plan.claim import claim_name, former_name
 from palaestra_sim.errors import WorldError
 
 
@@ -125,6 +125,15 @@ def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lac
     if lacks is None or complete(job, observed):
         return False
     return lacks is Lacking.FIELDS or _held(job, observed, layout) is None
+
+
+def lacking_claims(job: TrainingJob, observed: Observed) -> tuple[str, ...]:
+    """Return the names of the claims that unfinished replicas lack although they have trained."""
+    return tuple(
+        claim_name(job.metadata.name, index, job.metadata.uid or "")
+        for index, lost in _lost(job, observed).items()
+        if lost.what is LostPart.CLAIM
+    )
 
 
 def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, ...]:

@@ -162,7 +162,7 @@ class Looking:
 
         A claim that somebody restored may not have our labels.
         """
-        lacking, namespace = lacking_claims(job, observed.present), job.metadata.namespace
+        lacking, namespace = lacking_claims(job, observed), job.metadata.namespace
         claims = [Source(kind=SourceKind.CLAIM, name=name) for name in lacking]
         found = {
             (claim.kind.value, claim.name) for claim in claims if self._source(namespace, claim) is not None
