@@ -4,4 +4,4 @@
 set -eu
 # A read-only folder is reported, and can still be read.
 cp --update=none /usr/local/share/palaestra/first-steps.ipynb . || true
-exec jupyter lab --ip=0.0.0.0 --port=8888 --no-browser --ServerApp.root_dir="$PWD" --LabApp.extension_manager=readonly
+exec jupyter lab "--ip=*" --port=8888 --no-browser --ServerApp.root_dir="$PWD" --LabApp.extension_manager=readonly

@@ -48,6 +48,7 @@ MODES: dict[str, Values] = {
             "allowedAntiAffinityLabels": ["palaestra.dev/job"],
             "nodeSelector": {"kubernetes.io/os": "linux"},
             "hostUsers": False,
+            "resources": {"rosMaster": {"limits": {"cpu": 1, "memory": "128Mi"}}},
         },
         "serviceAccount": {"create": False, "name": "existing"},
     },

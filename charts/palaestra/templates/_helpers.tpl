@@ -30,11 +30,13 @@ app.kubernetes.io/component: {{ .component }}
 {{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
 {{- end }}
 
-{{/* Pod settings that *restricted* Pod Security requires, and the user of all our images. */}}
+{{/* Pod settings that *restricted* Pod Security requires, and the user of all our images unless the cluster chooses one. */}}
 {{- define "palaestra.podSecurity" -}}
 runAsNonRoot: true
+{{- if .Values.podSecurity.fixedUser }}
 runAsUser: 65532
 runAsGroup: 65532
+{{- end }}
 seccompProfile:
   type: RuntimeDefault
 {{- end }}
@@ -76,8 +78,11 @@ readOnlyRootFilesystem: true
   resources: [pods/eviction]
   verbs: [create]
 - apiGroups: [""]
-  resources: [configmaps, persistentvolumeclaims]
+  resources: [configmaps]
   verbs: [get, list, watch, create]
+- apiGroups: [""]
+  resources: [persistentvolumeclaims]
+  verbs: [get, list, watch, create, delete] # delete: never bound, of TrainingJobs that are gone
 - apiGroups: [networking.k8s.io]
   resources: [networkpolicies]
   verbs: [list, watch, create, patch]

@@ -35,6 +35,7 @@
     │   ├── NoSuchJob                no such TrainingJob
     │   ├── NoSuchNamespace          no such namespace
     │   ├── NotFetched               a run could not be copied
+    │   ├── NothingLost              no replica has lost its run, so none is restarted
     │   ├── NotInstalled             the cluster has no TrainingJobs
     │   ├── NotOfThisSweep           a job has the name of a sweep's trial (sweeps.there)
     │   ├── QueueDecides             Kueue alone suspends and resumes this job

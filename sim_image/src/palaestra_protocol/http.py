@@ -97,7 +97,8 @@ class Server(socketserver.ThreadingTCPServer):
     """One port: bound when made, answering from `start` until `close`.
 
     Args:
-        address: where to listen.
+        address: where to listen. `0.0.0.0` and `::` both mean every address of the machine, IPv6 and IPv4,
+            because the addresses of a pod are those of its cluster.
         routes: its paths.
         name: of the program, for the header `Server` and the thread.
         deadline_s: for reading a request, and again for writing the answer.
@@ -113,18 +114,26 @@ class Server(socketserver.ThreadingTCPServer):
     def __init__(
         self, address: Address, routes: Routes, *, name: str, deadline_s: float = DEADLINE_S
     ) -> None:
-        self.address_family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+        self._every = _is_every(address.host)
+        host = _every_host() if self._every else address.host
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.routes = routes
         self.name = name
         self.deadline_s = deadline_s
         self.places = Places()
         self._thread: threading.Thread | None = None
-        super().__init__((address.host, address.port), _Handler)
+        super().__init__((host, address.port), _Handler)
 
     @property
     def address(self) -> Address:
         """The address on which it listens, with the port that was free."""
         return Address(*self.socket.getsockname()[:2])
+
+    def server_bind(self) -> None:
+        """Bind the socket; for every address also to IPv4, whatever the system's default is."""
+        if self._every and self.address_family == socket.AF_INET6:
+            self.socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+        super().server_bind()
 
     def start(self) -> None:
         """Begin to answer, in threads of its own."""
@@ -173,6 +182,19 @@ class Server(socketserver.ThreadingTCPServer):
         error = sys.exception()
         if not isinstance(error, OSError):
             log.error("%s: a request failed: %r", self.name, error)
+
+
+def _is_every(host: str) -> bool:
+    """Return whether a host stands for every address; a name does not."""
+    try:
+        return ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return False
+
+
+def _every_host() -> str:
+    """Return the host that stands for every address; nodes may have IPv6 switched off in the kernel."""
+    return str(ipaddress.IPv6Address(0) if socket.has_dualstack_ipv6() else ipaddress.IPv4Address(0))
 
 
 class _Handler(BaseHTTPRequestHandler):

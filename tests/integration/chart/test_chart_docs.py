@@ -92,6 +92,20 @@ def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubec
     assert [name for name in left.split() if "palaestra" in name] == []
 
 
+def test_the_roles_can_be_typed_after_the_installation_alone(typed, kubectl):
+    """Their binding is in a namespace that only other chapters made, and those could not be typed twice."""
+    people = PAGE[PAGE.index("## For the people who train") : PAGE.index("## Without Helm")]
+    [roles] = blocks(people, "sh")
+    [some] = blocks(PAGE[PAGE.index("## In some namespaces only") : PAGE.index("## For the people")], "sh")
+
+    typed(BLOCKS[0])
+    typed(roles)
+    [again] = [line for line in some.splitlines() if "robots" in line or "namespace.yaml" in line][:1]
+    typed(again)
+
+    assert "trainers" in kubectl("get", "rolebindings", "--namespace=robots", "--output=name")
+
+
 @pytest.mark.timeout(600)
 def test_the_page_can_be_typed_from_top_to_bottom(typed):
     """Each command works after those above it, without a warning; the end is an installation without Helm."""

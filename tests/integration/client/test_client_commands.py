@@ -35,9 +35,12 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
     place.train("b")
     tell("b", "Running", step=12000)
 
-    code, [headings, *rows], _ = typed("get")
+    code, [headings, *rows], [unseen] = typed("get")
 
     assert code == 0
+    assert unseen.startswith(
+        "a: no operator has reconciled it; check that the operator runs and watches this"
+    )
     assert headings.split()[:6] == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET"]
     assert [row.split()[:5] for row in rows] == [["a", *"----"], ["b", "Running", "Because", "-", "12000"]]
     assert "ALGORITHM" in typed("get", "-o", "wide")[1][0]
@@ -266,6 +269,18 @@ def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tel
     assert (code, out) == (1, [])
     assert line.startswith("job a: has ended (Succeeded), so it cannot be ")
     assert not place.get(TRAINING_JOBS, "a")["spec"].get("suspend")
+
+
+def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
+    """Else the word would wait for a later loss, and the run would begin again without one."""
+    place.train("a")
+    tell("a", "Running", replicas=[REPLICA])
+
+    code, out, [line] = typed("restart", "a")
+
+    assert (code, out) == (1, [])
+    assert line.startswith("job a: no replica has the reason RunLost, so none is restarted; ")
+    assert "annotations" not in place.get(TRAINING_JOBS, "a")["metadata"]
 
 
 def test_delete_says_what_stays(typed, place):

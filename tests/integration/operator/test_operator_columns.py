@@ -1,9 +1,14 @@
 """What `kubectl get` shows of TrainingJobs, and what it can select, at a real API server."""
 
+import itertools
+
 import pytest
 
+from palaestra_protocol.pod.status import CheckpointStatus, Termination
 from tests.integration.operator.cluster import world_of
 from tests.waiting import eventually
+
+SAVED = CheckpointStatus(step=20, time="2026-01-31T12:00:00Z")
 
 
 @pytest.fixture
@@ -33,6 +38,43 @@ def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start
 
     image, world = ["Pending", "ImagePull", "0/1", "7000"], ["Pending", "WorldMissing", "0/1", "50000"]
     eventually(lambda: rows() == [["no-image", *image], ["no-world", *world]])
+
+
+def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubectl):
+    """Whether a replica starts again and again, where, and what a failure now would cost."""
+    start()
+    place.train(replicas=2)
+    for pod in place.pods(count=2):
+        place.bind(pod)
+        place.run(pod)
+    place.until("Running")
+    place.end(place.pods(count=2)[0], 1, Termination(step=20, reason="Unexpected: it", last_checkpoint=SAVED))
+
+    def cells():
+        headings, row = (line for line in kubectl("tj", "-o", "wide"))
+        ends = [headings.index(name) for name in ("ATTEMPT", "RESTARTS", "CHECKPOINT", "NODE", "AGE")]
+        return [row[begin:end].strip() for begin, end in itertools.pairwise(ends)]
+
+    attempt, restarts, checkpoint, nodes = eventually(lambda: found if "" not in (found := cells()) else None)
+    assert (attempt, restarts) == ("2", "1")
+    assert checkpoint.endswith(("d", "y"))
+    assert nodes == "node-1"
+
+
+def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, control_plane):
+    """A heading with nothing below it looks like something that is missing."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+
+    described = control_plane.kubectl("-n", place.name, "describe", "trainingjob", "job").stdout
+
+    lines = described[described.index("\nStatus:") : described.index("\nEvents:")].splitlines()
+    depths = [len(line) - len(line.lstrip()) for line in lines]
+    pairs = zip(lines, depths, [*depths[1:], 0], strict=True)
+    assert [line for line, depth, below in pairs if line.endswith(":") and below <= depth and line] == []
 
 
 def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from palaestra import Client
 from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
 from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import stranger, world_map, world_of
@@ -61,17 +62,57 @@ def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(p
     assert place.get(JOBS, "job-0") is None
 
 
+def bound(place):
+    """Bind the claims to volumes, as a provisioner does."""
+    for claim in place.all(CLAIMS):
+        name, bind = claim["metadata"]["name"], {"status": {"phase": "Bound"}}
+        place.api.merge(CLAIMS, place.name, name, {"spec": {"volumeName": f"pv-{name}"}})
+        place.api.merge(CLAIMS, place.name, name, bind, subresource="status")
+
+
 def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
     """The run outlives the job; owner references take the rest, no finalizer of ours is needed."""
     start()
     made = place.train()
     place.pods()
+    bound(place)
 
     place.api.delete(TRAINING_JOBS, place.name, "job")
     eventually(lambda: list(map(claim_or_other, place.children())) == ["claim"])
 
     assert "finalizers" not in made["metadata"]
     assert place.get(TRAINING_JOBS, "job") is None
+
+
+def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
+    """It holds no run, and claims of jobs that never began filled the quota of the namespace."""
+    start()
+    place.train("idle", suspend=True, replicas=2)
+    place.train()
+    eventually(lambda: len(place.all(CLAIMS)) == 3)
+
+    place.api.delete(TRAINING_JOBS, place.name, "idle")
+
+    eventually(lambda: len(place.all(CLAIMS)) == 1)
+    assert len(place.all(CLAIMS, "job")) == 1
+
+
+def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place, start):
+    """Its name has the uid of the job before, so nothing would ever use it."""
+    place.train(suspend=True)
+    first = start()
+    eventually(lambda: place.all(CLAIMS))
+    [old] = place.all(CLAIMS)
+    first.stop()
+    place.api.delete(TRAINING_JOBS, place.name, "job", propagation="Foreground")
+    eventually(lambda: place.get(TRAINING_JOBS, "job") is None)
+    place.train(suspend=True)
+
+    start()
+
+    eventually(
+        lambda: [claim["metadata"]["uid"] != old["metadata"]["uid"] for claim in place.all(CLAIMS)] == [True]
+    )
 
 
 def claim_or_other(name):
@@ -198,9 +239,40 @@ def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
     start()
     place.train(ttlSecondsAfterFinished=1)
     [pod] = place.pods()
+    bound(place)
     place.run(pod)
     place.end(pod, word=DONE)
 
     eventually(lambda: place.get(TRAINING_JOBS, "job") is None)
 
     assert len(place.all(CLAIMS, "job")) == 1
+
+
+def test_a_trained_job_without_its_claim_waits_for_a_person(place, start, control_plane):
+    """A new claim is empty, and the training would begin at step 0 without a word."""
+    start()
+    place.train(backoffLimit=0)
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+    place.end(pod, 75, Termination(step=20, reason="Interrupted: SIGTERM received"))
+    eventually(lambda: place.status().get("step") == 20)
+    client = Client(namespace=place.name, kubeconfig=str(control_plane.kubeconfig))
+    client.suspend("job")
+    place.until("Suspended")
+    [claim] = place.all(CLAIMS)
+    place.api.delete(CLAIMS, place.name, claim["metadata"]["name"])
+    eventually(lambda: place.all(CLAIMS) == [])
+
+    client.resume("job")
+    eventually(lambda: place.status()["replicas"][0]["reason"] == "RunLost")
+    held = place.all(CLAIMS), place.get(JOBS, "job-0")["spec"]["suspend"]
+    client.restart("job")
+    place.pods()
+    client.close()
+
+    assert held == ([], True)
+    assert [each["metadata"]["name"] for each in place.all(CLAIMS)] == [claim["metadata"]["name"]]
+    [replica] = place.status()["replicas"]
+    assert (replica["lost"]["what"], replica["lost"]["step"]) == ("Claim", 20)
+    assert eventually(lambda: {"RunLost", "RunRestarted"} <= place.events())

@@ -1,5 +1,6 @@
 """Refused and missing objects, and objects that a job may not use: each has its reason in the status."""
 
+import json
 from http import HTTPStatus
 from pathlib import Path
 
@@ -17,6 +18,14 @@ from tests.waiting import eventually
 
 PLATFORM = Path(__file__).parents[3] / "manifests" / "examples" / "platform"
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
+LIMITS = Resource(api_version="v1", kind="LimitRange", plural="limitranges")
+ADMISSION = "admissionregistration.k8s.io/v1"
+POLICIES = Resource(
+    api_version=ADMISSION, kind="ValidatingAdmissionPolicy", plural="validatingadmissionpolicies"
+)
+POLICY_BINDINGS = Resource(
+    api_version=ADMISSION, kind="ValidatingAdmissionPolicyBinding", plural="validatingadmissionpolicybindings"
+)
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
 TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
 SECRET = {
@@ -121,6 +130,102 @@ def test_what_affects_others_waits_until_it_is_allowed_and_stays_when_it_no_long
 def uid(found):
     """Return the uid of an object."""
     return found["metadata"]["uid"]
+
+
+# OpenShift's constraint restricted-v2 refuses users outside of the range of a namespace.
+RANGE = "must be in the ranges: [1000660000, 1000669999]"
+LIKE_OPENSHIFT = {
+    "apiVersion": "admissionregistration.k8s.io/v1",
+    "kind": "ValidatingAdmissionPolicy",
+    "spec": {
+        "matchConstraints": {
+            "resourceRules": [
+                {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
+            ]
+        },
+        "validations": [
+            {
+                "expression": "!has(object.spec.securityContext) || "
+                "(!has(object.spec.securityContext.runAsUser) && !has(object.spec.securityContext.fsGroup))",
+                "message": RANGE,
+            }
+        ],
+    },
+}
+
+
+@pytest.fixture
+def like_openshift(place):
+    """Refuse pods of this namespace that name a user, as OpenShift does."""
+    name = f"like-openshift-{place.name}"
+    chosen = {"namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": place.name}}}
+    place.api.create(POLICIES, LIKE_OPENSHIFT | {"metadata": {"name": name}})
+    place.api.create(
+        POLICY_BINDINGS,
+        {
+            "apiVersion": POLICIES.api_version,
+            "kind": "ValidatingAdmissionPolicyBinding",
+            "metadata": {"name": name},
+            "spec": {"policyName": name, "validationActions": ["Deny"], "matchResources": chosen},
+        },
+    )
+    yield
+    place.api.delete(POLICY_BINDINGS, None, name)
+    place.api.delete(POLICIES, None, name)
+
+
+@pytest.mark.usefixtures("like_openshift")
+def test_pods_run_where_the_cluster_chooses_their_user(place, start):
+    """With the user of our images each of them was refused."""
+    operator = start()
+    place.train("named")
+    eventually(lambda: RANGE in str(place.status("named").get("replicas", "")), 60)
+    operator.stop()
+
+    start("--no-fixed-user")
+    place.train("chosen")
+
+    assert place.pods("chosen")
+
+
+SIZES = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}
+FLOOR = {"type": "Container", "min": SIZES["requests"], "maxLimitRequestRatio": {"memory": "2"}}
+HARD = {"requests.cpu": "8", "limits.cpu": "16", "requests.memory": "16Gi", "limits.memory": "32Gi"}
+
+
+def confined(place):
+    """Let the API server refuse containers without limits, and small and uneven ones."""
+    place.create(
+        LIMITS,
+        {
+            "apiVersion": "v1",
+            "kind": "LimitRange",
+            "metadata": {"name": "floor"},
+            "spec": {"limits": [FLOOR]},
+        },
+    )
+    limited(place, quota() | {"spec": {"hard": HARD}})
+
+
+def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
+    """Of the ROS master no field could say it, so its pod was refused for ever."""
+    confined(place)
+    start()
+    groups = [{"name": name, "role": name.title(), "resources": SIZES} for name in ("collect", "evaluate")]
+
+    place.train(simulators=groups, trainer={"resources": SIZES}, rosMaster={"resources": SIZES})
+
+    assert place.pods()
+
+
+def test_the_shortest_job_fits_a_namespace_with_limits_by_the_installation(place, start):
+    """Neither `helm test` nor a first example knows the limits of a namespace."""
+    confined(place)
+    start(*(f"--{each}-resources={json.dumps(SIZES)}" for each in ("ros-master", "simulator", "trainer")))
+
+    place.train()
+
+    assert place.pods()
 
 
 def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):

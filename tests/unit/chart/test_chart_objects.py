@@ -137,6 +137,15 @@ def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
     } - {("palaestra-trial", "drones")}
 
 
+def test_no_pod_names_a_user_where_the_cluster_chooses_it():
+    """OpenShift refuses a pod whose user is not of the namespace's range."""
+    all_pods = merged(MODES["everything"], {"podSecurity": {"fixedUser": False}})
+    text = json.dumps(objects(all_pods))
+
+    assert not re.search(r"runAs(User|Group)\b|fsGroup\b", text)
+    assert "--no-fixed-user" in text
+
+
 def test_both_modes_hold_the_same_rights(made):
     """The operator does the same in each."""
     assert rules(bound(made("namespaced"))) == rules(bound(made("default")))

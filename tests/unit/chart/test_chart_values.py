@@ -32,6 +32,7 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
     ("images.trainer.digest", "sha256:abc", ""),
     ("imagePullSecrets", ["registry"], "/0"),
     ("imagePullSecrets", [{"secret": "registry"}], "/0"),
+    ("podSecurity.fixedUser", 65532, ""),
     ("crds.install", "yes", ""),
     ("jobs.allowedPodLabels", "example.com/", ""),
     ("jobs.allowedPodLabels", ["/team"], "/0"),
@@ -43,6 +44,7 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
     ("jobs.allowedAffinityNamespaces", ["Storage"], "/0"),
     ("jobs.allowedAntiAffinityLabels", ["a b"], "/0"),
     ("jobs.nodeSelector", {"kubernetes.io/arch": 64}, "/kubernetes.io~1arch"),
+    ("jobs.resources.rosMaster", {"cpu": "1"}, ""),
     ("networkPolicy.egress.apiServerPorts", [], ""),
     ("networkPolicy.egress.apiServerPorts", [70000], "/0"),
     ("monitoring.podMonitor.interval", 15, ""),
@@ -104,9 +106,9 @@ def test_values_that_do_not_go_together_are_refused(values, told):
 
 def properties(schema: dict[str, Any], path: tuple[str, ...] = ()) -> set[str]:
     """Return the paths of all values that the schema knows."""
-    schema = {**schema, **_definition(schema)}
-    inner = schema.get("properties")
-    if not inner or path[-1:] == ("resources",):
+    whole = schema.get("$ref") == "#/definitions/resources"
+    inner = {**schema, **_definition(schema)}.get("properties")
+    if not inner or whole:
         return {".".join(path)}
     return {each for name, below in inner.items() for each in properties(below, (*path, name))}
 

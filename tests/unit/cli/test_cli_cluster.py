@@ -6,7 +6,7 @@ from palaestra.cli import main
 
 COMMANDS = [
     *("get", "describe", "watch", "logs", "events"),
-    *("suspend", "resume", "delete", "fetch", "try", "doctor"),
+    *("suspend", "resume", "restart", "delete", "fetch", "try", "doctor"),
 ]
 
 

@@ -58,7 +58,7 @@ def whole(replicas):
 
 def counted(replica):
     """Return how often each container was killed for its memory, and when last."""
-    return [(each["container"], each["times"], each["last"]) for each in replica["memoryKills"]]
+    return [(each["container"], each["times"], each["last"]) for each in replica.get("memoryKills", ())]
 
 
 def job(size=0, **annotations):

@@ -4,7 +4,8 @@ from copy import deepcopy
 
 import pytest
 
-from palaestra.decide import write_in_s
+from palaestra.api.status import ReplicaStatus, Status
+from palaestra.decide import as_data, write_in_s
 
 OLD = {
     "phase": "Running",
@@ -32,6 +33,21 @@ def changed(change):
 def test_what_is_equal_is_not_written():
     """No request while nothing changes."""
     assert write_in_s(OLD, deepcopy(OLD), None) is None
+
+
+def test_an_empty_list_is_not_written():
+    """`kubectl describe` prints a heading with nothing below it."""
+    written = as_data(Status(replicas=(ReplicaStatus(index=0),)))
+
+    assert [name for name, value in written["replicas"][0].items() if value == []] == []
+
+
+def test_a_list_that_an_older_definition_adds_is_no_change():
+    """Else the operator would write the status again and again."""
+    added = deepcopy(OLD)
+    added["replicas"][0]["memoryKills"] = []
+
+    assert write_in_s(added, OLD, 3600) is None
 
 
 def test_active_time_is_written_with_what_else_changes():

@@ -48,6 +48,18 @@ def test_an_image_runs_as_a_user_without_rights(instructions):
     assert [each for each, _ in instructions].index("USER") > [each for each, _ in instructions].index("RUN")
 
 
+def test_an_image_runs_as_any_user_of_the_group_0(instructions):
+    """OpenShift gives each namespace a user of its own, which has no name and no home in the image."""
+    folders = [
+        words
+        for run in values(instructions, "RUN")
+        for words in re.findall(r"install --directory ([^&]*)", run)
+    ]
+
+    assert "HOME=/tmp USER=palaestra" in values(instructions, "ENV")
+    assert all("--group=root --mode=775" in words for words in folders)
+
+
 def test_an_image_has_debian_trixie_as_its_base_unless_another_is_named(instructions):
     """A base that is called `latest` is another one tomorrow."""
     assert values(instructions, "FROM") == ["${BASE}"]
@@ -99,7 +111,7 @@ def test_an_image_has_a_folder_for_a_project_of_the_user_s_own(name):
     """`palaestra-install` writes it in a build, as the user of the image, and Python looks there first."""
     [made] = [run for run in values(parsed(recipes("debian")[name]), "RUN") if "useradd" in run]
 
-    assert "install --directory --owner=palaestra --group=palaestra /opt/packages" in made
+    assert "install --directory --owner=palaestra --group=root --mode=775 /opt/packages" in made
     assert "PYTHONPATH=/opt/packages" in values(parsed(recipes("debian")[name]), "ENV")
 
 

@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 
 from palaestra.api.container import Resources
 from palaestra.local.spec import read_pod
-from palaestra.plan import Images, LocalLayout, plan, resources
+from palaestra.plan import ClusterLayout, Images, LocalLayout, plan, resources
 
 TWO_GROUPS = [
     {"name": "collect", "role": "Collect", "count": 2},
     {"name": "evaluate", "role": "Evaluate"},
 ]
+OWN = {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim"]}
 
 
 def containers(planned) -> dict[str, dict]:
@@ -418,3 +419,34 @@ def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
 
     [volume] = [each["emptyDir"] for each in volumes if each["name"] == mounts["/dev/shm"]]
     assert volume == {"medium": "Memory", "sizeLimit": size}
+
+
+def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
+    """A quota on limits.cpu refuses a pod of which one container has no such limit, for ever."""
+    own = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}
+
+    planned = containers(in_cluster(simulators=[OWN, TWO_GROUPS[1]], rosMaster={"resources": own}))
+
+    assert planned["ros-master"]["resources"] == own
+    assert planned["install-sidecar"]["resources"] == own
+
+
+def test_an_installation_sets_the_resources_of_jobs_that_mention_none(make_job):
+    """So the shortest job fits a namespace with limits of its own; what a job mentions wins."""
+    defaults = resources.Defaults(
+        ros_master=Resources(limits={"cpu": "200m"}),
+        simulator=Resources(limits={"cpu": "1"}),
+        trainer=Resources(limits={"cpu": "3", "memory": "4Gi"}),
+    )
+    layout = ClusterLayout(images=Images.of_release("1"), resources=defaults)
+    job = make_job(trainer={"resources": {"limits": {"memory": "1Gi"}}})
+
+    planned = containers(plan(job, layout))
+
+    assert planned["ros-master"]["resources"] == {
+        "requests": {"memory": "64Mi"},
+        "limits": {"memory": "256Mi", "cpu": "200m"},
+    }
+    assert planned["sim-collect-0"]["resources"]["limits"] == {"memory": "2Gi", "cpu": "1"}
+    assert planned["trainer"]["resources"] == {"limits": {"cpu": "3", "memory": "1Gi"}}
+    assert environment(planned["trainer"])["OMP_NUM_THREADS"] == "3"

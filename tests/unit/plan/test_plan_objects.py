@@ -204,6 +204,17 @@ def test_the_pod_is_restricted(in_cluster):
         assert security["capabilities"] == {"drop": ["ALL"]}
 
 
+def test_a_cluster_may_choose_the_user_of_a_pod(make_job):
+    """OpenShift refuses a user outside of the namespace's range; all else stays restricted."""
+    security = pod(plan(make_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
+
+    assert security == {
+        "runAsNonRoot": True,
+        "seccompProfile": {"type": "RuntimeDefault"},
+        "fsGroupChangePolicy": "OnRootMismatch",
+    }
+
+
 def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
     """The installation's is a default for jobs that say nothing: an own image may be for another machine."""
     layout = ClusterLayout(

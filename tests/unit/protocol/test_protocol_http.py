@@ -46,6 +46,33 @@ ROUTES = {
 }
 
 
+EVERY = Address("0.0.0.0", 0)
+
+
+def peered(host, server):
+    """Return a connection to the server by another address of this machine."""
+    return socket.create_connection((host, server.address.port), timeout=DEADLINE_S)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+@pytest.mark.parametrize("peer", ["127.0.0.1", "::1"])
+def test_every_address_is_one_of_ipv6_and_of_ipv4(host, peer):
+    """A kubelet of a cluster with IPv6 only asks [podIP]:8080, and no answer came."""
+    with Server(Address(host, 0), ROUTES, name="test") as listening, peered(peer, listening) as connection:
+        connection.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
+        answer = connection.makefile("rb").read()
+
+    assert answer.endswith(b"ok\n")
+
+
+def test_a_node_without_ipv6_listens_on_ipv4(monkeypatch):
+    """`ipv6.disable=1` leaves no socket of that family."""
+    monkeypatch.setattr(socket, "has_dualstack_ipv6", lambda: False)
+
+    with Server(EVERY, ROUTES, name="test") as listening:
+        assert listening.address.host == "0.0.0.0"
+
+
 @pytest.fixture
 def server():
     """A server with the usual bounds."""

@@ -21,6 +21,22 @@ _COLUMNS = (
     ("Algorithm", "string", ".spec.trainer.algorithm.name", "The learning algorithm", 1),
     ("Started", "date", ".status.startTime", "When the first pod started", 1),
     ("Completed", "date", ".status.completionTime", "When the last replica ended", 1),
+    ("Attempt", "integer", ".status.attempt", "Highest attempt of all replicas", 1),
+    (
+        "Restarts",
+        "integer",
+        ".status.restarts",
+        "Most failures of one replica's trainer, which count against backoffLimit",
+        1,
+    ),
+    (
+        "Checkpoint",
+        "date",
+        ".status.lastCheckpointTime",
+        "When the replica that is furthest behind saved its newest checkpoint",
+        1,
+    ),
+    ("Node", "string", ".status.nodes", "Nodes of the newest pods", 1),
     ("Age", "date", ".metadata.creationTimestamp", "When the job was created", 0),
 )
 
@@ -75,8 +91,17 @@ def schema() -> Schema:
     # Generations begin at 1. Without this default, kstatus would report a job as reconciled before an
     # operator has read it.
     fields["status"]["default"] = {"observedGeneration": 0}
+    _remove_empty_defaults(fields["status"])
     plain: Schema = without_marks(whole)
     return plain
+
+
+def _remove_empty_defaults(schema: Schema) -> None:
+    """Remove defaults of lists that may be absent; `kubectl describe` would print them without content."""
+    if schema.get("default") == []:
+        del schema["default"]
+    for inner in (*schema.get("properties", {}).values(), *([schema["items"]] if "items" in schema else ())):
+        _remove_empty_defaults(inner)
 
 
 def _column(name: str, kind: str, path: str, description: str, priority: int) -> dict[str, Any]:

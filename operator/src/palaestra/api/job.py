@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from palaestra.api.container import Resources
 from palaestra.api.fields import (
     MAY_CHANGE,
     QUALIFIED,
@@ -96,6 +97,13 @@ class PullSecret(ApiModel):
     """Name of the Secret, in the job's own namespace."""
 
 
+class RosMaster(ApiModel):
+    """The ROS master of a replica, and the container that copies the sidecar into images of your own."""
+
+    resources: Resources = Resources()
+    """CPU and memory of each of the two containers, which do not run at the same time."""
+
+
 class Spec(ApiModel):
     """The desired training; every field has a default."""
 
@@ -110,6 +118,9 @@ class Spec(ApiModel):
         SimulatorGroup(name="evaluate", role=Role.EVALUATE),
     )
     """Groups of simulators in each replica; at most 32 simulators in total."""
+
+    ros_master: RosMaster | None = None
+    """The ROS master; absent: the resources that the installation or else Palaestra gives it."""
 
     trainer: Trainer = Trainer()
     """The task, the algorithm and the length of training."""

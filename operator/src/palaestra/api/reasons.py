@@ -37,6 +37,8 @@ class Reason(StrEnum):
     NO_KUEUE = "NoKueue"
     NAME_TAKEN = "NameTaken"
     OLD_POD_TERMINATING = "OldPodTerminating"
+    RUN_LOST = "RunLost"
+    RUN_RESTARTED = "RunRestarted"
     PLANNED = "Planned"
     QUEUED = "Queued"
     SUSPENDING = "Suspending"
@@ -107,12 +109,14 @@ HELD = frozenset(
         Reason.CONFIG_MAP_NOT_FOR_JOBS,
         Reason.SECRET_NOT_FOR_JOBS,
         Reason.CLAIM_NOT_FOR_JOBS,
+        Reason.RUN_LOST,
     }
 )
 
 # Reasons for which a replica waits: the cluster retries, or a person must act. The metric
 # palaestra_replicas_waiting counts these.
 WAITING = (
+    Reason.RUN_LOST,
     Reason.NAME_TAKEN,
     Reason.OLD_POD_TERMINATING,
     Reason.PODS_REFUSED,
@@ -243,6 +247,20 @@ ROWS: dict[Reason, Row] = {
         "write",
         "wait; if the node is lost and its machine is off, run `kubectl delete node NODE`; or use another "
         "claim",
+    ),
+    Reason.RUN_LOST: Row(
+        "{fact}; restore it, or run `palaestra restart {name}` to train from step 0 again",
+        "the replica has trained, and its claim does not exist or its run directory is empty; the operator "
+        "suspends it and creates no new claim, because it would train from step 0",
+        "restore the claim under its name, or the run directory; after you have restored a run directory, or "
+        "to train from step 0 again, run `palaestra restart NAME` ([a lost run](operations.md#a-lost-run))",
+    ),
+    Reason.RUN_RESTARTED: Row(
+        "the run that was at step {step} is lost; the replica begins with what its run directory holds, at "
+        "step 0 if that is empty, because the annotation palaestra.dev/restart-lost-runs asks for it",
+        "a person gave a lost run up, or has restored it",
+        "nothing",
+        warning=False,
     ),
     Reason.PLANNED: Row(
         "created {objects}", "the operator created the objects of a replica", "nothing", warning=False

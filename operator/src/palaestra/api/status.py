@@ -100,8 +100,8 @@ class Restarts(Reported):
     """Restarts of simulators after a fault, over all attempts."""
 
     disruption: Count = 0
-    """Pods replaced after a disruption (preemption, eviction, drain) or a manual deletion; these do not count
-    against `backoffLimit`."""
+    """Pods replaced after a disruption (preemption, eviction, drain), or after a deletion that left the
+    trainer time to save; these do not count against `backoffLimit`."""
 
     suspension: Count = 0
     """Pods replaced because the job was suspended and resumed."""
@@ -123,6 +123,31 @@ class PodReference(Reported):
 
     created: datetime = Field(strict=False)
     """Time at which the pod was created."""
+
+
+class LostPart(StrEnum):
+    """The part of a run that is lost."""
+
+    CLAIM = "Claim"
+    RUN_DIRECTORY = "RunDirectory"
+
+
+class LostRun(Reported):
+    """A run that had trained and is lost."""
+
+    what: LostPart = Field(strict=False)
+    """`Claim`: the claim of the replica does not exist. `RunDirectory`: the run directory was empty when a
+    later attempt began."""
+
+    step: Count
+    """Step of its newest checkpoint; without a checkpoint, the highest step."""
+
+    pod: PodReference | None = None
+    """Newest pod of the lost run; absent: none is known."""
+
+    restarted: datetime | None = Field(default=None, strict=False)
+    """Time at which the operator let the replica begin again, because a person asked for it. Absent: the
+    replica waits for that."""
 
 
 class SimulatorStatus(Reported):
@@ -190,6 +215,9 @@ class ReplicaStatus(Reported):
     pod: PodReference | None = None
     """Pod of the current attempt; absent: no pod yet."""
 
+    node: Word | None = None
+    """Node of the newest pod; absent: no node has been chosen yet."""
+
     step: Count | None = None
     """Environment steps trained; absent: not known yet."""
 
@@ -248,6 +276,9 @@ class ReplicaStatus(Reported):
     steps_lost: Count | None = None
     """Environment steps of episodes that a fault ended early, and steps repeated after an interruption, over
     all attempts; absent: not known yet."""
+
+    lost: LostRun | None = None
+    """Run that the replica has lost last; absent: none."""
 
 
 class Release(Reported):
@@ -319,6 +350,22 @@ class Status(Reported):
 
     success_rate: Fraction | None = None
     """Lowest success rate of all replicas, 0 to 1; absent: no evaluation yet."""
+
+    attempt: Count | None = None
+    """Highest attempt of all replicas; absent: no pod yet."""
+
+    restarts: Count | None = None
+    """Most failures of one replica's trainer, which count against `backoffLimit`; absent: none."""
+
+    last_checkpoint_time: datetime | None = Field(default=None, strict=False)
+    """Oldest time at which a replica saved its newest checkpoint; absent: there is no checkpoint yet."""
+
+    nodes: Word | None = None
+    """Nodes of the newest pods, separated by commas; absent: no node has been chosen yet."""
+
+    lost_runs_restarted: Word | None = None
+    """Last value of the annotation `palaestra.dev/restart-lost-runs` that the operator obeyed; absent:
+    none."""
 
     left_out: Words | None = None
     """Nodes that the simulators leave out of their worlds because they cannot simulate them: a line for each

@@ -29,7 +29,8 @@ class Storage(ApiModel):
     """Storage class of the claim; absent: the cluster's default."""
 
     retain: Retain = Field(default=Retain.KEEP, strict=False)
-    """`Keep`: the claim stays when the TrainingJob is deleted. `Delete`: the claim is deleted too."""
+    """`Keep`: the claim stays when the TrainingJob is deleted, unless it was never bound to a volume.
+    `Delete`: the claim is deleted too."""
 
     ephemeral: bool = False
     """`true` keeps the run in the pod, so it is deleted with the pod; a condition reports this."""

@@ -1,4 +1,4 @@
-"""`palaestra suspend`, `resume` and `delete`."""
+"""`palaestra suspend`, `resume`, `restart` and `delete`."""
 
 import argparse
 
@@ -17,6 +17,11 @@ RESUME = """\
 Sets spec.suspend of TrainingJobs to false: they resume from their checkpoints. Refuses a job with a queue,
 because Kueue suspends and resumes it, and a job that has ended.
 """
+RESTART = """\
+Lets replicas with the reason RunLost continue. A replica whose claim is gone gets a new one and trains from
+step 0 again. A replica whose run directory was empty resumes from the newest checkpoint that is in it now,
+else it too begins at step 0.
+"""
 DELETE = """\
 Deletes TrainingJobs with their pods and waits until they are deleted. The claims with their runs stay unless
 the job has `retain: Delete`; the command prints how to delete them.
@@ -25,10 +30,11 @@ GONE_S = 300.0
 
 
 def add(commands: Commands) -> None:
-    """Add the three commands."""
+    """Add the four commands."""
     for name, work, description in (
         ("suspend", _suspend, SUSPEND),
         ("resume", _resume, RESUME),
+        ("restart", _restart, RESTART),
         ("delete", _delete, DELETE),
     ):
         parser = cluster_command(commands, name, work, description)
@@ -53,6 +59,13 @@ def _resume(client: Client, options: argparse.Namespace) -> int:
     for name in options.names:
         client.resume(name)
         say([f"{name}: will resume; `palaestra watch {name}` shows its progress"])
+    return 0
+
+
+def _restart(client: Client, options: argparse.Namespace) -> int:
+    for name in options.names:
+        client.restart(name)
+        say([f"{name}: will begin its lost runs again; `palaestra watch {name}` shows its progress"])
     return 0
 
 

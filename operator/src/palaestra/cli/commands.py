@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "watch": Command("watching", "show the progress of a job"),
         "suspend": Command("changing", "suspend jobs"),
         "resume": Command("changing", "resume suspended jobs"),
+        "restart": Command("changing", "begin lost runs again"),
         "delete": Command("changing", "delete jobs"),
         "fetch": Command("fetching", "copy the results of a run"),
         "doctor": Command("doctor", "find out why jobs do not run"),

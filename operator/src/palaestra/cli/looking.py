@@ -12,7 +12,7 @@ from palaestra.client import Client, asked, check_namespace
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
-from palaestra.view import describe, happened, server_table
+from palaestra.view import describe, happened, server_table, without_status
 from palaestra_protocol.numbers import seconds, whole
 
 READS = "Reads the cluster and changes nothing.\n"
@@ -27,6 +27,7 @@ after an hour by default. {READS}"""
 LOGS = f"""\
 Prints the log of a container of a replica's newest pod. {READS}"""
 LOG_S = 86_400.0
+UNSEEN = "no operator has reconciled it; check that the operator runs and watches this namespace"
 
 
 def add(commands: Commands) -> None:
@@ -88,6 +89,8 @@ def _table(client: Client, options: argparse.Namespace, namespace: str | None) -
         sys.stderr.write(f"no TrainingJobs{chosen} in {where}\n")
         return 0
     say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
+    if unseen := without_status(table):
+        sys.stderr.write(f"{', '.join(unseen)}: {UNSEEN}\n")
     return 0
 
 

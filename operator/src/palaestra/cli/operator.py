@@ -1,14 +1,17 @@
 """`palaestra operator`: reconcile the TrainingJobs of a cluster."""
 
 import argparse
+import json
 import re
 from importlib.metadata import version
 
+from palaestra.api.container import Resources
 from palaestra.cli.parsing import Commands, command
 from palaestra.cluster import own_namespace
 from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
 from palaestra.plan import Allowed, Images
+from palaestra.plan.resources import Defaults
 from palaestra_protocol.numbers import seconds, whole
 
 OPERATOR = """\
@@ -59,7 +62,7 @@ def add(commands: Commands) -> None:
         "--metrics-address",
         metavar="HOST:PORT",
         default="0.0.0.0:8080",
-        help="address of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
+        help="address of /healthz, /readyz and /metrics; default: 0.0.0.0:8080, every address, also of IPv6",
     )
     _add_cluster(parser)
     _add_pods(parser)
@@ -116,6 +119,34 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
         help="label that the nodes of training pods must have, unless a job sets another value; "
         "may be repeated; default: none",
     )
+    parser.add_argument(
+        "--fixed-user",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="run training pods as user 65532; --no-fixed-user: as the user that the cluster chooses; "
+        "default: yes",
+    )
+    for container in ("ros-master", "simulator", "trainer"):
+        parser.add_argument(
+            f"--{container}-resources",
+            metavar="JSON",
+            type=_resources,
+            default=Resources(),
+            help=f"requests and limits of each {container} of a job that mentions none, such as "
+            '{"limits": {"cpu": "500m"}}; default: those of the release',
+        )
+
+
+def _resources(text: str) -> Resources:
+    try:
+        given = json.loads(text)
+        return Resources.model_validate(
+            {field: {name: str(value) for name, value in given[field].items()} for field in given}
+        )
+    except (AttributeError, TypeError, ValueError) as error:
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is not resources; use JSON such as {{"limits": {{"cpu": "500m"}}}}'
+        ) from error
 
 
 def _add_users(parser: argparse.ArgumentParser) -> None:
@@ -197,6 +228,12 @@ def _operator(options: argparse.Namespace) -> int:
             node_selector=dict(options.node_selector),
             host_users=options.host_users,
             allowed=Allowed(**{field: tuple(getattr(options, field)) for _, field, *_ in ALLOWANCES}),
+            resources=Defaults(
+                ros_master=options.ros_master_resources,
+                simulator=options.simulator_resources,
+                trainer=options.trainer_resources,
+            ),
+            fixed_user=options.fixed_user,
             kubeconfig=options.kubeconfig,
             context=options.context,
         )

@@ -2,14 +2,16 @@
 
 import time
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal, Self
 
 from palaestra.api import Spec, Status, TrainingJob, validate
+from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, PodReference
 from palaestra.client.asking import asked
-from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, QueueDecides
+from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, NothingLost, QueueDecides
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
@@ -19,7 +21,7 @@ from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.given import Given, data_of, name_of
 from palaestra.objects import Object
 from palaestra.plan import ClusterLayout, Images
-from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica
+from palaestra.plan.replica import RESTART_LOST_RUNS, ROS_MASTER, TRAINER, Replica
 
 MANAGER = "palaestra"
 FETCH_S = 600.0
@@ -238,6 +240,24 @@ class Client:
         job = self._suspended(name, suspend=False)
         _check_queue(job)
         return job
+
+    def restart(self, name: str) -> TrainingJob:
+        """Let the replicas of a job whose runs are lost continue with what their run directories hold.
+
+        A replica whose run directory is empty or whose claim is gone begins at step 0 again.
+
+        Raises:
+            NoSuchJob: no job has this name.
+            HasEnded: the job has ended; nothing was changed.
+            NothingLost: no replica of the job has lost its run; nothing was changed.
+        """
+        job = self.get(name)
+        _check_running(job, "restarted")
+        if not any(replica.reason == Reason.RUN_LOST for replica in job.status.replicas):
+            raise NothingLost.of(name)
+        word = {"metadata": {"annotations": {RESTART_LOST_RUNS: datetime.now(UTC).isoformat()}}}
+        with asked(name, self.namespace):
+            return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, word))
 
     def delete(self, name: str, *, deadline_s: float | None = None) -> None:
         """Delete a job and its pods; with a deadline, wait for that. With `retain: Keep`, claims stay.

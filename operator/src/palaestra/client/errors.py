@@ -6,6 +6,7 @@
     ├── NoSuchJob           the TrainingJob does not exist, or was deleted meanwhile
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
     ├── HasEnded            the job has ended, so it is neither suspended nor resumed
+    ├── NothingLost         no replica of the job has lost its run, so none is restarted
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
     ├── NoPod               a replica has no pod or no such container, so no log
@@ -81,6 +82,18 @@ class HasEnded(ClientError):
         return cls(
             f"job {name}: has ended ({phase}), so it cannot be {verb}; create a new job, and continue this "
             "run with spec.storage.resumeFrom"
+        )
+
+
+class NothingLost(ClientError):
+    """No replica of the job has lost its run, so there is nothing to restart."""
+
+    @classmethod
+    def of(cls, name: str) -> Self:
+        """Return the error about the job of this name."""
+        return cls(
+            f"job {name}: no replica has the reason RunLost, so none is restarted; to train from step 0 "
+            "again, create a new job"
         )
 
 

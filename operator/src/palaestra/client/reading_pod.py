@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from palaestra.api import TrainingJob
-from palaestra.plan.replica import TRAINER, owner
+from palaestra.plan.replica import ROS_MASTER, TRAINER, owner
 
 CONTAINER = "reader"
 VOLUME = "run"
 FETCH_LABEL = "palaestra.dev/fetch"
 RUN_VARIABLE = "PALAESTRA_RUN"
 GRACE_S = 1
-RESOURCES = {"requests": {"cpu": "10m", "memory": "32Mi"}, "limits": {"memory": "96Mi"}}
 
 
 def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_s: int) -> dict[str, Any]:
@@ -35,7 +34,7 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
         "activeDeadlineSeconds": lives_s,
         "terminationGracePeriodSeconds": GRACE_S,
         "volumes": [volume for volume in spec["volumes"] if volume["name"] == VOLUME],
-        "containers": [_reader(trainer_of(template), lives_s)],
+        "containers": [_reader(template, lives_s)],
     }
     labels = {"app.kubernetes.io/managed-by": "palaestra", FETCH_LABEL: job.metadata.name}
     return {
@@ -51,15 +50,20 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
     }
 
 
-def _reader(trainer: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
-    """Return the container: the trainer's image and security, with only the run mounted, read-only."""
+def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
+    """Return the container: the trainer's image and security, with only the run mounted, read-only.
+
+    It has the resources of the ROS master, the smallest that a quota of the namespace has admitted.
+    """
+    trainer = trainer_of(template)
+    [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)
     return {
         "name": CONTAINER,
         "image": trainer["image"],
         "imagePullPolicy": trainer["imagePullPolicy"],
         "command": ["sleep", str(lives_s)],
         "securityContext": trainer["securityContext"],
-        "resources": RESOURCES,
+        "resources": master["resources"],
         "volumeMounts": [
             {**mount, "readOnly": True} for mount in trainer["volumeMounts"] if mount["name"] == VOLUME
         ],

@@ -31,7 +31,15 @@ from palaestra.decide.decision import (
     Stop,
 )
 from palaestra.decide.fitting import fitted
-from palaestra.decide.preparing import Prepared, complete, prepare, resuming, wants_whole, worlds_to_check
+from palaestra.decide.preparing import (
+    Prepared,
+    complete,
+    lacking_claims,
+    prepare,
+    resuming,
+    wants_whole,
+    worlds_to_check,
+)
 from palaestra.decide.times import Record, Times
 from palaestra.decide.writing import as_data, write_in_s
 
@@ -55,6 +63,7 @@ __all__ = [
     "complete",
     "decide",
     "fitted",
+    "lacking_claims",
     "managed_here",
     "prepare",
     "reject",

@@ -7,7 +7,7 @@ from palaestra.api.status import TERMINAL, ReplicaStatus
 from palaestra.decide.decision import Action, Basis, Create, Discard, Replace, SetSuspend, Stop
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.replicas import Decided
-from palaestra.decide.suspending import mark, to_resume, to_set
+from palaestra.decide.suspending import mark, to_set
 from palaestra.objects import Object
 from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved
 from palaestra.plan import Plan, ReplicaPlan
@@ -104,16 +104,20 @@ def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Re
 def _switches(
     job: TrainingJob, observed: Observed, prepared: Prepared, decided: Sequence[Decided]
 ) -> Iterator[SetSuspend]:
-    """Yield a change for each Job whose `suspend` is not as in the spec; a hold prevents a resumption."""
+    """Yield a change for each Job whose `suspend` is not as in the spec; a hold prevents a resumption.
+
+    The Job of a lost run is suspended, because its trainer would begin at step 0.
+    """
     for seen, replica in zip(observed.replicas, decided, strict=True):
-        held = prepared.closed is not None and to_resume(job, seen.job)
+        suspend = job.spec.suspend or seen.index in prepared.lost
+        held = prepared.closed is not None and not suspend
         going_on = replica.status.phase not in TERMINAL and not held
-        if seen.job is not None and going_on and to_set(job, seen.job):
+        if seen.job is not None and going_on and to_set(job, seen.job, suspend=suspend):
             yield SetSuspend(
                 job=seen.job.name,
                 replica=seen.index,
-                suspend=job.spec.suspend,
-                mark=mark(seen, replica.status.pod, suspend=job.spec.suspend),
+                suspend=suspend,
+                mark=mark(seen, replica.status.pod, suspend=suspend),
                 basis=_basis(seen.job),
             )
 

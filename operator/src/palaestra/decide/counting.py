@@ -80,6 +80,14 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
     return tuple(pod for pod in pods if pod.created >= named.created)
 
 
+def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
+    """Return the uids of the pods whose reports apply: those since a lost run was given up, else all."""
+    if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
+        pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)
+        return frozenset(pod.uid for pod in pods if pod.uid != old.lost.pod.uid)
+    return frozenset(pod.uid for pod in pods)
+
+
 def failed_by_itself(pod: PodView) -> bool:
     """Return whether the end of a pod counts against `backoffLimit`, by the rules of podFailurePolicy."""
     interrupted = pod.trainer is not None and exit_code(pod) == ExitCode.INTERRUPTED
@@ -213,14 +221,16 @@ def _simulators(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVi
 
 
 def _furthest(old: ReplicaStatus, seen: ReplicaObserved) -> int | None:
-    steps = [old.furthest_step, old.step, *_steps(seen)]
+    steps = [old.furthest_step, old.step, *_steps(old, seen)]
     return max((_bounded(step) for step in steps if step is not None), default=None)
 
 
-def _steps(seen: ReplicaObserved) -> Iterable[int]:
-    for message in seen.terminations.values():
-        yield message.step
-    if seen.polled:
+def _steps(old: ReplicaStatus, seen: ReplicaObserved) -> Iterable[int]:
+    current = of_this_run(old, seen.pods)
+    for pod, message in seen.terminations.items():
+        if pod in current:
+            yield message.step
+    if seen.polled and seen.pod and seen.pod.uid in current:
         yield seen.polled.status.step
 
 

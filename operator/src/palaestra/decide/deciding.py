@@ -22,6 +22,7 @@ from palaestra.decide.edits import edits
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import of_actions, of_change
 from palaestra.decide.judging import Course
+from palaestra.decide.losing import new_word, restarted
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
@@ -101,7 +102,20 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
     if old.phase in TERMINAL or job.status.phase in TERMINAL:
         late = old.model_copy(update={"last_attempt": late_word(situation)})
         return Decided(status=late, course=Course(stop=_still_to_stop(old, seen)))
-    return decided(situation)
+    return _with_lost_run(decided(situation), job, prepared, times)
+
+
+def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
+    """Return a replica with the run that it has lost; a person's word gives up a run that was shown."""
+    shown, lost = found.status.lost, prepared.lost.get(found.status.index)
+    if found.status.phase in TERMINAL:
+        return found
+    if lost is None:
+        gone = shown is not None and shown.restarted is None  # the claim is there again
+        return replace(found, status=found.status.model_copy(update={"lost": None})) if gone else found
+    if shown == lost and new_word(job) is not None:
+        return replace(found, status=restarted(found.status, lost, times.now))
+    return replace(found, status=found.status.model_copy(update={"lost": lost}))
 
 
 def _kept(job: TrainingJob, decided: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
@@ -149,6 +163,7 @@ def _status(
         completion_time=now if where.phase in TERMINAL else None,
         active_seconds=min(int(times.active_s(old.active_seconds)), MOST_COUNT),
         active_since=now if active(where.phase, replicas) and not _waits(observed, prepared) else None,
+        lost_runs_restarted=new_word(job) or old.lost_runs_restarted,
         left_out=left_out(old, observed),
         replicas=tuple(replicas),
         **columns(job, replicas),

@@ -38,6 +38,7 @@ def of_change(old: Status, new: Status) -> Iterator[Happening]:
         yield from _of_replica(before.get(replica.index), replica)
         yield from _of_attempt(before.get(replica.index), replica)
         yield from _of_memory(before.get(replica.index), replica)
+        yield from _of_lost_run(before.get(replica.index), replica)
     for kind in _ENDS:
         yield from _of_condition(old, new, kind)
 
@@ -103,3 +104,10 @@ def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happen
         message = say(whose, container=kill.container, limit=limit_of(kill.limit), times=kill.times)
         if kill.times > before.get(kill.container, 0) and message not in reported:
             yield happening(whose, message, new.index)
+
+
+def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
+    """Yield the event of a lost run that a person gave up."""
+    before = old.lost.restarted if old is not None and old.lost is not None else None
+    if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
+        yield happening(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)

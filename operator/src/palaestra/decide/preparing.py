@@ -4,14 +4,16 @@ A replica with all its objects is not planned at all, so a later change of its w
 release, has no effect on it.
 """
 
+import dataclasses
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob, broken_guards
 from palaestra.api.reasons import Reason
-from palaestra.api.status import TERMINAL
+from palaestra.api.status import TERMINAL, LostPart, LostRun
 from palaestra.decide.allowing import not_allowed
 from palaestra.decide.holding import Hold, held
+from palaestra.decide.losing import lost_runs, why_lost
 from palaestra.decide.suspending import to_resume
 from palaestra.errors import WorldCheckTooCostly, WorldRefused, WorldUnchecked
 from palaestra.observe.reading import part
@@ -19,7 +21,7 @@ from palaestra.observe.shortening import Lacking
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind
 from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
-from palaestra.plan.claim import former_name
+from palaestra.plan.claim import claim_name, former_name
 from palaestra_sim.errors import WorldError
 
 
@@ -27,16 +29,20 @@ from palaestra_sim.errors import WorldError
 class Prepared:
     """The plan with its images, or the hold that prevents it; neither if no object is missing.
 
-    `closed` keeps existing Jobs from being resumed: an object that they use is no longer for jobs.
+    `closed` keeps existing Jobs from being resumed: an object that they use is no longer for jobs. `lost` has
+    the replicas that must not train, because their runs are lost.
     """
 
     plan: Plan | None = None
     images: Images | None = None
     hold: Hold | None = None
     closed: Hold | None = None
+    lost: Mapping[int, LostRun] = dataclasses.field(default_factory=dict)
 
     def hold_of(self, job: TrainingJob, seen: ReplicaObserved) -> Hold | None:
         """Return the hold that keeps a replica from being planned or resumed."""
+        if (lost := self.lost.get(seen.index)) is not None:
+            return Hold(explanation=why_lost(job, seen.index, lost))
         if seen.job is None:
             return self.hold
         return self.closed if to_resume(job, seen.job) else None
@@ -56,9 +62,10 @@ _MISSING = {SourceKind.SECRET: Reason.SECRET_MISSING, SourceKind.CLAIM: Reason.C
 def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
     """Return the plan of a job with missing objects; its images are those of its acceptance."""
     closed = sources_are_still_for_jobs(job, observed) if resuming(job, observed) else None
+    lost = _lost(job, observed)
     if complete(job, observed):
-        return Prepared(closed=closed)
-    return replace(_planned(job, observed, layout), closed=closed)
+        return Prepared(closed=closed, lost=lost)
+    return replace(_planned(job, observed, layout), closed=closed, lost=lost)
 
 
 def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
@@ -117,6 +124,15 @@ def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lac
     if lacks is None or complete(job, observed):
         return False
     return lacks is Lacking.FIELDS or _held(job, observed, layout) is None
+
+
+def lacking_claims(job: TrainingJob, observed: Observed) -> tuple[str, ...]:
+    """Return the names of the claims that unfinished replicas lack although they have trained."""
+    return tuple(
+        claim_name(job.metadata.name, index, job.metadata.uid or "")
+        for index, lost in _lost(job, observed).items()
+        if lost.what is LostPart.CLAIM
+    )
 
 
 def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, ...]:
@@ -203,15 +219,20 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
 def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
     """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts.
 
-    A replica without a Job keeps the claim of an earlier release.
+    A replica whose run is lost gets none. A replica without a Job keeps the claim of an earlier release.
     """
     named = {source.name for source in references(job) if source.kind is SourceKind.CLAIM}
     there = {name for _, name in observed.present} | named
+    lost = _lost(job, observed)
     return {
         replica.index: _mounted(job, replica, there)
         for replica in unfinished(job, observed)
-        if replica.job is None or not replica.job.volumes <= there
+        if replica.index not in lost and (replica.job is None or not replica.job.volumes <= there)
     }
+
+
+def _lost(job: TrainingJob, observed: Observed) -> Mapping[int, LostRun]:
+    return lost_runs(job, unfinished(job, observed), observed.present)
 
 
 def _mounted(job: TrainingJob, replica: ReplicaObserved, there: Collection[str]) -> frozenset[str]:

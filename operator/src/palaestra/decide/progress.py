@@ -15,6 +15,7 @@ from palaestra.api.status import (
     SimulatorStatus,
     SuccessInterval,
 )
+from palaestra.decide.counting import of_this_run
 from palaestra.decide.situation import Situation
 from palaestra.decide.times import Wait, after
 from palaestra.observe.reading import MOST_COUNT, as_time
@@ -32,6 +33,10 @@ def progress(situation: Situation, phase: Phase) -> dict[str, object]:
 
     A trainer that has not read its run directory yet reports step 0, whatever was learned before.
     """
+    if situation.seen.pod is not None and situation.seen.pod.uid not in of_this_run(
+        situation.old, situation.seen.pods
+    ):
+        return {"steps_per_second": None}
     polled = situation.seen.polled.status if situation.seen.polled and phase not in TERMINAL else None
     ended_with = situation.seen.termination
     told_last = ended_with or polled

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, field
 
+from palaestra.api.lines import one_line
 from palaestra.api.status import TERMINAL, ReplicaStatus
 from palaestra.decide.judging import Course, judge
 from palaestra.decide.memory import memory_kills
 from palaestra.decide.progress import progress
 from palaestra.decide.remembering import last_attempt
 from palaestra.decide.situation import Situation, Verdict
+
+LONGEST_NODE = 253  # characters of a node's name, as the API server bounds it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +39,7 @@ def _status(situation: Situation, verdict: Verdict) -> ReplicaStatus:
             "since": situation.now if changed else old.since,
             "attempt": counts.attempt,
             "pod": counts.pod,
+            "node": _node(situation),
             "restarts": counts.restarts,
             "simulator_restarts": counts.simulator_restarts,
             "furthest_step": counts.furthest_step,
@@ -45,3 +49,9 @@ def _status(situation: Situation, verdict: Verdict) -> ReplicaStatus:
             **progress(situation, verdict.phase),
         }
     )
+
+
+def _node(situation: Situation) -> str | None:
+    """Return the node of the newest pod; after the pod is gone, the one that it had."""
+    pod = situation.seen.pod
+    return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None

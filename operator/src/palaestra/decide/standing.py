@@ -16,13 +16,12 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # no other object 
 
 
 def held(situation: Situation) -> Finding | None:
-    """An object that the job names does not exist or is not for jobs, so nothing is created or resumed."""
+    """Its run is lost, or an object that the job names does not exist or is not for jobs: nothing begins."""
     if situation.hold is None:
         return None
-    return Finding(
-        explanation=situation.hold.explanation,
-        phase=Phase.PENDING if situation.seen.job is None else Phase.SUSPENDED,
-    )
+    job = situation.seen.job
+    phase = Phase.PENDING if job is None else Phase.SUSPENDED if job.suspended else None
+    return Finding(explanation=situation.hold.explanation, phase=phase)
 
 
 def suspending(situation: Situation) -> Finding | None:

@@ -13,6 +13,7 @@ from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import Verdict
 from palaestra.observe.views import Observed
 
+LONGEST_NODES = 256  # characters of the names of all nodes
 LONGEST_LEFT_OUT = 230  # of a line: a group's name, and 200 characters of a simulator
 
 
@@ -48,11 +49,17 @@ def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, An
     """Return the columns of `kubectl get tj`, from the replica with the fewest steps and from the worst."""
     up = sum(replica.phase in {Phase.RUNNING, Phase.SUCCEEDED} for replica in replicas)
     steps = [replica.step for replica in replicas if replica.step is not None]
+    saved = [replica.last_checkpoint.time for replica in replicas if replica.last_checkpoint is not None]
+    nodes = [replica.node for replica in replicas if replica.node is not None]
     rates = [replica.success_rate for replica in replicas if replica.success_rate is not None]
     return {
         "running": f"{up}/{job.spec.replicas}",
         "step": min(steps, default=None),
         "success_rate": min(rates, default=None),
+        "attempt": max((replica.attempt for replica in replicas), default=0) or None,
+        "restarts": max((replica.restarts.trainer for replica in replicas), default=0) or None,
+        "last_checkpoint_time": min(saved, default=None),
+        "nodes": one_line(",".join(dict.fromkeys(nodes)), LONGEST_NODES) or None,
     }
 
 

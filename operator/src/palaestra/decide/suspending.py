@@ -21,15 +21,17 @@ def set_last(job: TrainingJob, seen: JobView) -> bool:
     return seen.suspended if changed else job.spec.suspend
 
 
-def to_set(job: TrainingJob, seen: JobView | None) -> bool:
+def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = None) -> bool:
     """Return whether the operator has to suspend or resume a Job; if it has a queue, Kueue does.
+
+    The Job is to be as `suspend`; None: as the spec.
 
     The spec is compared with the value that the operator set last, not with the current one. Otherwise the
     operator and another client would undo each other's writes forever.
     """
     if seen is None or job.spec.scheduling.queue_name is not None or seen.queue or seen.end is not None:
         return False
-    return set_last(job, seen) != job.spec.suspend
+    return set_last(job, seen) != (job.spec.suspend if suspend is None else suspend)
 
 
 def seen_generation(job: TrainingJob, observed: Observed) -> int | None:

@@ -12,13 +12,13 @@ from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
-_OF_JOB = frozenset({"leftOut", "step", "successRate"})
+_OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
 _FIRST = frozenset(  # once present, always present
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "successInterval", "meanReturn", "stepsPerSecond", "simulators",
-     "lastCheckpoint",
+     "lastCheckpoint", "node",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
 
@@ -27,8 +27,19 @@ _AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
 
 
 def as_data(status: Status) -> dict[str, Any]:
-    """Return the status as in the API server: camelCase, without absent fields."""
-    return status.model_dump(mode="json", by_alias=True, exclude_none=True)
+    """Return the status as in the API server: camelCase, without absent fields and empty lists.
+
+    `kubectl describe` prints a heading for each empty list, and a reader takes an absent one for empty.
+    """
+    data: dict[str, Any] = _without_empty(status.model_dump(mode="json", by_alias=True, exclude_none=True))
+    return data
+
+
+def _without_empty(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        kept = {name: _without_empty(value) for name, value in data.items()}
+        return {name: value for name, value in kept.items() if value != []}
+    return [_without_empty(item) for item in data] if isinstance(data, list) else data
 
 
 def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
@@ -40,7 +51,8 @@ def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: f
         since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
             has not written it.
     """
-    before = _without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS)
+    # An API server whose definition is older adds the empty lists again.
+    before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))
     after = _without(new, _WITH_OTHERS)
     if before == after:
         return None

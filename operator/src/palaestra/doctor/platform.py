@@ -8,7 +8,6 @@ from typing import Any
 from palaestra.api.crd import crd
 from palaestra.api.job import API_VERSION
 from palaestra.client.errors import INSTALL
-from palaestra.client.reading_pod import RESOURCES
 from palaestra.cluster import Forbidden, Invalid, NotFound
 from palaestra.cluster.resources import DEFINITIONS, NAMESPACES, NODES, PODS, STORAGE_CLASSES
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
@@ -16,6 +15,12 @@ from palaestra.doctor.installation import trainer_image
 from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
+
+# Small, and with every limit, so that no quota asks for another.
+RESOURCES = {
+    "requests": {"cpu": "10m", "memory": "32Mi"},
+    "limits": {"cpu": "10m", "memory": "96Mi"},
+}
 
 FIRST = (1, 33)  # the first version in which sidecar containers are stable
 DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"

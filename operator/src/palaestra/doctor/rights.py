@@ -56,7 +56,7 @@ OPERATOR = (
     may("", "pods", "list watch"),
     may("", "pods/eviction", "create"),
     may("", "configmaps", "get list watch create"),
-    may("", "persistentvolumeclaims", "get list watch create"),
+    may("", "persistentvolumeclaims", "get list watch create delete"),
     may("networking.k8s.io", "networkpolicies", "list watch create patch"),
     may("", "events", "get list create patch"),
 )

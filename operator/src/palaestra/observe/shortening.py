@@ -18,7 +18,7 @@ LONGEST_TEXT = 256  # characters of an inline world that is kept unchanged
 MOST_CHARACTERS = 32_768  # of a cached copy, its status aside; that of a usual job has 4,000
 
 # Fields that may be large: lists and maps of texts. No decision needs them once the objects exist.
-_LARGE_OF_SPEC = frozenset({"imagePullSecrets"})
+_LARGE_OF_SPEC = frozenset({"imagePullSecrets", "rosMaster"})
 _LARGE_OF_TRAINER = frozenset({"algorithm", "command", "env", "environment", "resources"})
 _LARGE_OF_GROUP = frozenset({"command", "driver", "env", "image", "options", "resources", "world"})
 _LARGE_OF_SCHEDULING = frozenset({"affinity", "nodeSelector", "podAnnotations", "podLabels", "tolerations"})

@@ -8,9 +8,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from palaestra.observe.claims import FIELDS
 from palaestra.observe.jobs import REPLACED, SETTINGS, STOPPED, SUSPENDED
 from palaestra.observe.shortening import shortened
 from palaestra.plan.job import SUSPEND_SET
+from palaestra.plan.replica import RESTART_LOST_RUNS
 
 _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
@@ -21,7 +23,7 @@ _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
     "initContainerStatuses", "containerStatuses",
 )  # fmt: skip
-_ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET)
+_ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET, RESTART_LOST_RUNS)
 
 SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole one without its status
 SMALL = 65_536  # bytes, up to which a cached TrainingJob has no such annotation
@@ -39,7 +41,9 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
         return kept | {"spec": _job_spec(raw), "status": raw.get("status", {})}
     if kind == "Pod":
         return kept | {"spec": _pod_spec(raw), "status": _some(raw.get("status"), _POD_STATUS)}
-    if kind in {"ConfigMap", "PersistentVolumeClaim", "NetworkPolicy"}:
+    if kind == "PersistentVolumeClaim":
+        return kept | {"spec": _some(raw.get("spec"), FIELDS), "status": _some(raw.get("status"), ("phase",))}
+    if kind in {"ConfigMap", "NetworkPolicy"}:
         return kept
     return _measured(raw, shortened(whole(raw))) if kind == "TrainingJob" else whole(raw)
 

@@ -13,6 +13,7 @@
 - `trainers`: the pods to poll
 - `confirming`: reads before a write, because a cache may lag
 - `acting`, `reporting`, `writing`: every write to the cluster; none while another operator leads
+- `tidying`: the claims of jobs that are gone, if nothing was ever in them
 - `workers`: threads that take keys from the queue
 - `families`: every metric by name, as data; `metrics`, `waiting`: their values
 - `health`, `logs`, `options`, `run`: the process

@@ -22,7 +22,7 @@ from palaestra.cluster.resources import (
     SECRETS,
     TRAINING_JOBS,
 )
-from palaestra.decide import complete, resuming
+from palaestra.decide import complete, lacking_claims, resuming
 from palaestra.objects import Key
 from palaestra.observe import Objects, Observed, Polled, Raw, Source, SourceKind, observe, references, whole
 from palaestra.operator.admissions import Admissions
@@ -110,10 +110,12 @@ class Looking:
             denied=self._denials.known(key, uid),
             switchers=self._switchers.of(key, uid, job, jobs),
         )
-        observed, asked_s = self._asked(job, observe(job, objects))
+        found, lost_s = self._with_claims(job, observe(job, objects))
+        observed, asked_s = self._asked(job, found)
         met_s = RECHECK_S if strangers else None
         return Seen(
-            observed=observed, again_s=earliest(hindrances.again_s, admissions.again_s, asked_s, met_s)
+            observed=observed,
+            again_s=earliest(hindrances.again_s, admissions.again_s, asked_s, met_s, lost_s),
         )
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
@@ -154,6 +156,19 @@ class Looking:
             return seen
         verdicts = self._checking.verdicts(key, worlds)
         return replace(seen, observed=replace(seen.observed, verdicts=verdicts))
+
+    def _with_claims(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
+        """Return the observation with the claims of trained replicas that only the cluster has.
+
+        A claim that somebody restored may not have our labels.
+        """
+        lacking, namespace = lacking_claims(job, observed), job.metadata.namespace
+        claims = [Source(kind=SourceKind.CLAIM, name=name) for name in lacking]
+        found = {
+            (claim.kind.value, claim.name) for claim in claims if self._source(namespace, claim) is not None
+        }
+        present = observed.present | found
+        return replace(observed, present=present), RECHECK_S if lacking else None
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
         """Return the observation completed by requests, and the seconds until the next ones."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from palaestra.errors import PalaestraError
 from palaestra.plan import Allowed, Images
+from palaestra.plan.resources import NO_DEFAULTS, Defaults
 from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import MOST_PORT
 
@@ -29,6 +30,8 @@ class Options:
         node_selector: labels that the nodes of training pods must have.
         host_users: whether training pods have the users of their nodes; if not, each has a user namespace.
         allowed: what jobs may ask for beyond their own pods.
+        resources: of containers of jobs that mention none.
+        fixed_user: whether training pods name their user; if not, the cluster chooses one.
         kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
@@ -44,6 +47,8 @@ class Options:
     node_selector: Mapping[str, str] = field(default_factory=dict)
     host_users: bool = True
     allowed: Allowed = field(default_factory=Allowed)
+    resources: Defaults = NO_DEFAULTS
+    fixed_user: bool = True
     kubeconfig: str | None = None
     context: str | None = None
 

@@ -30,9 +30,11 @@ from palaestra.operator.poller import Poller
 from palaestra.operator.reporting import Reporting
 from palaestra.operator.schedule import Target
 from palaestra.operator.strangers import Strangers
+from palaestra.operator.tidying import Tidying
 from palaestra.operator.workers import Workers
 from palaestra.operator.writing import Writer
 from palaestra.plan import ClusterLayout
+from palaestra.plan.layout import USER
 
 log = structlog.get_logger(__name__)
 
@@ -73,6 +75,7 @@ class Operator:
             Reporting(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
             _layout(options),
         )
+        self._tidying = Tidying(api, self._caches, writer)
         self._workers = Workers(
             self._queue,
             self._reconcile,
@@ -125,7 +128,9 @@ class Operator:
 
     def _reconcile(self, key: Key) -> float | None:
         self._writer.begin()
-        return self._controller.reconcile(key)
+        again_s = self._controller.reconcile(key)
+        self._tidying.tidy(key)
+        return again_s
 
     def _leads(self) -> bool:
         return self._term() is not None
@@ -197,4 +202,6 @@ def _layout(options: Options) -> ClusterLayout:
         node_selector=options.node_selector,
         host_users=options.host_users,
         allowed=options.allowed,
+        resources=options.resources,
+        user=USER if options.fixed_user else None,
     )

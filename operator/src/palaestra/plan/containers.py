@@ -48,7 +48,7 @@ def ros_master(replica: Replica) -> Container:
             "timeoutSeconds": PERIOD_S,
             "failureThreshold": _tries(replica),
         },
-        **_common(replica, ROS_MASTER, planned.resources(Resources(), planned.ROS_MASTER), ()),
+        **_common(replica, ROS_MASTER, _of_ros_master(replica), ()),
     }
 
 
@@ -56,7 +56,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
     """Return the sidecar of one simulator, which starts it when the trainer asks."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
-    quantities = planned.resources(group.resources, _least(group.driver))
+    quantities = planned.resources(group.resources, _least(replica, group.driver))
     if group.standby:
         quantities = planned.for_two(quantities)
     common = _common(replica, simulator.container, quantities, group.env)
@@ -102,6 +102,7 @@ def trainer(replica: Replica) -> Container:
     """Return the trainer: the built-in loop, or the job's own program in its place."""
     spec, places = replica.job.spec.trainer, replica.places(TRAINER)
     port = replica.layout.ports.status
+    least = planned.by_default(replica.layout.resources.trainer, planned.TRAINER)
     container = {
         "name": TRAINER,
         "image": _trainer_image(replica),
@@ -110,7 +111,7 @@ def trainer(replica: Replica) -> Container:
         "ports": [_port("metrics", port)],
         "terminationMessagePath": places.termination,
         "terminationMessagePolicy": "FallbackToLogsOnError",
-        **_common(replica, TRAINER, planned.resources(spec.resources, planned.TRAINER), spec.env),
+        **_common(replica, TRAINER, planned.resources(spec.resources, least), spec.env),
     }
     if not spec.command:  # a program of the job's own need not serve anything
         # Importing PyTorch takes a busy node minutes, before anything can answer.
@@ -133,7 +134,7 @@ def install_sidecar(replica: Replica) -> Container | None:
         "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
         "terminationMessagePolicy": "FallbackToLogsOnError",
         "securityContext": SECURITY,
-        "resources": planned.resources(Resources(), planned.ROS_MASTER),
+        "resources": _of_ros_master(replica),
         "volumeMounts": [{"name": "sidecar", "mountPath": target}],
     }
 
@@ -223,9 +224,17 @@ def _simulator_image(replica: Replica, simulator: PlannedSimulator) -> str:
     return simulator.group.image or release
 
 
-def _least(driver: Driver) -> Resources:
+def _least(replica: Replica, driver: Driver) -> Resources:
     """Return the resources of a simulator whose job asks for none."""
-    return planned.MUJOCO if driver is Driver.MUJOCO else planned.SIMULATOR
+    release = planned.MUJOCO if driver is Driver.MUJOCO else planned.SIMULATOR
+    return planned.by_default(replica.layout.resources.simulator, release)
+
+
+def _of_ros_master(replica: Replica) -> planned.Planned:
+    """Return the resources of the ROS master, and of the container that copies the sidecar."""
+    own = replica.job.spec.ros_master
+    least = planned.by_default(replica.layout.resources.ros_master, planned.ROS_MASTER)
+    return planned.resources(own.resources if own is not None else Resources(), least)
 
 
 def _trainer_image(replica: Replica) -> str:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from palaestra.errors import PlanError
+from palaestra.plan.resources import NO_DEFAULTS, Defaults
 
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
 CONTROL_PORTS = range(7100, 7200)  # of the k-th simulator of a pod; a pod has 32 at most
 HEALTH_PORTS = range(7200, 7300)
+USER = 65532  # uid, gid and fsGroup of everything in a pod, as in the images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +135,16 @@ class Layout(Protocol):
         """Whether the users in a pod are those of its node; False: each pod has a user namespace."""
         ...
 
+    @property
+    def resources(self) -> Defaults:
+        """Requests and limits of containers of jobs that mention none."""
+        ...
+
+    @property
+    def user(self) -> int | None:
+        """The user and group of a pod; None: the cluster chooses them, as OpenShift does."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -159,6 +171,8 @@ class ClusterLayout:
     node_selector: Mapping[str, str] = field(default_factory=dict)
     host_users: bool = True
     allowed: Allowed = Allowed()
+    resources: Defaults = NO_DEFAULTS
+    user: int | None = USER
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the same places for every container; runs are kept apart by the job's uid."""
@@ -195,6 +209,8 @@ class LocalLayout:
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
     host_users: bool = True
+    resources: Defaults = NO_DEFAULTS
+    user: int = USER
 
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the places of one container, all below `<job_directory>/<replica>`."""

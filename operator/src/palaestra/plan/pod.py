@@ -9,13 +9,7 @@ from palaestra.plan.containers import install_sidecar, ros_master, shared_memory
 from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
-USER = 65532  # uid, gid and fsGroup of everything in the pod
-UNPRIVILEGED: Mapping[str, Any] = {
-    "runAsNonRoot": True,
-    "runAsUser": USER,
-    "runAsGroup": USER,
-    "seccompProfile": {"type": "RuntimeDefault"},
-}
+UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
 GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot notice
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"
@@ -41,7 +35,7 @@ def pod_template(
             "enableServiceLinks": False,
             **({} if replica.layout.host_users else {"hostUsers": False}),
             "terminationGracePeriodSeconds": GRACE_S,
-            "securityContext": {**UNPRIVILEGED, "fsGroup": USER, "fsGroupChangePolicy": "OnRootMismatch"},
+            "securityContext": _security(replica.layout.user),
             **_scheduling(replica),
             "initContainers": init,
             "containers": [main],
@@ -52,6 +46,19 @@ def pod_template(
                 *_empty_volumes([*init, main], _sizes(replica, main)),
             ],
         },
+    }
+
+
+def _security(user: int | None) -> dict[str, Any]:
+    """Return the security settings of a pod; without a user, the cluster chooses user and groups."""
+    fixed = {} if user is None else {"runAsUser": user, "runAsGroup": user}
+    group = {} if user is None else {"fsGroup": user}
+    return {
+        "runAsNonRoot": True,
+        **fixed,
+        "seccompProfile": UNPRIVILEGED["seccompProfile"],
+        **group,
+        "fsGroupChangePolicy": "OnRootMismatch",
     }
 
 

@@ -14,6 +14,7 @@ from palaestra_sim.world import RunIdentity
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
 UID_LABEL = "palaestra.dev/job-uid"  # a job that is made again has the name of the one before
+RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"  # annotation of a TrainingJob: any new value
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"
 

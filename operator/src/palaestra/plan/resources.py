@@ -5,6 +5,7 @@ asks for 425m. Small networks learn no faster with a second thread, so the train
 """
 
 import math
+from dataclasses import dataclass
 from decimal import Decimal
 
 from palaestra.api.container import Resources
@@ -16,6 +17,20 @@ UNITS: dict[str, Decimal | int] = {
 }  # fmt: skip
 
 Planned = dict[str, dict[str, str]]
+
+NONE = Resources()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Defaults:
+    """An installation's resources for containers of jobs that mention none; Palaestra's own fill the rest."""
+
+    ros_master: Resources = NONE
+    simulator: Resources = NONE
+    trainer: Resources = NONE
+
+
+NO_DEFAULTS = Defaults()
 
 ROS_MASTER = Resources(requests={"cpu": "25m", "memory": "64Mi"}, limits={"memory": "256Mi"})
 SIMULATOR = Resources(requests={"cpu": "75m", "memory": "160Mi"}, limits={"memory": "2Gi"})
@@ -38,6 +53,11 @@ def resources(wanted: Resources, default: Resources) -> Planned:
     }
     planned = {"requests": {**requests, **wanted.requests}, "limits": {**limits, **wanted.limits}}
     return {field: value for field, value in planned.items() if value}
+
+
+def by_default(installation: Resources, release: Resources) -> Resources:
+    """Return the default of a container: the installation's, and the release's where that mentions none."""
+    return Resources.model_validate(resources(installation, release))
 
 
 def for_two(planned: Planned) -> Planned:

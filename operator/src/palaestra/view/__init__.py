@@ -9,7 +9,7 @@ from palaestra.view.durations import short
 from palaestra.view.history import History
 from palaestra.view.live import live
 from palaestra.view.sparkline import sparkline
-from palaestra.view.tables import lines_of, server_table
+from palaestra.view.tables import lines_of, server_table, without_status
 
 __all__ = [
     "History",
@@ -21,4 +21,5 @@ __all__ = [
     "server_table",
     "short",
     "sparkline",
+    "without_status",
 ]

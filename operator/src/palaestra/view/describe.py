@@ -5,7 +5,7 @@ from datetime import datetime
 
 from palaestra.api import Role, TrainingJob
 from palaestra.api.history import Goodput, LastAttempt
-from palaestra.api.status import Condition, ReplicaStatus, SuccessInterval
+from palaestra.api.status import Condition, LostPart, LostRun, ReplicaStatus, SuccessInterval
 from palaestra.client import Happening
 from palaestra.view.durations import ago, short
 from palaestra.view.tables import NOTHING, lines_of
@@ -113,6 +113,8 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
         yield "Slow steps", f"{slow:,} (not faults)" if slow else ""
     yield "Memory kills", ", ".join(f"{kill.container} {kill.times}" for kill in replica.memory_kills)
     yield "Steps lost", f"{replica.steps_lost:,}" if replica.steps_lost else ""
+    if replica.lost is not None:
+        yield "Lost run", _lost(replica.lost, now)
     yield "Time spent", _shares(replica.goodput) if replica.goodput else ""
 
 
@@ -136,6 +138,12 @@ def _success(rate: float, interval: SuccessInterval | None) -> str:
     return (
         f"{rate:.0%} (95% interval {interval.low:.0%} to {interval.high:.0%}, {interval.episodes} episodes)"
     )
+
+
+def _lost(lost: LostRun, now: datetime) -> str:
+    what = "claim" if lost.what is LostPart.CLAIM else "run directory"
+    then = "" if lost.restarted is None else f", given up {ago(lost.restarted, now)}"
+    return f"{what} at step {lost.step:,}{then}"
 
 
 def _counts(counts: dict[str, int]) -> str:

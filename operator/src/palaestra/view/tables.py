@@ -36,5 +36,15 @@ def server_table(table: Mapping[str, Any], *, wide: bool = False, namespaces: bo
     return lines_of(rows)
 
 
+def without_status(table: Mapping[str, Any]) -> list[str]:
+    """Return the names of the objects in an API server's `Table` whose column Status is empty."""
+    places = [place for place, column in enumerate(table["columnDefinitions"]) if column["name"] == "Status"]
+    return [
+        row["object"]["metadata"]["name"]
+        for row in table.get("rows") or ()
+        if any(not row["cells"][place] for place in places)
+    ]
+
+
 def _cell(value: object) -> str:
     return NOTHING if value is None or value == "" else str(value)

@@ -40,7 +40,7 @@ def status_server(
     }
     host, _, port = address.rpartition(":")
     try:
-        return Server(Address(host, int(port)), routes, name="palaestra-trainer")
+        return Server(Address(host.strip("[]"), int(port)), routes, name="palaestra-trainer")
     except (OSError, OverflowError) as error:
         taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
         fact = "is in use" if taken else f"cannot be listened on ({error})"

@@ -1,0 +1,18 @@
+"""Claims that were never bound to a volume, so that nothing is lost with them."""
+
+from palaestra.observe.reading import part, text
+from palaestra.observe.views import Raw
+
+MANAGED = "app.kubernetes.io/managed-by"
+FIELDS = ("volumeName", "dataSource", "dataSourceRef")  # of a claim's spec, which are read here
+
+
+def is_unused(raw: Raw) -> bool:
+    """Return whether a claim that the operator created was never bound, and is not being deleted.
+
+    A claim with a data source is a restored one, whose volume may still be on its way.
+    """
+    metadata = part(raw, "metadata")
+    ours = part(metadata, "labels").get(MANAGED) == "palaestra" and "deletionTimestamp" not in metadata
+    pending = text(part(raw, "status"), "phase") == "Pending"
+    return ours and pending and not any(part(raw, "spec").get(field) for field in FIELDS)
