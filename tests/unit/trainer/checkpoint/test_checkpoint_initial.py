@@ -181,3 +181,51 @@ def test_a_file_that_is_no_model_is_refused(tmp_path, content):
         ConfigurationError, match=r"cannot be read as a model of Stable-Baselines3 .*; name a"
     ):
         begin_from(path, model_of())
+
+
+def changed(model, path, change):
+    """Return the path of a zip of the model whose first weight is changed."""
+    saved(model, path)
+    state = model.policy.state_dict()
+    name = next(name for name in state if name.endswith("weight"))
+    content = io.BytesIO()
+    torch.save(state | {name: change(state[name])}, content)
+    with zipfile.ZipFile(path) as archive:
+        others = {each: archive.read(each) for each in archive.namelist() if each != "policy.pth"}
+    with zipfile.ZipFile(path, "w") as archive:
+        for member, data in (others | {"policy.pth": content.getvalue()}).items():
+            archive.writestr(member, data)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    [
+        (lambda weight: torch.full_like(weight, torch.nan), "has numbers that are not finite"),
+        (lambda weight: weight / 0, "has numbers that are not finite"),
+        (lambda weight: weight.to(torch.complex64), "is strided of complex64, and strided of float32"),
+        (lambda weight: weight.to_sparse(), "is sparse_coo of float32, and strided of float32"),
+    ],
+    ids=["nan", "infinite", "complex", "sparse"],
+)
+def test_weights_that_are_no_plain_numbers_are_refused(tmp_path, change, fact):
+    """NaN trained on as NaN, the imaginary part was dropped, and a sparse tensor raised."""
+    path = changed(model_of(seed=1), tmp_path / "model.zip", change)
+
+    with pytest.raises(ConfigurationError, match=fact):
+        begin_from(path, model_of(seed=2))
+
+
+@pytest.mark.parametrize("inner", [False, True], ids=["in the zip", "in PyTorch's own zip"])
+def test_a_file_that_unpacks_to_gigabytes_is_refused_before_it_does(tmp_path, inner):
+    """Two megabytes became four gigabytes of memory."""
+    bomb = io.BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("archive/data/0", bytes(64 << 20))
+    with zipfile.ZipFile(tmp_path / "model.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("policy.pth", bomb.getvalue() if inner else bytes(64 << 20))
+
+    with pytest.raises(
+        ConfigurationError, match=r"unpacks to 67108864 bytes, and the policy of this run needs"
+    ):
+        begin_from(tmp_path / "model.zip", model_of())

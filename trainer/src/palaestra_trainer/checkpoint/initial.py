@@ -10,7 +10,7 @@ import io
 import json
 import pickle
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ log = structlog.get_logger(__name__)
 
 POLICY = "policy.pth"
 _SHOWN = 3  # mismatches in a message
+_OVERHEAD_BYTES = 1 << 20  # names, statistics, and what the format of PyTorch adds
 
 
 def begin_from(path: Path, model: BaseAlgorithm) -> None:
@@ -34,8 +35,8 @@ def begin_from(path: Path, model: BaseAlgorithm) -> None:
     Raises:
         ConfigurationError: the file cannot be read, or a tensor or statistic does not fit this model.
     """
-    tensors, known = _read(path, model.device)
     own = model.policy.state_dict()
+    tensors, known = _read(path, model.device, _most_bytes(own))
     if mistakes := list(_mistakes(tensors, own)):
         more = f", and {len(mistakes) - _SHOWN} more" if len(mistakes) > _SHOWN else ""
         facts = "; ".join(mistakes[:_SHOWN]) + more
@@ -45,13 +46,26 @@ def begin_from(path: Path, model: BaseAlgorithm) -> None:
     log.info("begins from a policy", file=str(path), tensors=len(own), statistics=taken)
 
 
-def _read(path: Path, device: torch.device) -> tuple[Any, dict[str, Any]]:
-    """Return the tensors and the statistics in a zip."""
+def _most_bytes(own: Mapping[str, torch.Tensor]) -> int:
+    """Return how many bytes a policy of these tensors can need in a file, at twice their precision."""
+    return 2 * sum(tensor.nbytes for tensor in own.values()) + _OVERHEAD_BYTES
+
+
+def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, Any]]:
+    """Return the tensors and the statistics in a zip whose members have at most so many bytes."""
     try:
         with zipfile.ZipFile(path) as archive:
+            statistics = [NORMALIZE] if NORMALIZE in archive.namelist() else []
+            _refuse_larger(path, map(archive.getinfo, [POLICY, *statistics]), most)
             content = io.BytesIO(archive.read(POLICY))
-            known = json.loads(archive.read(NORMALIZE)) if NORMALIZE in archive.namelist() else {}
+            known = json.loads(archive.read(NORMALIZE)) if statistics else {}
+        if zipfile.is_zipfile(content):  # the format of PyTorch is a zip too, whose members may be compressed
+            with zipfile.ZipFile(content) as inner:
+                _refuse_larger(path, inner.infolist(), most)
+        content.seek(0)
         return torch.load(content, map_location=device, weights_only=True), known
+    except ConfigurationError:
+        raise
     except pickle.UnpicklingError as error:  # its text recommends to unpickle
         raise _refused(
             path, f"{POLICY} holds more than tensors, which is never unpickled; name a model.zip"
@@ -59,6 +73,17 @@ def _read(path: Path, device: torch.device) -> tuple[Any, dict[str, Any]]:
     except (OSError, KeyError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
         fact = f"cannot be read as a model of Stable-Baselines3 ({error}); name a model.zip"
         raise _refused(path, fact) from error
+
+
+def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) -> None:
+    """Refuse members of a zip that unpack to more than the policy of this run can need, before they do."""
+    unpacked = sum(each.file_size for each in members)
+    if unpacked > most:
+        raise _refused(
+            path,
+            f"unpacks to {unpacked} bytes, and the policy of this run needs {most} at most; use the "
+            "algorithm, policy and spaces that it was trained with",
+        )
 
 
 def _mistakes(tensors: Any, own: Mapping[str, torch.Tensor]) -> Iterator[str]:
@@ -71,6 +96,10 @@ def _mistakes(tensors: Any, own: Mapping[str, torch.Tensor]) -> Iterator[str]:
             yield f"the tensor {name}, {_shape(tensor)} in this run, is missing"
         elif there.shape != tensor.shape:
             yield f"the tensor {name} is {_shape(there)}, and {_shape(tensor)} in this run"
+        elif there.layout != tensor.layout or there.is_complex() != tensor.is_complex():
+            yield f"the tensor {name} is {_kind(there)}, and {_kind(tensor)} in this run"
+        elif not bool(torch.isfinite(there).all()):
+            yield f"the tensor {name} has numbers that are not finite"
     for name in tensors.keys() - own.keys():
         yield f"the tensor {name} is unknown in this run"
 
@@ -98,6 +127,10 @@ def _take_statistics(path: Path, model: BaseAlgorithm, known: Mapping[str, Any])
 
 def _shape(tensor: torch.Tensor) -> str:
     return str(tuple(tensor.shape))
+
+
+def _kind(tensor: torch.Tensor) -> str:
+    return f"{tensor.layout} of {tensor.dtype}".replace("torch.", "")
 
 
 def _refused(path: Path, fact: str) -> ConfigurationError:
