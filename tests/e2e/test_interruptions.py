@@ -80,3 +80,25 @@ def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
     assert namespace.replica("longer")["step"] == 500
     (pod,) = namespace.pods("longer", live=False)
     assert "resumed at step 300" in namespace.cluster.kubectl("logs", "-n", namespace.name, named(pod))
+
+
+def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
+    """It trained from step 0 again, and nothing said so; a new value of the annotation gives the run up."""
+    namespace.apply(make_slow_job("amid", steps=300, every_steps=EVERY_STEPS))
+    namespace.wait_for_step("amid", AMID)
+    namespace.patch("amid", suspend=True)
+    namespace.wait(lambda: namespace.holds("amid", "Suspended") and not namespace.pods("amid"), LONG_S)
+    [claim] = map(named, namespace.select("persistentvolumeclaims", "amid"))
+
+    namespace.cluster.delete("persistentvolumeclaims", namespace.name, claim)
+    namespace.wait(lambda: namespace.get("persistentvolumeclaims", claim) is None)
+    namespace.patch("amid", suspend=False)
+
+    namespace.wait(lambda: namespace.events("amid", "RunLost"))
+    assert namespace.replica("amid")["lost"]["what"] == "Claim"
+    assert namespace.get("persistentvolumeclaims", claim) is None
+    word = {"metadata": {"annotations": {"palaestra.dev/restart-lost-runs": "now"}}}
+    namespace.cluster.patch("trainingjobs", namespace.name, "amid", word)
+    assert namespace.wait_for_end("amid", LONG_S) == "Succeeded"
+    assert namespace.replica("amid")["lost"]["step"] >= EVERY_STEPS
+    assert namespace.events("amid", "RunRestarted")
