@@ -71,6 +71,25 @@ def test_the_answer_header_tells_the_type(peer, dial):
     assert header["callerid"] == f"/{peer.name}"
 
 
+# Of `uint64 node; string fieldName; bool queryBaseNode --- uint64 field`, the type in Webots R2025a.
+GET_FIELD_2025A = "88d5309880e1463a89aff87d30e09f1c"
+
+
+def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
+    """It renamed a field of three requests, so their sums differ, and their bytes do not."""
+    peer.do(
+        lambda: peer.node.serve(
+            "field", "webots_ros/node_get_field", lambda it: {"field": it.node + it.proto}
+        )
+    )
+
+    connection, header = dial(service=f"/{peer.name}/field", md5sum=GET_FIELD_2025A)
+    connection.sendall(frame(struct.pack("<QI5sB", 6, 5, b"title", True)))
+
+    assert header["md5sum"] == GET_FIELD_2025A
+    assert (read_exactly(connection, 1), read_frame(connection)) == (b"\x01", struct.pack("<Q", 7))
+
+
 def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
     """Without `persistent` a connection serves one call."""
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from palaestra_protocol.ros import definitions, digests
 from palaestra_protocol.ros.codec import Codec, codec_of
@@ -31,12 +32,26 @@ class MessageType(NamedTuple):
 
 
 class ServiceType(NamedTuple):
-    """One service type: its name, the md5 that peers compare, and the two codecs."""
+    """One service type: its name, the md5 that peers compare, and the two codecs.
+
+    Attributes:
+        name: `package/name`.
+        md5: that of Webots R2023b.
+        request: of a call.
+        response: of an answer.
+        later_md5: that of Webots R2025a, whose clients send the same bytes; equal if it renamed nothing.
+    """
 
     name: str
     md5: str
     request: Codec
     response: Codec
+    later_md5: str
+
+
+# A field of requests that Webots R2025a renamed. Source: its change log, ROS 1 API.
+_FORMER: Final = ("bool", "proto")
+_LATER: Final = "queryBaseNode"
 
 
 @cache
@@ -61,8 +76,15 @@ def service_type(name: str) -> ServiceType:
     """
     find = definitions.message
     request, response = definitions.service(name)
+    fields = tuple(
+        replace(each, name=_LATER) if (each.type, each.name) == _FORMER else each for each in request.fields
+    )
     return ServiceType(
-        name, digests.md5(find, request, response), codec_of(request, find), codec_of(response, find)
+        name,
+        digests.md5(find, request, response),
+        codec_of(request, find),
+        codec_of(response, find),
+        digests.md5(find, replace(request, fields=fields), response),
     )
 
 

@@ -207,12 +207,12 @@ class RosNode:
         if known is None:
             raise Refused(f"no such service {header['service']}")
         service, handler = known
-        _check_md5(header, service.name, service.md5)
+        md5 = _agreed_md5(header, service.name, service.md5, service.later_md5)
         link.send(
             encode_header(
                 {
                     "callerid": f"/{self.name}",
-                    "md5sum": service.md5,
+                    "md5sum": md5,
                     "request_type": f"{service.name}Request",
                     "response_type": f"{service.name}Response",
                     "type": service.name,
@@ -225,7 +225,7 @@ class RosNode:
         topic = self._topics.get(header.get("topic", ""))
         if topic is None:
             raise Refused(f"no such topic {header.get('topic')}")
-        _check_md5(header, topic.type.name, topic.type.md5)
+        _agreed_md5(header, topic.type.name, topic.type.md5)
         link.send(
             encode_header(
                 {
@@ -244,10 +244,12 @@ class RosNode:
         return topic.connect(link, self._subscribers.pop)
 
 
-def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:
+def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
+    """Return the md5 of a type that both ends know."""
     theirs = header.get("md5sum", "*")
-    if theirs not in {"*", md5}:
-        raise Refused(f"client wants md5sum {theirs}, but {type_name} has {md5}")
+    if theirs not in {"*", *known}:
+        raise Refused(f"client wants md5sum {theirs}, but {type_name} has {known[0]}")
+    return known[0] if theirs == "*" else theirs
 
 
 class ServiceEnd:
