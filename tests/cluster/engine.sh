@@ -29,12 +29,21 @@ engine_up() {
   mkfifo "$STATE/owner"
   exec 8<>"$STATE/owner" # closed when this script ends, in any way
   ip route replace "${FENCE[@]}"
+  give_weight
   become_engine &
   disown
   wait_until 10 engine_is_fenced || die "the engine's network namespace could not be fenced: see $STATE/engine.log"
   link_to_engine
   wait_until 30 docker version >/dev/null 2>&1 || die "Docker Engine did not start: $(tail -3 "$STATE/engine.log")"
   docker network create kind --subnet "$NODE_SUBNET" >/dev/null
+}
+
+# On cgroup v1, a group below the root weighs as one process of this machine: beside others, all pods would share that.
+give_weight() {
+  local shares=/sys/fs/cgroup/cpu/$CONTROL_GROUP/cpu.shares
+  [[ -w /sys/fs/cgroup/cpu/cpu.shares ]] || return 0
+  mkdir -p "${shares%/*}"
+  echo "$CPU_SHARES" >"$shares"
 }
 
 engine_keep() { echo stay >&8; }

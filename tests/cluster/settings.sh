@@ -34,6 +34,7 @@ isolated() { unshare --mount --pid --fork --kill-child --mount-proc -- "$@"; }
 CLUSTER=palaestra
 STATE=$CACHE/kind # all that a running cluster has on disk; gone when it is
 CONTROL_GROUP=palaestra-$(sha256sum <<<"$STATE" | cut -c1-8)
+CPU_SHARES=8192 # of the group; a process has 1024
 KUBECONFIG_FILE=$STATE/kubeconfig
 
 # The stock way: kind's own node image, for kind of programs/kind. PALAESTRA_NODE_IMAGE chooses another Kubernetes.
