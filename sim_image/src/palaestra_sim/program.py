@@ -30,6 +30,7 @@ from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.summary import differences, lacks, silent_devices, summary
+from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.mjcf import is_mjcf
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
@@ -81,6 +82,9 @@ class Program:
             sys.stderr.write(f"{error}\n{self.name}: {error.summary}\n")
         except SimError as error:
             sys.stderr.write(f"{self.name}: {error}\n")
+        except RecursionError:
+            fact = "nodes are nested too deep, or one uses itself; use fewer levels"
+            sys.stderr.write(f"{self.name}: {options.world}: {fact}\n")
         except MasterUnreachable as error:
             sys.stderr.write(f"{self.name}: {error}\n")
             return _NO_MASTER
@@ -108,7 +112,7 @@ class Program:
         wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
 
         def load(world_path: Path, mode: Mode) -> Backend:
-            if not is_mjcf(world_path.read_bytes()):
+            if not is_mjcf(read_bounded(world_path)):
                 return wbt(world_path, mode)
             if self.mjcf is None:
                 raise WorldError(world_path.name, 1, 1, f"{self.name} simulates no MJCF", "use driver mujoco")

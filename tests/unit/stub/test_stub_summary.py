@@ -71,6 +71,35 @@ def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
     assert check('Robot { controller "ros" }')[0] == 0
 
 
+def test_a_node_that_uses_itself_ends_in_one_sentence(check):
+    """It was a RecursionError."""
+    code, lines = check("DEF A Group { children [ USE A ] }")
+
+    assert (code, len(lines)) == (2, 1)
+    assert "nested too deep, or one uses itself" in lines[0]
+
+
+def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
+    """Sixty lines would be 2 to the 60th nodes."""
+    monkeypatch.setattr("palaestra_sim.scene.nodes.growing.MAX_NODES", 500)
+    lines = [
+        f"DEF A{level} Group {{ children [ USE A{level - 1} USE A{level - 1} ] }}" for level in range(1, 60)
+    ]
+
+    code, said = check("\n".join(["DEF A0 Solid { }", *lines]))
+
+    assert (code, len(said)) == (2, 1)
+    assert "the world has more than 500 nodes; break a circle of PROTOs or of USE" in said[0]
+
+
+def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
+    """/dev/zero has no end."""
+    (tmp_path / "my.wbt").symlink_to("/dev/zero")
+
+    assert main([str(tmp_path / "my.wbt"), "--check"]) == 2
+    assert capsys.readouterr().err.endswith("my.wbt: is no regular file\n")
+
+
 def test_what_is_left_out_by_choice_is_no_obstacle(check):
     """The check named --leave-out as the remedy, and with it printed the same."""
     world = "Colosseum { } Solid { boundingObject Cone { } }"

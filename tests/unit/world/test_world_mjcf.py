@@ -4,6 +4,7 @@ import pytest
 
 from palaestra_sim.world import RunIdentity, WorldError, check, generate, rename, robots, suffix
 from palaestra_sim.world.mjcf import describe, whole_step_ms
+from tests.tables import for_each
 
 IDENTITY = RunIdentity(job="balance", replica=0, group="collect", index=1)
 NAMED = b"""<?xml version="1.0"?>
@@ -131,7 +132,10 @@ def test_a_folder_of_meshes_beside_that_of_the_world_is_the_usual_layout():
         check(with_custom(b"", both), relative_addresses=True)
 
 
-@pytest.mark.parametrize(("timestep", "near"), [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013")])
+@pytest.mark.parametrize(
+    ("timestep", "near"),
+    [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013"), ("1e-09", "1e-05 or 1.0101e-05")],
+)
 def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
     """A basic step of two seconds was taken, at which no robot could be driven."""
     with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
@@ -153,6 +157,31 @@ def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(times
 def test_a_rounded_timestep_makes_the_step_that_is_meant(timestep, step_ms):
     """1/240, 1/60, 1/120 and 1/300 of a second have no end in decimals."""
     assert whole_step_ms(float(timestep)) == step_ms
+
+
+GROWING = [
+    ('<replicate count="1000000000"><geom size="1"/></replicate>', "<replicate> makes 1e+09"),
+    ('<replicate count="1000"><replicate count="1000"/></replicate>', "<replicate> makes 1e+06"),
+    ('<flexcomp type="grid" count="3000 3000 3000"/>', "<flexcomp> makes 2.7e+10"),
+    ('<composite count="3000 3000 1"/>', "<composite> makes 9e+06"),
+    ('<hfield nrow="100000" ncol="100000"/>', "<hfield> makes 1e+10"),
+    ('<texture builtin="flat" width="100000" height="100000"/>', "<texture> makes 1e+10"),
+    ('<camera resolution="100000 100000"/>', "<camera> makes 1e+10"),
+]
+
+
+@for_each("element, fact", GROWING)
+def test_a_line_that_would_take_all_memory_is_refused(element, fact):
+    """MuJoCo allocates what it asks for: minutes, or gigabytes."""
+    with pytest.raises(WorldError) as refused:
+        check(with_custom(b"", element.encode()))
+
+    assert fact in str(refused.value)
+
+
+def test_large_models_are_no_attack():
+    """A height field of a few kilometers, and a rope of a thousand parts."""
+    check(with_custom(b"", b'<asset><hfield nrow="2000" ncol="2000"/></asset><replicate count="1000"/>'))
 
 
 def test_files_beside_the_world_need_a_world_with_a_file():

@@ -12,6 +12,7 @@ from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.world import builtin_protos, local_protos, parse
+from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.stand_ins import StandIn, shipped
 
 
@@ -38,7 +39,7 @@ class Loader:
             WorldError: the file is wrong, or holds something that cannot be simulated.
             OSError: it cannot be read.
         """
-        world = parse(world_path.read_bytes(), world_path.name)
+        world = parse(read_bounded(world_path), world_path.name)
         found = local_protos(world_path, world, name=world_path.name, without=self.stand_ins)
         # A PROTO of the project is what its author means; a stand-in of the user's comes before it.
         solids = {name: entry for name, entry in shipped().items() if name not in found.local}

@@ -14,6 +14,7 @@ from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import SidecarError, WorldError
 from palaestra_sim.sidecar import project
 from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots, suffix
+from palaestra_sim.world.bounded import read_bounded
 
 SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
 _PROJECT = "project"
@@ -33,7 +34,7 @@ def read(world: Path) -> bytes:
         SidecarError: the file does not exist, or may not be read.
     """
     try:
-        return world.read_bytes()
+        return read_bounded(world)
     except OSError as error:
         raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt or .xml file") from error
 

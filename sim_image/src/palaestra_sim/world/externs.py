@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.proto import Proto, parse_proto
 from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token, unquoted
@@ -68,7 +69,7 @@ def local_protos(
     *,
     name: str = "world",
     without: Container[str] = (),
-    read: Read = Path.read_bytes,
+    read: Read = read_bounded,
     files_below: List = _protos_below,
 ) -> Protos:
     """Return the PROTOs that `world` and its local PROTO files name.

@@ -24,6 +24,7 @@ from palaestra_sim.scene.reading import LeaveOut, Reading
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.world import mjcf
+from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.mjcf import Description
 from palaestra_sim.world.mjcf.elements import Element
 from palaestra_sim.world.source import Source
@@ -39,7 +40,7 @@ def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> Mjc
         WorldError: the file is wrong, or has something that no client could use.
         OSError: it cannot be read.
     """
-    source = world_path.read_bytes()
+    source = read_bounded(world_path)
     leave_out = leave_out or LeaveOut()
     mjcf.check(source, world_path.name, relative_addresses=True)
     description = mjcf.describe(source, world_path.name)
@@ -126,10 +127,11 @@ class _Parts:
                     )
                 elif (file := self._folder / found) not in seen:
                     seen.add(file)
-                    inner = Source(data=file.read_bytes(), name=part)
+                    inner = Source(data=read_bounded(file), name=part)
                     elements = mjcf.read(inner)
                     self.roots.append(elements)
                     yield from mjcf.strays(inner, elements, self._named, includes=False)
+                    yield from mjcf.growing(inner, elements)
                     waiting.append((posixpath.dirname(found), inner, elements))
 
     def beside_the_root(self) -> Iterator[WorldError]:

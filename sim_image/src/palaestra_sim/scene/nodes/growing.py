@@ -75,6 +75,9 @@ class Grower:
         return [node for node in grown if node is not None]
 
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
+        if len(self.nodes) > MAX_NODES:  # the first such place ends the reading: there may be 2 to the 60th
+            fact = f"the world has more than {MAX_NODES} nodes"
+            raise scope.error(written, fact, "break a circle of PROTOs or of USE, or use fewer")
         try:
             source = scope.resolve(written)
         except WorldError as error:
@@ -117,10 +120,6 @@ class Grower:
         if scope.depth >= MAX_DEPTH:
             fact = f"PROTOs are nested more than {MAX_DEPTH} deep"
             self.refused.append(scope.error(source, fact, "break the circle"))
-            return None
-        if len(self.nodes) > MAX_NODES:
-            fact = f"the world has more than {MAX_NODES} nodes"
-            self.refused.append(scope.error(source, fact, "break a circle of PROTOs, or use fewer"))
             return None
         unknown = [name for name in source.fields if name not in proto.fields and " " not in name]
         for name in unknown:

@@ -5,6 +5,7 @@ Pure text, as all of `world`: MuJoCo itself is not needed to check or to name su
 - `elements`: the elements of an XML file with their places
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
+- `growing`: elements that would take all memory
 - `checks`: the mistakes that make a world unusable
 - `naming`: the world of one simulator
 """
@@ -22,6 +23,7 @@ from palaestra_sim.world.mjcf.description import (
 )
 from palaestra_sim.world.mjcf.elements import read
 from palaestra_sim.world.mjcf.files import in_project, named_files, named_folders, parts, strays
+from palaestra_sim.world.mjcf.growing import growing
 from palaestra_sim.world.mjcf.naming import generate, rename, robots
 
 __all__ = [
@@ -32,6 +34,7 @@ __all__ = [
     "fits",
     "fitting_timesteps_s",
     "generate",
+    "growing",
     "in_project",
     "is_mjcf",
     "named_files",

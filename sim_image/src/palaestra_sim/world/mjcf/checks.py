@@ -23,6 +23,7 @@ from palaestra_sim.world.mjcf.description import (
     whole_step_ms,
 )
 from palaestra_sim.world.mjcf.files import in_project, named_files, parts, strays
+from palaestra_sim.world.mjcf.growing import growing
 
 _ROS_REMAPPING: Final = re.compile(r"__\w+:=")
 
@@ -99,6 +100,11 @@ def unknown_devices(found: Description) -> Iterator[WorldError]:
             )
 
 
+def too_large(found: Description) -> Iterator[WorldError]:
+    """An element would grow to more than memory holds when MuJoCo reads it."""
+    yield from growing(found.source, found.root)
+
+
 def files_elsewhere(found: Description) -> Iterator[WorldError]:
     """A name of a file leads out of the project of the world."""
     yield from strays(found.source, found.root)
@@ -119,6 +125,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     renamed_behind_its_name,
     unfit_step,
     unknown_devices,
+    too_large,
     files_elsewhere,
 )
 """The checks for every MJCF world."""

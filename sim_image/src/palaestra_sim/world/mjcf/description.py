@@ -32,6 +32,8 @@ LEFT_OUT: Final = "-"  # the name of a device that the robot shall not have
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
 _LONGEST_MS: Final = 100  # of a basic step that no world asks for; robots move a few times as often
+_MOST_STEPS: Final = 10_000  # of MuJoCo in a basic step: more take seconds each
+_SHORTEST_PART: Final = 99  # of a millisecond: what a message recommends as a timestep
 _NEAR: Final = 1e-4  # relative: 0.0041666 s is 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
@@ -136,7 +138,7 @@ def fits(step_ms: float, timestep_s: float) -> bool:
     if not step_ms >= 1.0 or step_ms != int(step_ms):
         return False
     steps = step_ms / (timestep_s * 1000.0)
-    return round(steps) >= 1 and abs(steps - round(steps)) < _NEAR * steps
+    return 1 <= round(steps) <= _MOST_STEPS and abs(steps - round(steps)) < _NEAR * steps
 
 
 def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
@@ -144,7 +146,7 @@ def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
     ms = timestep_s * 1000.0
     if ms >= 1.0:
         return int(ms) / 1000.0, (int(ms) + 1) / 1000.0
-    steps = int(1.0 / ms)
+    steps = min(int(1.0 / ms), _SHORTEST_PART)
     return 0.001 / (steps + 1), 0.001 / steps
 
 

@@ -1,0 +1,27 @@
+"""The bytes of a file of a world, if they are few enough to be one.
+
+A link may lead to a device that has no end, such as /dev/zero.
+"""
+
+import errno
+import stat
+from pathlib import Path
+from typing import Final
+
+MOST_BYTES: Final = 64 << 20
+"""Bytes of one file; the largest worlds of public projects have a tenth of it."""
+
+
+def read_bounded(path: Path) -> bytes:
+    """Return the bytes of a file.
+
+    Raises:
+        OSError: it cannot be read, is no regular file, or is too large.
+    """
+    with path.open("rb") as file:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise OSError(errno.EINVAL, "is no regular file", str(path))
+        found = file.read(MOST_BYTES + 1)
+    if len(found) > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"has more than {MOST_BYTES} bytes", str(path))
+    return found

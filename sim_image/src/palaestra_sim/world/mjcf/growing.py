@@ -1,0 +1,54 @@
+"""Elements that grow when MuJoCo reads them: copies, grids of points, and pictures.
+
+MuJoCo allocates what they ask for, so a line of text can take all memory or minutes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world.mjcf.elements import Element
+from palaestra_sim.world.source import Source
+
+_MOST: Final[Mapping[str, int]] = {
+    "replicate": 100_000,
+    "composite": 100_000,
+    "flexcomp": 1_000_000,
+    "hfield": 16_000_000,
+    "texture": 100_000_000,
+    "camera": 1 << 26,
+}
+# The attributes whose numbers are multiplied.
+_SIZES: Final[Mapping[str, tuple[str, ...]]] = {
+    "replicate": ("count",),
+    "composite": ("count",),
+    "flexcomp": ("count",),
+    "hfield": ("nrow", "ncol"),
+    "texture": ("width", "height"),
+    "camera": ("resolution",),
+}
+_REMEDY: Final = "make it smaller"
+
+
+def growing(source: Source, root: Element) -> Iterator[WorldError]:
+    """Yield an error for each element that would grow to too many copies, points or pixels."""
+    waiting = [(root, 1.0)]
+    while waiting:
+        element, copies = waiting.pop()
+        size = _size(element)
+        if element.tag == "replicate":
+            size = copies = copies * size
+        if element.tag in _MOST and size > _MOST[element.tag]:
+            fact = f"<{element.tag}> makes {size:.3g} of what is in it; {_MOST[element.tag]} are the most"
+            yield source.error(element.start, fact, _REMEDY)
+        waiting += [(child, copies) for child in element.children]
+
+
+def _size(element: Element) -> float:
+    """Return the product of the numbers that an element multiplies; 1 where MuJoCo refuses them."""
+    texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
+    numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
+    return math.prod(numbers)
