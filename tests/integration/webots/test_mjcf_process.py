@@ -7,7 +7,7 @@ import yaml
 
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.ros import RosService
-from palaestra_trainer.webots import Lever, Mode, Webots
+from palaestra_trainer.webots import Lever, Mode, MujocoActuator, MujocoSensor, Webots
 from palaestra_trainer.webots.devices import PositionSensor
 
 STEP_MS = 40
@@ -118,3 +118,29 @@ class TestAKeyframe:
         assert start[-1] > 0.05
         assert again[-1] > 0.05
         assert back[-1] - back[-2] < back[1] - back[0]
+
+
+class TestWhatWebotsDoesNotHave:
+    """A world with a sensor and an actuator that have no device in Webots."""
+
+    @pytest.fixture
+    def source(self, source):
+        """The world of the example with both."""
+        sensor = '<subtreecom name="center of mass" body="cart"/></sensor>'
+        return source.replace(
+            "</actuator>", '<adhesion name="grip" body="cart" ctrlrange="0 1"/></actuator>'
+        ).replace("</sensor>", sensor)
+
+    def test_facades_read_its_numbers_and_set_its_control(self, cartpole):
+        """Below `mujoco/`, with the names of the model."""
+        sensor = MujocoSensor("cartpole", "center of mass")
+        sensor.enable(STEP_MS)
+        grip = MujocoActuator("cartpole", "grip")
+        grip.set(2.0)
+        cartpole.step()
+
+        assert sensor.read()
+        assert sensor.value.shape == (3,)
+        assert cartpole.call("mujoco/grip/get_control", "get_float", ask=True).value == 1.0
+        sensor.disable()
+        grip.close()

@@ -170,11 +170,6 @@ def test_the_other_sensors_have_the_units_of_webots(load):
     ("texts", "message"),
     [
         (
-            (FORCE, '<framelinvel name="v" objtype="body" objname="cart"/>'),
-            "the sensor 'v' of type framelinvel is no device of Webots; leave it out",
-        ),
-        (('<adhesion body="cart" ctrlrange="0 1"/>',), "the actuator 'actuator0' is no motor of Webots"),
-        (
             (FORCE, "", ("<custom>", '<custom><text name="device:sensor/x" data="y"/>')),
             "the model has no sensor/x; write one of: sensor/accelerometer, ",
         ),
@@ -196,16 +191,6 @@ def test_devices_of_one_name_are_told_apart(load):
     found = kinds(load(servo + FORCE, '<jointpos name="push" joint="hinge"/>'))
 
     assert {"slider_position", "slider_velocity", "push", "push_jointpos"} <= set(found)
-
-
-def test_a_sensor_without_a_device_is_left_out_by_its_type(load):
-    """The trainer logs it, and the status of the job has it."""
-    simulation = load(
-        FORCE, '<framelinvel name="v" objtype="body" objname="cart"/>', leave_out=["framelinvel"]
-    )
-
-    assert "v" not in kinds(simulation)
-    assert len(simulation.left_out) == 1
 
 
 def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):

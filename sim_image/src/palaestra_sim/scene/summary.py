@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, DistanceSensorType
+from palaestra_sim.scene.devices.kind import Kind
+from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 _ROLLS_AND_TURNS: Final = 2
+_MOST_NAMES: Final = 8  # of devices in one line
 
 
 class Described(Protocol):
@@ -79,6 +82,7 @@ def differences(simulation: Described) -> Iterator[str]:
     lidars = sum(kind.node == "Lidar" for kind, _ in devices)
     outlines = [node for node in simulation.tree.nodes.values() if node.outline]
     meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
+    yield from _not_in_webots(devices)
     if infrared := types[DistanceSensorType.INFRA_RED]:
         yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
     if lidars:
@@ -94,6 +98,18 @@ def differences(simulation: Described) -> Iterator[str]:
     sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _not_in_webots(devices: Iterable[tuple[Kind[Any], Any]]) -> Iterator[str]:
+    """Yield a line for each type of device that Webots does not have, with the names of its devices."""
+    names: dict[str, list[str]] = {}
+    for kind, device in devices:
+        if not is_base_type(kind.node):
+            names.setdefault(kind.node, []).append(device.name)
+    for type_name, of_type in sorted(names.items()):
+        more = ", ..." if len(of_type) > _MOST_NAMES else ""
+        named = ", ".join(of_type[:_MOST_NAMES])
+        yield f"{len(of_type)} {type_name}, a type that Webots does not have: {named}{more}"
 
 
 def _of_robot(robot: Robot) -> Iterator[str]:

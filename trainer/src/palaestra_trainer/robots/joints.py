@@ -26,7 +26,8 @@ class JointRobot(SimulatedRobot, Joints):
         motors: names of its motors.
         sensors: names of its PositionSensors.
         greatest: the greatest command of each motor.
-        commanded: what `command` sets: position (rad, m), velocity, force (N) or torque (N m).
+        commanded: what `command` sets: position (rad, m), velocity, force (N) or torque (N m); control is
+            for actuators of MuJoCo that Webots has no motor for, with names such as "mujoco/biceps".
 
     Raises:
         ConfigurationError: the class names no motors, or not one greatest command for each.

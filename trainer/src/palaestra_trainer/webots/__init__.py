@@ -16,6 +16,7 @@ from palaestra_trainer.webots.devices import (
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
 from palaestra_trainer.webots.levers import Command, Lever
+from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.requirements import require_node
 from palaestra_trainer.webots.simulation import Actuator, Simulation
@@ -35,6 +36,8 @@ __all__ = [
     "LidarPoints",
     "Mode",
     "Motor",
+    "MujocoActuator",
+    "MujocoSensor",
     "Observer",
     "PositionSensor",
     "RangeFinder",

@@ -8,7 +8,7 @@ from typing import Literal
 from palaestra_trainer.webots.devices import topic_name
 from palaestra_trainer.webots.services import Services
 
-Command = Literal["position", "velocity", "force", "torque"]
+Command = Literal["position", "velocity", "force", "torque", "control"]
 
 
 class Lever:
@@ -17,7 +17,8 @@ class Lever:
     Args:
         robot: the ROS name of the robot's controller.
         device: the motor's name in the world.
-        command: "position" (rad or m), "velocity", "force" (N) or "torque" (N m).
+        command: "position" (rad or m), "velocity", "force" (N), "torque" (N m), or "control" in the units of
+            an actuator of MuJoCo that Webots has no motor for.
 
     Attributes:
         robot: see above.

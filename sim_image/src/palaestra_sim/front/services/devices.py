@@ -34,6 +34,7 @@ class Feed:
         reading: the field of the value; "" is the last one.
         many: whether the value is a sequence, with a message for each of its items.
         whole: whether a value has all fields by name.
+        stamped: whether the messages have a header.
         publishers: by period in ms.
     """
 
@@ -45,6 +46,7 @@ class Feed:
     reading: str = ""
     many: bool = False
     whole: bool = False
+    stamped: bool = True
     publishers: dict[int, Publisher] = field(default_factory=dict)
 
     def begin(self, node: Node, period_ms: int) -> None:
@@ -72,12 +74,17 @@ class Feed:
         for period_ms, publisher in self.publishers.items():
             if elapsed_ms % period_ms == 0 and publisher.heard:
                 for value in source.value if self.many else (source.value,):
-                    if self.whole:
-                        publisher.send_stamped(value)
-                    elif self.reading:
-                        publisher.send_stamped({self.reading: value})
-                    else:
-                        publisher.send_value(value)
+                    self._send(publisher, value)
+
+    def _send(self, publisher: Publisher, value: Any) -> None:
+        if self.whole:
+            publisher.send_stamped(value)
+        elif not self.stamped:
+            publisher.send({self.reading: value})
+        elif self.reading:
+            publisher.send_stamped({self.reading: value})
+        else:
+            publisher.send_value(value)
 
 
 class Outlet:
@@ -110,12 +117,13 @@ class Outlet:
             Feed(
                 f"{path}/{it.name}",
                 it.type_name,
-                header,
+                header if it.stamped else {},
                 it.constants,
                 it.source,
                 reading=it.reading,
                 many=it.many,
                 whole=it.whole,
+                stamped=it.stamped,
             )
             for it in topics
         )

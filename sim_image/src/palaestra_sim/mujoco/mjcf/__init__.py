@@ -4,6 +4,7 @@
 - `model`: the compiled model, and its state between two steps
 - `motors`: actuators as motors
 - `sensors`: sensors and cameras as devices
+- `own`: sensors and actuators that Webots has no device for
 - `eye`: what cameras see
 - `robot`: the robot with all devices
 - `tree`: bodies, joints and devices as nodes

@@ -8,10 +8,11 @@ from typing import Any, Final
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.mjcf import motors
+from palaestra_sim.mujoco.mjcf import motors, own
 from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
 from palaestra_sim.mujoco.mjcf.motors import Actuator, ActuatorMotor
-from palaestra_sim.mujoco.mjcf.sensors import Sensor, camera, measured
+from palaestra_sim.mujoco.mjcf.own import MujocoActuator
+from palaestra_sim.mujoco.mjcf.sensors import Sensor, camera, in_webots, measured
 from palaestra_sim.scene.devices.kind import Devices, Kind, Sample, Shaft
 from palaestra_sim.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.scene.joints import Joint
@@ -21,7 +22,6 @@ from palaestra_sim.world.mjcf import LEFT_OUT, Description
 _ACTUATOR: Final = "actuator"
 _CAMERA: Final = "camera"
 _SENSOR: Final = "sensor"
-_KEEPS: Final = "write it in <actuator> as <motor>, <position> or <velocity>"
 
 
 @dataclass(slots=True, kw_only=True)
@@ -32,14 +32,16 @@ class Equipment:
         devices: by name.
         joints: the number of the joint of each device that is on one, by name.
         motors: those of actuators.
+        actuators: those that are no motors.
         samples: give the sensors their values.
         refused: mistakes with devices, each with its place.
-        left_out: sensors and actuators without a device, which the user left out.
+        left_out: sensors and actuators without a device in Webots, which the user left out.
     """
 
     devices: Devices = field(default_factory=Devices)
     joints: dict[str, int] = field(default_factory=dict)
     motors: list[ActuatorMotor] = field(default_factory=list)
+    actuators: list[MujocoActuator] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
     refused: list[WorldError] = field(default_factory=list)
     left_out: list[WorldError] = field(default_factory=list)
@@ -84,8 +86,8 @@ class _Fitter:
         for index in range(model.nsensor):
             self._add_sensor(index)
         for index in range(model.ncam):
-            own = model.camera(index).name or f"camera{index}"
-            name = self._name(_CAMERA, own, f"{own}_camera")
+            default = model.camera(index).name or f"camera{index}"
+            name = self._name(_CAMERA, default, f"{default}_camera")
             if name is not None:
                 found = camera(self._model, index, name)
                 self._add(_CAMERA, found.kind, found.device, None)
@@ -95,14 +97,14 @@ class _Fitter:
     def _add_actuator(self, index: int) -> None:
         model = self._model.model
         joint = motors.joint_of(model, index)
-        own = model.actuator(index).name
         default = self._defaults[index]
-        name = self._name(_ACTUATOR, default, f"{default}_actuator")
+        control = motors.control_of(model, index)
+        folder = "" if control is not None else own.FOLDER
+        name = self._name(_ACTUATOR, default, f"{default}_actuator", folder)
         if name is None:
             return
-        control = motors.control_of(model, index)
         if control is None:
-            self._lack(_ACTUATOR, own, f"the actuator {default!r} is no motor of Webots", _KEEPS)
+            self._add_own_actuator(index, name)
             return
         actuator = Actuator(
             control=control[0],
@@ -117,14 +119,25 @@ class _Fitter:
         if self._add(_ACTUATOR, ROTATIONAL_MOTOR if turns else LINEAR_MOTOR, motor, joint):
             self._found.motors.append(motor)
 
+    def _add_own_actuator(self, index: int, name: str) -> None:
+        model = self._model.model
+        type_name = own.actuator_type_of(model, index)
+        if self._is_left_out(_ACTUATOR, model.actuator(index).name, name, type_name):
+            return
+        actuator = own.actuator_of(model, self._model.data, index, name)
+        if self._add(_ACTUATOR, own.MUJOCO_ACTUATOR, actuator, None):
+            self._found.actuators.append(actuator)
+
     def _add_sensor(self, index: int) -> None:
         model = self._model.model
-        type_name = mujoco.mjtSensor(int(model.sensor_type[index])).name.removeprefix("mjSENS_").lower()
+        type_name = own.type_name_of(model, index)
         what, which = int(model.sensor_objtype[index]), int(model.sensor_objid[index])
-        own = model.sensor(index).name
+        given = model.sensor(index).name
         target = mujoco.mj_id2name(model, what, which) if which >= 0 else None
-        name = self._name(_SENSOR, own or f"{target or index}_{type_name}", f"{own}_{type_name}")
-        if name is None:
+        folder = "" if in_webots(model, index) else own.FOLDER
+        default = given or f"{target or index}_{type_name}"
+        name = self._name(_SENSOR, default, f"{given}_{type_name}", folder)
+        if name is None or (folder and self._is_left_out(_SENSOR, given, name, type_name)):
             return
         start = int(model.sensor_adr[index])
         joint = which if what == mujoco.mjtObj.mjOBJ_JOINT and self._is_simple(which) else None
@@ -137,17 +150,15 @@ class _Fitter:
                 shaft=Shaft() if joint is None else self._shaft(joint),
             )
         )
-        if found is None:
-            fact = f"the sensor {name!r} of type {type_name} is no device of Webots"
-            self._lack(_SENSOR, own, fact, f"leave it out (--leave-out {type_name})", type_name)
-        elif self._add(_SENSOR, found.kind, found.device, joint):
+        if self._add(_SENSOR, found.kind, found.device, None if folder else joint):
             self._found.samples.append(found.sample)
 
     def _add(self, section: str, kind: Kind[Any], device: Any, joint: int | None) -> bool:
         name: str = device.name
         devices = self._found.devices
         if name in devices.rows:
-            remedy = f'rename one: <text name="device:{section}/{name}" data="..."/> in <custom>'
+            key = f"device:{section}/{name.removeprefix(own.FOLDER)}"
+            remedy = f'rename one: <text name="{key}" data="..."/> in <custom>'
             error = self._description.error(section, name, f"a second device is called {name!r}", remedy)
             self._found.refused.append(error)
             return False
@@ -160,24 +171,25 @@ class _Fitter:
             self._found.joints[name] = joint
         return True
 
-    def _name(self, section: str, default: str, other: str) -> str | None:
-        """Return the name of a device; None if the robot shall not have it.
+    def _name(self, section: str, default: str, other: str, folder: str = "") -> str | None:
+        """Return the name of a device, below `folder`; None if the robot shall not have it.
 
         Names in a model are unique in a section; a device whose name another section has too gets `other`.
         """
         key = f"{section}/{default}"
         self._known.add(key)
-        if key not in self._names and default in self._found.devices.rows:
-            return other
+        if key not in self._names and f"{folder}{default}" in self._found.devices.rows:
+            return f"{folder}{other}"
         name = self._names.get(key, default)
-        return None if name == LEFT_OUT else name
+        return None if name == LEFT_OUT else f"{folder}{name}"
 
-    def _lack(self, section: str, name: str, fact: str, remedy: str, type_name: str = "") -> None:
-        error = self._description.error(section, name, fact, remedy)
-        if self._leave_out.everything or type_name in self._leave_out.types:
-            self._found.left_out.append(error)
-        else:
-            self._found.refused.append(error)
+    def _is_left_out(self, section: str, given: str, name: str, type_name: str) -> bool:
+        """Return whether the user leaves out a type that Webots does not have, and note it if so."""
+        if type_name not in self._leave_out.types:
+            return False
+        fact = f"the {section} {name!r} of type {type_name} has no device in Webots"
+        self._found.left_out.append(self._description.error(section, given, fact, "left out"))
+        return True
 
     def _unknown(self) -> Iterator[WorldError]:
         """Yield an error for each name in `custom` of a device that the model does not have."""

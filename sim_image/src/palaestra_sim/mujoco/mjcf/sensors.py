@@ -1,7 +1,7 @@
 """Sensors and cameras of a model as devices of Webots.
 
 A sensor whose value is one number has the interface of a PositionSensor. Those with more numbers have a
-device of their own, or none.
+device of their own; if Webots has none, see `own`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, Final
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.mjcf.eye import ModelEye
 from palaestra_sim.mujoco.mjcf.model import Model
+from palaestra_sim.mujoco.mjcf.own import MUJOCO_SENSOR, MujocoSensor, type_name_of
 from palaestra_sim.scene.devices.accelerometer import ACCELEROMETER, Accelerometer
 from palaestra_sim.scene.devices.camera import CAMERA, Camera
 from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR, DistanceSensor, DistanceSensorType
@@ -62,13 +63,15 @@ class Sensor:
     shaft: Shaft
 
 
-def measured(sensor: Sensor) -> Measured | None:
-    """Return the device of a sensor; None if Webots has nothing alike."""
-    type_ = int(sensor.model.model.sensor_type[sensor.number])
-    make = _MAKERS.get(type_)
-    if make is None and sensor.numbers.size == 1:
-        make = _number
-    return None if make is None else make(sensor)
+def in_webots(model: Any, number: int) -> bool:
+    """Return whether Webots has a device for a sensor of the model."""
+    return _maker(model, number) is not None
+
+
+def measured(sensor: Sensor) -> Measured:
+    """Return the device of a sensor: one of Webots, or else one that publishes the numbers as they are."""
+    make = _maker(sensor.model.model, sensor.number) or _numbers
+    return make(sensor)
 
 
 def camera(parent: Model, number: int, name: str) -> Measured:
@@ -98,6 +101,18 @@ def _own(kind: Kind[DeviceT]) -> Kind[DeviceT]:
     return replace(kind, sampler=_by_model)
 
 
+def _maker(model: Any, number: int) -> Callable[[Sensor], Measured] | None:
+    type_ = int(model.sensor_type[number])
+    return _OF_ONE.get(type_, _number) if model.sensor_dim[number] == 1 else _OF_SEVERAL.get(type_)
+
+
+def _numbers(sensor: Sensor) -> Measured:
+    device = MujocoSensor(
+        name=sensor.name, type_name=type_name_of(sensor.model.model, sensor.number), numbers=sensor.numbers
+    )
+    return Measured(kind=_MUJOCO_SENSOR, device=device, sample=device.sample)
+
+
 def _number(sensor: Sensor) -> Measured:
     device = PositionSensor(name=sensor.name, shaft=sensor.shaft, resolution=-1.0, noise=0.0)
 
@@ -107,10 +122,8 @@ def _number(sensor: Sensor) -> Measured:
     return Measured(kind=_POSITION_SENSOR, device=device, sample=sample)
 
 
-def _distance(sensor: Sensor) -> Measured | None:
+def _distance(sensor: Sensor) -> Measured:
     """Return a distance sensor, which measures its whole reach where it meets nothing."""
-    if sensor.numbers.size != 1:
-        return None
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
     device = DistanceSensor(
@@ -198,10 +211,13 @@ _GYRO: Final = _own(GYRO)
 _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
+_MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
 _CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # it has its eye already
-_MAKERS: Final[dict[int, Callable[[Sensor], Measured | None]]] = {
+_OF_ONE: Final[dict[int, Callable[[Sensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,
+}
+_OF_SEVERAL: Final[dict[int, Callable[[Sensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_ACCELEROMETER): _accelerometer,
     int(mujoco.mjtSensor.mjSENS_GYRO): _gyro,
     int(mujoco.mjtSensor.mjSENS_FRAMEQUAT): _inertial_unit,

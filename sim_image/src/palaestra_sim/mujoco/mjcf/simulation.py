@@ -200,6 +200,8 @@ class MjcfSimulation:
             change()
         for motor in self._equipment.motors:
             motor.command(self._step_s)
+        for actuator in self._equipment.actuators:
+            actuator.command()
         self._model.step(self._steps)
         self.motion.clear()
         if self._reset_asked:
@@ -213,3 +215,5 @@ class MjcfSimulation:
         self._model.settle()  # motors read the lengths of tendons
         for motor in self._equipment.motors:
             motor.reset()
+        for actuator in self._equipment.actuators:
+            actuator.reset()

@@ -204,12 +204,13 @@ class Topic:
 
     Attributes:
         name: below the device's name.
-        type_name: of its messages, which begin with a header.
+        type_name: of its messages.
         source: of the reading; None if it never has one.
         constants: the other fields.
         reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
         many: whether `value` is a sequence, with a message for each of its items.
         whole: whether a value has all fields but the header, by name.
+        stamped: whether the messages begin with a header; without one, `reading` names the field.
     """
 
     name: str
@@ -219,6 +220,7 @@ class Topic:
     reading: str = ""
     many: bool = False
     whole: bool = False
+    stamped: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

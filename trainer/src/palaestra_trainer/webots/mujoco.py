@@ -1,0 +1,62 @@
+"""Sensors and actuators of a model of MuJoCo for which Webots has no device.
+
+A simulator offers them below `mujoco/`: `mujoco/hip_force` is the sensor `hip_force` of the model.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_protocol.ros.rostypes import message_type
+from palaestra_trainer.webots.devices import Sensor
+from palaestra_trainer.webots.levers import Lever
+
+_FOLDER: Final = "mujoco/"
+_TYPE: Final = "std_msgs/Float64MultiArray"
+_decode: Final = message_type(_TYPE).codec.decode
+
+
+class MujocoSensor(Sensor):
+    """A sensor of several numbers; `value` has them in MuJoCo's order and units: shape (numbers,), float64.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        sensor: its name in the model, e.g. hip_force
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, sensor: str) -> None:
+        super().__init__(robot, f"{_FOLDER}{sensor}", _TYPE, read_numbers)
+
+
+class MujocoActuator(Lever):
+    """An actuator that is no motor of Webots, such as a muscle; `set` takes MuJoCo's control.
+
+    The simulator keeps the control within the actuator's `ctrlrange`.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        actuator: its name in the model, e.g. biceps
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, actuator: str) -> None:
+        super().__init__(robot, f"{_FOLDER}{actuator}", "control")
+
+
+def read_numbers(message: bytes | memoryview) -> NDArray[np.float64]:
+    """Return the numbers of a message, as a new array.
+
+    Raises:
+        ValueError: one is not finite, or the message is cut short.
+    """
+    numbers = _decode(message).data
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{numbers}; a sensor of MuJoCo must be finite")
+    return np.array(numbers, np.float64)
