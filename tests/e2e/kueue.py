@@ -79,7 +79,8 @@ class Kueue:
 
 def scheduling(priority: str | None = None) -> Object:
     """Return the `scheduling` that the page gives a job, of a priority class or of none."""
-    found: list[Object] = [yaml.safe_load(block)["spec"]["scheduling"] for block in blocks(DOING, "yaml")]
+    specs: list[Object] = [yaml.safe_load(block).get("spec", {}) for block in blocks(DOING, "yaml")]
+    found: list[Object] = [spec["scheduling"] for spec in specs if "scheduling" in spec]
     return next(each for each in found if each.get("priorityClassName") == priority)
 
 

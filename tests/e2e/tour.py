@@ -20,6 +20,7 @@ def tour(place: Namespace, operators: str) -> None:
     wait_in_queue(place)  # the operator asks why after 5 s; the steps from here on take longer
     give_up(place)
     stop_suspended(place)
+    delete_unbound(place)
     suspend(place, flag=False)
     replace_pod(place)
     suspend(place, flag=True)
@@ -64,6 +65,14 @@ def stop_suspended(place: Namespace) -> None:
     place.wait(lambda: len(place.pods("over")) == 2, LONG_S)
     place.cluster.patch("jobs", place.name, "over-0", {"spec": {"suspend": True}})
     place.wait(lambda: place.get("jobs", "over-0") is None, LONG_S)
+
+
+def delete_unbound(place: Namespace) -> None:
+    """Delete a job whose claim was never bound: the claim goes too."""
+    place.apply(make_job("unbound", script=WAIT, suspend=True))
+    [claim] = place.wait(lambda: place.select("persistentvolumeclaims", "unbound"), LONG_S)
+    place.cluster.delete("trainingjobs", place.name, "unbound")
+    place.wait(lambda: place.get("persistentvolumeclaims", named(claim)) is None, LONG_S)
 
 
 def suspend(place: Namespace, *, flag: bool) -> None:
