@@ -9,20 +9,27 @@ from palaestra.api.crd import crd
 from palaestra.api.tree import walk
 from tests.waiting import eventually
 
-GROUP = "earlier.example.com"  # the other tests use the definition itself
-KIND = f"trainingjobs.{GROUP}"
+# Of its own, because the other tests on this API server use the definition itself: `kubectl describe` lists a
+# short name in all groups.
+GROUP = "earlier.example.com"
+NAMES = {
+    "plural": "earlierjobs",
+    "singular": "earlierjob",
+    "kind": "EarlierJob",
+    "listKind": "EarlierJobList",
+}
+KIND = f"{NAMES['plural']}.{GROUP}"
 PASSWORD = {"env": [{"name": "PROXY", "value": "http://me:secret@proxy:3128"}]}
 GUARDS = {guard.message for _, model in walk(TrainingJob) for guard in model.guards}
 
 
 def definition():
-    """Return the definition of this release under another group."""
+    """Return the definition of this release under another group and name."""
     found = crd()
-    names = {**found["spec"]["names"], "shortNames": [], "categories": []}
     return {
         **found,
         "metadata": {"name": KIND},
-        "spec": {**found["spec"], "group": GROUP, "names": names},
+        "spec": {**found["spec"], "group": GROUP, "names": NAMES},
     }
 
 
@@ -42,7 +49,7 @@ def job(name):
     """Return a job whose spec breaks a guard."""
     return {
         "apiVersion": f"{GROUP}/v1alpha1",
-        "kind": "TrainingJob",
+        "kind": NAMES["kind"],
         "metadata": {"name": name, "namespace": "default"},
         "spec": {"trainer": PASSWORD},
     }
