@@ -16,7 +16,10 @@ def _pending(namespace, name):
 
 
 def _starting(namespace, name):
-    return namespace.pods(name) and namespace.status(name).get("phase")
+    """Return whether a pod is there, and its volume: a claim that was never bound goes with its job."""
+    claims = namespace.select("persistentvolumeclaims", name)
+    bound = [claim["status"].get("phase") == "Bound" for claim in claims]
+    return namespace.pods(name) and namespace.status(name).get("phase") and bound == [True]
 
 
 def _running(namespace, name):
