@@ -129,10 +129,10 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
     found = []
     for name in sorted(filter(str.isidentifier, names)):
         mine, other = _spec(name, [folder]), _spec(name, others)
-        # A folder without `__init__.py` shadows nothing, but may be shadowed. The library tries to import
-        # some modules, such as msvcrt, to find out which system this is.
-        hides = not _same(mine.origin, other.origin) if mine and mine.origin and other else False
-        if mine and mine.origin and (hides or (other is None and name in sys.stdlib_module_names)):
+        if not (mine and mine.origin):  # a folder without `__init__.py` shadows nothing
+            continue
+        # The library tries to import some modules that a system lacks, such as msvcrt, to recognize it.
+        if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
             found.append((name, mine.origin, folder))
     return found
 

@@ -27,8 +27,7 @@ class Beams:
         self._origins, self._directions = origins_and_directions(beams)
         self._distances = np.empty(len(beams))
         self._hits = np.empty(len(beams), dtype=np.int32)
-        order = groupby(range(len(beams)), key=lambda index: tuple(self._origins[index]))
-        self._bundles = [(bundle[0], bundle[-1] + 1) for _, indices in order if (bundle := list(indices))]
+        self._bundles = bundles(self._origins)
 
     def cast(self, built: Built) -> list[float]:
         """Return how far each beam travels, in meters; its full reach if it meets nothing."""
@@ -61,6 +60,12 @@ class Beams:
             count,
             mujoco.mjMAXVAL,
         )
+
+
+def bundles(origins: Any) -> list[tuple[int, int]]:
+    """Return the first beam, and the one after the last, of each run of beams that begin at one point."""
+    order = groupby(range(len(origins)), key=lambda index: tuple(origins[index]))
+    return [(run[0], run[-1] + 1) for _, indices in order if (run := list(indices))]
 
 
 def origins_and_directions(beams: Sequence[Beam]) -> tuple[Any, Any]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
 
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.pictures import Pictures
-from palaestra_sim.mujoco.rays import origins_and_directions
+from palaestra_sim.mujoco.rays import bundles, origins_and_directions
 from palaestra_sim.mujoco.visible import PASSED, Visible
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.physics import Figure
@@ -29,8 +28,7 @@ class LidarBeams:
         self._figure = figure
         self._reach = np.array([beam.reach_m for beam in beams])
         self._origins, self._directions = origins_and_directions(beams)
-        order = groupby(range(len(beams)), key=lambda index: tuple(self._origins[index]))
-        self._bundles = [(bundle[0], bundle[-1] + 1) for _, indices in order if (bundle := list(indices))]
+        self._bundles = bundles(self._origins)
         self._own: tuple[Visible | None, Any] = (None, np.empty(0, int))
 
     def cast(self) -> list[float]:

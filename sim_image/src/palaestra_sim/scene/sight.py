@@ -51,12 +51,14 @@ class Sight:
         ]
         self._seen = (-1, -1)
         self._standing: list[_Target] = []
-        self._moving: list[Drawn] = []
+        self._moving: list[_Target] = []
 
     def cast(self) -> list[Glance]:
         """Return what each ray meets now."""
         self._refresh()
-        targets = [*self._standing, *map(_Target, self._moving)]
+        for target in self._moving:
+            target.place()
+        targets = [*self._standing, *self._moving]
         pose = self._carrier.world_pose
         return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
 
@@ -71,28 +73,32 @@ class Sight:
             chain = [] if thing.place is None else list(thing.place.chain())
             if self._carrier in chain:
                 continue
-            if any(place.moves for place in chain):
-                self._moving.append(thing)
-            else:
-                self._standing.append(_Target(thing))
+            of_its_kind = self._moving if any(place.moves for place in chain) else self._standing
+            of_its_kind.append(_Target(thing))
 
 
 class _Target:
-    """A visible shape where it is now."""
+    """A visible shape, where it was when it was placed last."""
 
-    __slots__ = ("center", "half_height_m", "hit", "inward", "radius_m", "reflection")
+    __slots__ = ("_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
 
     def __init__(self, thing: Drawn) -> None:
+        self._thing = thing
+        self.hit = _surface(thing)
+        self.radius_m = _radius(thing)
+        self.reflection = reflection(thing)
+        self.place()
+
+    def place(self) -> None:
+        """Take the pose of this moment."""
+        thing = self._thing
         frame = Pose() if thing.place is None else thing.place.world_pose
         pose = frame.after(thing.local)
         self.inward = pose.inverse
-        self.hit = _surface(thing)
         self.center = pose.position
-        self.radius_m = _radius(thing)
         up = pose.rotation[6:]
         box_m = sum(abs(share) * length / 2.0 for share, length in zip(up, thing.size, strict=True))
         self.half_height_m = self.radius_m if thing.mesh else box_m
-        self.reflection = reflection(thing)
 
 
 def reflection(thing: Drawn) -> float:

@@ -14,8 +14,8 @@ from stable_baselines3.common.buffers import BaseBuffer, ReplayBuffer, RolloutBu
 
 from palaestra_trainer import own
 from palaestra_trainer.algorithms import her, own_buffers
-from palaestra_trainer.algorithms.own_buffers import FIELD
 from palaestra_trainer.algorithms.signatures import parameters
+from palaestra_trainer.algorithms.values import FIELD
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 

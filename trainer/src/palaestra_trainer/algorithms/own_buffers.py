@@ -32,17 +32,21 @@ from palaestra_trainer.algorithms.buffers import (
     ValidRolloutBuffer,
 )
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
+from palaestra_trainer.algorithms.values import FIELD
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
-FIELD = "algorithm.hyperparameters"
-# What a class may extend, and the class for valid rows that comes before it; the nearest base is found first.
-_VALID: Mapping[type[BaseBuffer], type[BaseBuffer]] = {
-    DictReplayBuffer: ValidDictReplayBuffer,
-    ReplayBuffer: ValidReplayBuffer,
+# Rollout buffers, and the class for valid rows of each; the classes that extend others come first.
+VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
     MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
+}
+# What an author's class may extend.
+_VALID: Mapping[type[Any], type[Any]] = {
+    DictReplayBuffer: ValidDictReplayBuffer,
+    ReplayBuffer: ValidReplayBuffer,
+    **VALID_ROLLOUTS,
 }
 # These read the rows after a row; in one column, such a row may be another member's.
 _NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)

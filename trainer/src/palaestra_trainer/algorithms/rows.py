@@ -19,7 +19,7 @@ from sb3_contrib import MaskablePPO
 from sb3_contrib.common.maskable.buffers import MaskableDictRolloutBuffer, MaskableRolloutBuffer
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.buffers import DictRolloutBuffer, RolloutBuffer
+from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
@@ -29,14 +29,9 @@ from stable_baselines3.common.utils import explained_variance
 from palaestra_trainer.algorithms import own_buffers
 from palaestra_trainer.algorithms.buffers import (
     ValidDictReplayBuffer,
-    ValidDictRolloutBuffer,
     ValidReplayBuffer,
     ValidRolloutBuffer,
     valid_rows,
-)
-from palaestra_trainer.algorithms.maskable import (
-    ValidMaskableDictRolloutBuffer,
-    ValidMaskableRolloutBuffer,
 )
 from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
@@ -47,12 +42,9 @@ from palaestra_trainer.errors import ConfigurationError
 
 # Rollout buffers and what takes their place; a buffer of another class may need rows that these do not take.
 _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
-    RolloutBuffer: ValidRolloutBuffer,
-    DictRolloutBuffer: ValidDictRolloutBuffer,
+    **own_buffers.VALID_ROLLOUTS,
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
-    MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
-    MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
 }
 # Evaluations and exported files give masks to MaskablePPO and its subclasses only.
 _WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)

@@ -60,7 +60,7 @@ def measure(
         raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
     use_threads()
     only = configuration.model_copy(update={"simulators": evaluating})
-    with ExitStack() as stack:
+    with ExitStack() as last, ExitStack() as stack:
         fleet = Fleet(only, make_members(only), NullWatcher())
         stack.callback(fleet.stop)
         begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
@@ -78,8 +78,7 @@ def measure(
             "seconds": round(evaluation.seconds, 2),
         }
         report(result)
-        hurry = leave_after(STOPPED_S, ExitCode.DONE)
-    hurry.cancel()
+        last.callback(leave_after(STOPPED_S, ExitCode.DONE).cancel)
     return result
 
 

@@ -28,6 +28,7 @@ from palaestra_sim.seam import Row
 
 _MOST_RAYS: Final = 10_000  # each is cast at every step
 _BESIDE_M: Final = 1e-4  # how far the rays are beside that of a sonar
+_BEAMS_OF_SONAR: Final = 5  # of each ray
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # of a surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
@@ -224,8 +225,8 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
     Beyond an edge, the ray on the other side decides.
     """
-    for first in range(0, len(distances_m), 5):
-        distance, left, right, below, above = distances_m[first : first + 5]
+    for first in range(0, len(distances_m), _BEAMS_OF_SONAR):
+        distance, left, right, below, above = distances_m[first : first + _BEAMS_OF_SONAR]
         across = min(abs(left - distance), abs(right - distance)) / _BESIDE_M
         along = min(abs(below - distance), abs(above - distance)) / _BESIDE_M
         if math.hypot(across, along) < _STEEPEST:
