@@ -358,7 +358,7 @@ class Status(Reported):
     """Most failures of one replica's trainer, which count against `backoffLimit`; absent: none."""
 
     last_checkpoint_time: datetime | None = Field(default=None, strict=False)
-    """Oldest time at which a replica saved its newest checkpoint; absent: there is no checkpoint yet."""
+    """Earliest of the times at which replicas saved their newest checkpoints; absent: no replica has one."""
 
     nodes: Word | None = None
     """Nodes of the newest pods, separated by commas; absent: no node has been chosen yet."""

@@ -107,7 +107,7 @@ def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happen
 
 
 def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
-    """Yield the event of a lost run that a person gave up."""
+    """Yield an event if a person has given a lost run up since the old status."""
     before = old.lost.restarted if old is not None and old.lost is not None else None
     if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
         yield happening(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)
