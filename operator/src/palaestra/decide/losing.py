@@ -22,7 +22,11 @@ def lost_runs(
     job: TrainingJob, replicas: Iterable[ReplicaObserved], present: Collection[tuple[str, str]]
 ) -> dict[int, LostRun]:
     """Return the lost runs for which a person's word is missing, by replica; `present` has the claims."""
-    found = {seen.index: _lost(job, _old(job, seen), seen, present) for seen in replicas}
+    before = {replica.index: replica for replica in job.status.replicas}
+    found = {
+        seen.index: _lost(job, before.get(seen.index, ReplicaStatus(index=seen.index)), seen, present)
+        for seen in replicas
+    }
     return {index: lost for index, lost in found.items() if lost is not None}
 
 
@@ -55,11 +59,6 @@ def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaSt
     )
     given_up = lost.model_copy(update={"restarted": now, "pod": replica.pod})
     return replica.model_copy(update={**dict.fromkeys(forgotten), "fruitless": 0, "lost": given_up})
-
-
-def _old(job: TrainingJob, seen: ReplicaObserved) -> ReplicaStatus:
-    known = (replica for replica in job.status.replicas if replica.index == seen.index)
-    return next(known, ReplicaStatus(index=seen.index))
 
 
 def _lost(
