@@ -7,13 +7,16 @@ import itertools
 import statistics
 import threading
 import time
+import xmlrpc.client
 
 import genpy
+import rosgraph
 import rospy
 
 from palaestra_protocol.ros.rostypes import service_type
 from tests.bench.arena import running
 from tests.bench.sizes import scaled
+from tests.waiting import eventually
 
 ROUNDS = 5
 OURS = 1000
@@ -79,8 +82,9 @@ class RospyStepper:
         self._subscribers = [
             rospy.Subscriber(f"/{name}/{topic}/value", rospy.AnyMsg, self._count) for topic in TOPICS
         ]
-        while any(subscriber.get_num_connections() == 0 for subscriber in self._subscribers):
-            time.sleep(0.01)
+        self._publisher = xmlrpc.client.ServerProxy(rosgraph.Master(rospy.get_name()).lookupNode(f"/{name}"))
+        wanted = {subscriber.resolved_name for subscriber in self._subscribers}
+        eventually(lambda: self._connected() == wanted)
 
     def step(self):
         """Take one step."""
@@ -93,9 +97,16 @@ class RospyStepper:
                 raise TimeoutError("a sensor stays silent")
 
     def close(self):
-        """Unsubscribe."""
+        """Unsubscribe, and wait until the simulator knows it: the next stepper has the same name."""
         for subscriber in self._subscribers:
             subscriber.unregister()
+        eventually(lambda: not self._connected())
+        self._publisher("close")()
+
+    def _connected(self):
+        """Return the topics that the simulator sends to us; rospy counts a connection before it is made."""
+        links = self._publisher.getBusInfo(rospy.get_name())[2]
+        return {topic for _, subscriber, _, _, topic, _ in links if subscriber == rospy.get_name()}
 
     def _count(self, _message):
         self._arrived.release()
