@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from palaestra.cluster import Forbidden, Resource
+from palaestra.cluster import Forbidden, Invalid, Resource
 from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINING_JOBS
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
@@ -82,12 +82,21 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
         place.train("second")
 
 
+def pod(name, **spec):
+    """Return a pod as any controller may create it; keywords are fields of its spec."""
+    containers = [{"name": "main", "image": "theirs"}]
+    return {
+        "apiVersion": "v1",
+        "kind": "Pod",
+        "metadata": {"name": name},
+        "spec": {"containers": containers, **spec},
+    }
+
+
 def pod_apart(name, **term):
-    """Return a pod with a required anti-affinity, as any controller may create it."""
+    """Return a pod with a required anti-affinity."""
     terms = [{"topologyKey": "kubernetes.io/os", "labelSelector": {}, **term}]
-    affinity = {"podAntiAffinity": {"requiredDuringSchedulingIgnoredDuringExecution": terms}}
-    spec = {"containers": [{"name": "main", "image": "theirs"}], "affinity": affinity}
-    return {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": name}, "spec": spec}
+    return pod(name, affinity={"podAntiAffinity": {"requiredDuringSchedulingIgnoredDuringExecution": terms}})
 
 
 def test_the_quota_of_the_examples_refuses_an_affinity_to_other_namespaces(place):
@@ -154,6 +163,17 @@ LIKE_OPENSHIFT = {
 }
 
 
+def user_is_refused(place):
+    """Whether the API server would refuse a pod that names a user."""
+    of_a_user = pod("of-a-user", securityContext={"runAsUser": 1000})
+    of_a_user["metadata"]["namespace"] = place.name
+    try:
+        place.api.create(PODS, of_a_user, dry_run=True)
+    except Invalid as refusal:
+        return RANGE in str(refusal)
+    return False
+
+
 @pytest.fixture
 def like_openshift(place):
     """Refuse pods of this namespace that name a user, as OpenShift does."""
@@ -169,6 +189,8 @@ def like_openshift(place):
             "spec": {"policyName": name, "validationActions": ["Deny"], "matchResources": chosen},
         },
     )
+    # The API server goes by a policy only a moment after it has stored it.
+    eventually(lambda: user_is_refused(place), 60)
     yield
     place.api.delete(POLICY_BINDINGS, None, name)
     place.api.delete(POLICIES, None, name)
