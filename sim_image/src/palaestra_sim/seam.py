@@ -5,6 +5,7 @@ The wire is in `ros`; nothing here needs a socket.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from typing import Any, NamedTuple, Protocol
@@ -107,4 +108,19 @@ def topic_name(name: str) -> str:
     return name.translate(_REPLACED)
 
 
+def ros_name(name: str) -> str:
+    """Return a name with an underscore in the place of each character that `is_ros_name` refuses."""
+    return "/".join(_ILLEGAL.sub("_", part) for part in name.split("/") if part) or "_"
+
+
+def is_ros_name(name: str) -> bool:
+    """Return whether ROS takes a name as a part of paths, in the form that the controller gives it.
+
+    The controller ends at a name that ROS refuses.
+    """
+    return _LEGAL.fullmatch(topic_name(name)) is not None
+
+
 _REPLACED = str.maketrans("-. ()", "_____")
+_LEGAL = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+_ILLEGAL = re.compile(r"[^-. ()A-Za-z0-9_]")

@@ -37,6 +37,21 @@ def test_every_actuator_sensor_and_camera_is_a_device(load):
     }
 
 
+def test_a_name_that_ros_refuses_gets_underscores(load):
+    """MuJoCo takes any characters, and the names of models are not the author's to change."""
+    found = kinds(load(FORCE.replace('"push"', '"/cart::pushé"')))
+
+    assert found["cart__push_"] == "LinearMotor"
+
+
+def test_names_of_one_topic_are_refused_with_the_text_that_renames_one(load):
+    """A client could reach only one of the two."""
+    with pytest.raises(WorldError, match="devices 'cart position' and 'cart-position'") as refused:
+        load(FORCE.replace('"push"', '"cart position"'), '<jointpos name="cart-position" joint="hinge"/>')
+
+    assert '<text name="device:sensor/cart-position" data="..."/>' in str(refused.value)
+
+
 def test_a_text_renames_a_device_or_leaves_it_out(load):
     """Programs of users look for names of their own."""
     texts = '<text name="device:actuator/push" data="motor"/><text name="device:camera/eye" data="-"/>'

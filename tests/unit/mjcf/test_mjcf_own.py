@@ -205,7 +205,7 @@ def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
     """The remedy has the name in the model."""
     texts = '<text name="device:sensor/cart velocity" data="grip"/>'
 
-    with pytest.raises(WorldError, match="a second device is called 'mujoco/grip'"):
+    with pytest.raises(WorldError, match="a second device 'mujoco/grip'"):
         load(FORCE + GRIP, VELOCITY, ("<custom>", f"<custom>{texts}"))
 
 

@@ -212,6 +212,11 @@ BAD_ROBOTS = {
         "a touch sensor that measures force",
     ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
+    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', a name that ROS does not take"),
+    "two names of one topic": (
+        ('"ir1"', '"touch-sensor"'),
+        "devices 'touch-sensor' and 'touch sensor', whose topics are both 'touch_sensor'",
+    ),
     "an axis of no length": (
         ("DEF IR", "HingeJoint { jointParameters HingeJointParameters { axis 0 0 0 } } DEF IR"),
         "a joint with an axis of length 0",

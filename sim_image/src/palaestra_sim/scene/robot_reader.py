@@ -26,7 +26,7 @@ from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place, YUp
-from palaestra_sim.scene.reading import ELSEWHERE, Reading
+from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
 from palaestra_sim.scene.robot_place import RobotPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
@@ -51,6 +51,9 @@ _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid", "Track"}
 _JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 
+_NAME_IT: Final = (
+    "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
+)
 _STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
@@ -343,8 +346,9 @@ class _RobotReader:
             forces=self._forces,
         )
         device: object = kind.read(part)
-        if not node.left_out and name in self._devices.rows and self._by_ros:
-            self._reading.lacks(node, f"a second device {name!r}", f"give it its own name, {ELSEWHERE}")
+        trouble = self._devices.trouble_with(name) if self._by_ros else None
+        if not node.left_out and trouble is not None:
+            self._reading.lacks(node, trouble, _NAME_IT)
         if node.left_out:
             return None
         self._devices.rows[name] = kind, device

@@ -17,6 +17,7 @@ from palaestra_sim.scene.devices.kind import Devices, Kind, Sample, Shaft
 from palaestra_sim.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.seam import ros_name
 from palaestra_sim.world.mjcf import LEFT_OUT, Description
 
 _ACTUATOR: Final = "actuator"
@@ -156,10 +157,10 @@ class _Fitter:
     def _add(self, section: str, kind: Kind[Any], device: Any, joint: int | None) -> bool:
         name: str = device.name
         devices = self._found.devices
-        if name in devices.rows:
+        if trouble := devices.trouble_with(name):
             key = f"device:{section}/{name.removeprefix(own.FOLDER)}"
             remedy = f'rename one: <text name="{key}" data="..."/> in <custom>'
-            error = self._description.error(section, name, f"a second device is called {name!r}", remedy)
+            error = self._description.error(section, name, trouble, remedy)
             self._found.refused.append(error)
             return False
         devices.rows[name] = kind, device
@@ -175,12 +176,14 @@ class _Fitter:
         """Return the name of a device, below `folder`; None if the robot shall not have it.
 
         Names in a model are unique in a section; a device whose name another section has too gets `other`.
+        MuJoCo allows all characters in names, ROS few.
         """
         key = f"{section}/{default}"
         self._known.add(key)
-        if key not in self._names and f"{folder}{default}" in self._found.devices.rows:
-            return f"{folder}{other}"
-        name = self._names.get(key, default)
+        plain = ros_name(default)
+        if key not in self._names and f"{folder}{plain}" in self._found.devices.rows:
+            return f"{folder}{ros_name(other)}"
+        name = self._names.get(key, plain)
         return None if name == LEFT_OUT else f"{folder}{name}"
 
     def _is_left_out(self, section: str, given: str, name: str, type_name: str) -> bool:

@@ -22,7 +22,7 @@ from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.sight import Glance
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.seam import Fields, Row, is_ros_name, topic_name
 
 
 class Device(Protocol):
@@ -336,6 +336,16 @@ class Devices:
     def sensors(self) -> Mapping[str, Source]:
         """The devices that have a value."""
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
+
+    def trouble_with(self, name: str) -> str | None:
+        """Return why no client could reach another device of that name; None: one could."""
+        if name in self.rows:
+            return f"a second device {name!r}"
+        if not is_ros_name(name):
+            return f"a device {name!r}, a name that ROS does not take"
+        path = topic_name(name)
+        same = next((known for known in self.rows if topic_name(known) == path), None)
+        return None if same is None else f"devices {same!r} and {name!r}, whose topics are both {path!r}"
 
     def of(self, kind: Kind[DeviceT]) -> tuple[DeviceT, ...]:
         """Return the devices of one type."""
