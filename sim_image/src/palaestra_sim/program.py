@@ -19,7 +19,7 @@ from pathlib import Path
 from palaestra_protocol.control import LEFT_OUT_FILE
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim import faults
-from palaestra_sim.errors import SimError, WorldError, WorldRefusedError
+from palaestra_sim.errors import SimError, StandInError, WorldError, WorldRefusedError
 from palaestra_sim.front.backend import Backend
 from palaestra_sim.front.left_out import write_left_out
 from palaestra_sim.front.options import FrontOptions
@@ -276,10 +276,15 @@ def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
 
     Raises:
         StandInError: a file is no such table.
+        OSError: it cannot be read.
     """
     table: dict[str, StandIn] = {}
     for file in files:
-        table.update(load_stand_ins(file.read_text("utf-8"), str(file)))
+        try:
+            text = read_bounded(file).decode()
+        except UnicodeDecodeError:
+            raise StandInError(f"{file}: this is not UTF-8; save it as UTF-8") from None
+        table.update(load_stand_ins(text, str(file)))
     return table
 
 

@@ -1,6 +1,7 @@
 """Problems of a machine or a job are found before anything is started."""
 
 import errno
+import os
 import zipfile
 
 import pytest
@@ -150,6 +151,17 @@ def test_the_error_for_a_missing_world_file_has_its_path(request_for):
     [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": "/no/such.wbt"})))
 
     assert "/no/such.wbt: No such file or directory" in problem
+
+
+def test_a_world_without_an_end_is_refused(request_for, tmp_path):
+    """It would fill the memory, or wait for somebody who writes."""
+    device, pipe = tmp_path / "device.wbt", tmp_path / "pipe.wbt"
+    device.symlink_to("/dev/zero")
+    os.mkfifo(pipe)
+
+    for path in (device, pipe):
+        [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": str(path)})))
+        assert f"{path}: is no regular file; name a world" in problem
 
 
 def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):

@@ -100,6 +100,16 @@ def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
     assert capsys.readouterr().err.endswith("my.wbt: is no regular file\n")
 
 
+def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
+    """A table may be a device without end too, or be saved by another editor."""
+    endless, latin = tmp_path / "endless.toml", tmp_path / "latin.toml"
+    endless.symlink_to("/dev/zero")
+    latin.write_bytes("# Stühle".encode("latin-1"))
+
+    for table, fact in ((endless, "is no regular file"), (latin, "this is not UTF-8; save it as UTF-8")):
+        assert check("", "--stand-ins", str(table)) == (2, [f"palaestra-stub: {table}: {fact}"])
+
+
 def test_what_is_left_out_by_choice_is_no_obstacle(check):
     """The check named --leave-out as the remedy, and with it printed the same."""
     world = "Colosseum { } Solid { boundingObject Cone { } }"

@@ -21,6 +21,7 @@ from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import WorldError
+from palaestra_sim.world.bounded import read_bounded
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
 PYTHON_PATH = "PYTHONPATH"
@@ -176,7 +177,7 @@ def _simulator_program(group: SimulatorGroup) -> str:
 
 def _problems(path: Path) -> Iterator[str]:
     try:
-        world.check(path.read_bytes(), str(path), relative_addresses=True)
+        world.check(read_bounded(path), str(path), relative_addresses=True)
     except OSError as error:
         yield f"{path}: {error.strerror}; name a world of this machine"
     except WorldError as error:

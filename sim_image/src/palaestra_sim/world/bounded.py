@@ -18,9 +18,9 @@ def read_bounded(path: Path) -> bytes:
     Raises:
         OSError: it cannot be read, is no regular file, or is too large.
     """
+    if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe waits for somebody who writes
+        raise OSError(errno.EINVAL, "is no regular file", str(path))
     with path.open("rb") as file:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise OSError(errno.EINVAL, "is no regular file", str(path))
         found = file.read(MOST_BYTES + 1)
     if len(found) > MOST_BYTES:
         raise OSError(errno.EFBIG, f"has more than {MOST_BYTES} bytes", str(path))
