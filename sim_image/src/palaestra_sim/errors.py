@@ -3,6 +3,7 @@
     SimError
     ├── WorldError              the .wbt file is wrong: retrying cannot help
     │   └── WorldRefusedError   it has several mistakes; the message lists them all
+    ├── RootError               a folder does not hold all that a world names: retrying cannot help
     ├── StandInError            a file of stand-ins is wrong: retrying cannot help
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
@@ -101,6 +102,10 @@ def _in_one_line(errors: list[WorldError]) -> str:
     lines = ", ".join(map(str, dict.fromkeys(error.line for error in errors)))
     fact = f"{first.fact} ({_count(errors)} places, in lines {lines})"
     return str(WorldError(first.world, first.line, first.column, fact, first.remedy))
+
+
+class RootError(SimError, ValueError):
+    """A folder does not hold a world and all that it names; the message begins with the folder."""
 
 
 class StandInError(SimError, ValueError):

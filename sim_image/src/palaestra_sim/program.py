@@ -63,13 +63,14 @@ class Program:
         name: of the program.
         description: for its help.
         physics: returns the physics of a world that is about to be read.
-        mjcf: returns the simulation of an MJCF world; None: it simulates none.
+        mjcf: returns the simulation of an MJCF world, whose files are in a folder or, with None, in the
+            nearest one that holds them all; None: it simulates none.
     """
 
     name: str
     description: str
     physics: Callable[[], Physics]
-    mjcf: Callable[[Path, Mode, LeaveOut], Backend] | None = None
+    mjcf: Callable[[Path, Mode, LeaveOut, Path | None], Backend] | None = None
 
     def run(self, arguments: Sequence[str] | None = None) -> int:
         """Run the simulator until a client or a signal ends it; return the exit code."""
@@ -116,7 +117,7 @@ class Program:
                 return wbt(world_path, mode)
             if self.mjcf is None:
                 raise WorldError(world_path.name, 1, 1, f"{self.name} simulates no MJCF", "use driver mujoco")
-            return self.mjcf(world_path, mode, leave_out)
+            return self.mjcf(world_path, mode, leave_out, options.root)
 
         return load
 
@@ -267,6 +268,13 @@ def _parser(program: Program) -> argparse.ArgumentParser:
         metavar="TYPE",
         help=f"leave out nodes of this type that cannot be simulated, or {_ALL} of them; repeatable",
     )
+    if program.mjcf is not None:
+        add(
+            "--root",
+            type=Path,
+            metavar="DIR",
+            help="folder that holds all files that a model of MuJoCo names (default: the nearest such one)",
+        )
     faults.add_options(add)
     return parser
 

@@ -44,6 +44,7 @@ WORLDS = st.sampled_from(
         {"inline": "#VRML_SIM R2023b utf8\nWorldInfo { }\n"},
         {"configMap": {"name": "worlds", "key": "hall.wbt"}},
         {"file": "/worlds/hall.wbt"},
+        {"file": "/lab/worlds/hall.wbt", "root": "/lab"},
     ]
 )
 DRIVERS = st.sampled_from(

@@ -91,6 +91,20 @@ BROKEN = {
             "set one of them"
         ),
     ),
+    "a root that is not above the world": (
+        {"simulators.1.world": {"file": "/worlds/hall.wbt", "root": "/world"}},
+        (
+            "spec.simulators[1].world: has a root that is not above file; "
+            "set root to a folder above file, or remove it"
+        ),
+    ),
+    "a root without a file": (
+        {"simulators.1.world": {"builtin": "arena", "root": "/worlds"}},
+        (
+            "spec.simulators[1].world: has a root that is not above file; "
+            "set root to a folder above file, or remove it"
+        ),
+    ),
     "a variable with two values": (
         {"trainer.env": [{"name": "A", "value": "1", "secretKeyRef": {"name": "keys", "key": "a"}}]},
         "spec.trainer.env[0]: needs exactly one of value and secretKeyRef; set one of them",
@@ -283,6 +297,7 @@ KEPT = {
     "recycled by its age alone": {"simulators.0.recycle": {"afterMinutes": 30}},
     "all of a group are enough": {"simulators.0.count": 2, "simulators.0.minSimulators": 2},
     "a world in the image": {"simulators.0.world": {"file": "/worlds/hall.wbt"}},
+    "a world below a root": {"simulators.0.world": {"file": "/lab/worlds/hall.wbt", "root": "/lab"}},
     "a world in the job": {"simulators.0.world": {"inline": "#VRML_SIM R2023b utf8\n"}},
     "a world in a ConfigMap": {"simulators.0.world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}},
     "an empty variable": {"trainer.env": [{"name": "A", "value": ""}]},

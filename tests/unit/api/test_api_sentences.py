@@ -97,6 +97,9 @@ SENTENCES = [
     ({"simulators.0.world": {"file": "hall.wbt"}},
      ('spec.simulators[0].world.file: "hall.wbt" is not the path of a world; '
      "give the absolute path of a .wbt or .xml file")),
+    ({"simulators.0.world": {"file": "/lab/hall.wbt", "root": "/lab/"}},
+     ('spec.simulators[0].world.root: "/lab/" is not the path of a folder; '
+      "give an absolute path without a / at its end")),
     ({"trainer.environment.id": "Move To Target"},
      ('spec.trainer.environment.id: "Move To Target" is not the id of an environment; '
      "write it as in gymnasium's registry, such as MoveToTargetEnv-v0")),

@@ -164,6 +164,21 @@ def test_a_world_without_an_end_is_refused(request_for, tmp_path):
         assert f"{path}: is no regular file; name a world" in problem
 
 
+def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, tmp_path):
+    """The sidecar refused it too, but only after the start, and was started again for a minute."""
+    world = tmp_path / "lab" / "worlds" / "arm.xml"
+    world.parent.mkdir(parents=True)
+    (tmp_path / "arm.xml").write_text("<mujocoinclude/>")
+    world.write_text('<mujoco><include file="../../arm.xml"/></mujoco>')
+    group = collecting(world={"file": str(world), "root": str(tmp_path / "lab")})
+
+    [problem] = preflight.worlds_are_right(request_for(**group))
+
+    assert problem.startswith(
+        f"spec.simulators[0].world.file: {world}:1:9: '../../arm.xml' leads to {tmp_path}"
+    )
+
+
 def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
     """It would end the run in the middle of a checkpoint."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)

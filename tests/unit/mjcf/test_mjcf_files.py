@@ -71,13 +71,55 @@ def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
         load_mjcf(world(head, files={"defaults.xml": inner}), Mode.FAST)
 
 
-def test_a_file_of_elements_outside_of_the_project_is_refused(world, tmp_path):
-    """Also if it is named by an included one."""
-    (tmp_path / "secret.xml").write_text("<mujocoinclude/>")
-    inner = '<mujocoinclude><include file="../../secret.xml"/></mujocoinclude>'
+OUTSIDE = '<mujocoinclude><body name="outside"/></mujocoinclude>'
 
-    with pytest.raises(WorldError, match=r"secret\.xml' is outside of the project of the world"):
-        load_mjcf(world('<include file="inner.xml"/>', files={"inner.xml": inner}), Mode.FAST)
+
+def test_the_project_is_the_nearest_folder_that_holds_all_files(world, tmp_path):
+    """Models of dm_control and gymnasium-robotics name files up to four folders above their own."""
+    (tmp_path / "shared.xml").write_text(OUTSIDE)
+    inner = '<mujocoinclude><include file="../../shared.xml"/></mujocoinclude>'
+    path = world(ARGUMENTS.format(""), '<include file="inner.xml"/>', {"inner.xml": inner})
+
+    assert [it.name for it in load_mjcf(path, Mode.FAST).robots] == ["cell"]
+
+
+def test_a_file_outside_of_the_root_that_the_user_names_is_refused(world, tmp_path):
+    """With the file that names it, and what to do."""
+    (tmp_path / "shared.xml").write_text(OUTSIDE)
+    inner = '<mujocoinclude><include file="../../shared.xml"/></mujocoinclude>'
+    path = world("", '<include file="inner.xml"/>', {"inner.xml": inner})
+    root = tmp_path / "project"
+
+    with pytest.raises(
+        WorldError, match=rf"inner\.xml:1:16: .*outside of {root}; copy it .* or name a folder"
+    ):
+        load_mjcf(path, Mode.FAST, root=root)
+    load_mjcf(world(ARGUMENTS.format(""), '<include file="inner.xml"/>'), Mode.FAST, root=tmp_path)
+
+
+def test_the_whole_file_system_is_no_project(world):
+    """A model of a stranger must not read files of the pod."""
+    path = world("", f'<include file="{"../" * 20}etc/passwd"/>')
+
+    with pytest.raises(WorldError, match="etc/passwd' leads to the root of the file system; copy it"):
+        load_mjcf(path, Mode.FAST)
+
+
+@pytest.mark.parametrize("element", ['<include file="inner.xml"/>', '<geom type="mesh" mesh="inner"/>'])
+def test_a_link_out_of_the_project_is_refused(world, tmp_path, element):
+    """As a name that leads there is; one inside is fine, such as those of a mounted ConfigMap."""
+    (tmp_path / "shared.xml").write_text(OUTSIDE)
+    path = world(f'<asset><mesh name="inner" file="inner.xml"/></asset>{ARGUMENTS.format("")}', element)
+    (path.parent / "inner.xml").symlink_to(tmp_path / "shared.xml")
+
+    with pytest.raises(WorldError, match=rf"'inner\.xml' leads to {tmp_path}/shared\.xml, which is outside"):
+        load_mjcf(path, Mode.FAST)
+
+    (path.parent / "..data.xml").write_text(OUTSIDE)
+    (path.parent / "inner.xml").unlink()
+    (path.parent / "inner.xml").symlink_to("..data.xml")
+    if "include" in element:
+        load_mjcf(world(ARGUMENTS.format(""), element), Mode.FAST)
 
 
 def test_a_rounded_timestep_is_made_exact(world):

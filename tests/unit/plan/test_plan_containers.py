@@ -212,7 +212,7 @@ def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
         "image": "my:1",
         "command": ["sim", OF_POD],
         "options": [OF_POD],
-        "world": {"file": f"/worlds/{OF_POD}/hall.wbt"},
+        "world": {"file": f"/worlds/{OF_POD}/worlds/hall.wbt", "root": f"/worlds/{OF_POD}"},
         "env": env,
     }
     job = {"simulators": [own], "trainer": {"command": ["python", OF_POD], "env": env}}
@@ -229,7 +229,7 @@ def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
             *(one.get("value", "") for one in each.get("env", ())),
         )
     ]
-    assert sum(OF_POD in text for text in texts) == 6
+    assert sum(OF_POD in text for text in texts) == 7
     assert not [text for text in texts if OF_POD in text.replace("$$", "")]
 
 

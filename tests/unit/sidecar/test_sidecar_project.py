@@ -182,9 +182,55 @@ def test_a_work_folder_around_the_project_of_the_world_is_refused(source, tmp_pa
     assert [path.name for path in world.parent.iterdir()] == ["arena.wbt"]
 
 
+PROTO = BALL.replace(b"utf8\n", b'utf8\nEXTERNPROTO "../../shared/Box.proto"\n')
+MODEL = b"""<mujoco><worldbody><include file="../../shared/Box.proto"/></worldbody>
+<actuator><motor joint="hinge"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("content", [PROTO, MODEL], ids=["wbt", "mjcf"])
+def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_path, content) -> None:
+    """Packages share PROTOs and meshes among several projects."""
+    world = source("shared/Box.proto", "lab/x", world="source/lab/worlds/arena.wbt", content=content)
+    (tmp_path / "source/shared/Box.proto").write_text("<mujocoinclude/>")
+
+    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True)
+
+    assert made.parent == tmp_path / "work" / "project" / "lab" / "worlds"
+    assert read(made, "../../shared/Box.proto") == "<mujocoinclude/>"
+    assert read(made, "../x") == "lab/x"
+    assert preparation.root_of(world, None) == tmp_path / "source"
+
+
+@pytest.mark.parametrize(
+    ("root", "refusal"),
+    [
+        ("source/lab", "source/lab: the world names files above it; name "),
+        ("source/shared", r"source/shared: is not above .*arena\.wbt; name a folder that holds the world"),
+    ],
+)
+def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusal) -> None:
+    """The simulator would not find a file, and not say why."""
+    world = source("shared/Box.proto", world="source/lab/worlds/arena.wbt", content=PROTO)
+
+    with pytest.raises(SidecarError, match=f"^--root: {tmp_path}/{refusal}"):
+        preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path / root)
+    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path)
+    assert made.parent == tmp_path / "work" / "project" / "source" / "lab" / "worlds"
+
+
+def test_the_world_in_its_own_root_has_only_its_neighbors(source, tmp_path) -> None:
+    """A person says that nothing above belongs to it."""
+    world = source("worlds/map.json", "secret", content=RELATIVE)
+
+    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=world.parent)
+
+    assert read(made, "map.json") == "worlds/map.json"
+    assert [it.name for it in (tmp_path / "work" / "project").iterdir()] == ["worlds"]
+
+
 def test_of_the_root_only_what_is_not_the_system_s_is_linked(tmp_path) -> None:
     """A world in /worlds of an image has its project in /."""
-    folder = project.lay_out(Path("/usr/arena.wbt"), tmp_path / "project", linked=True)
+    folder = project.lay_out(Path("/usr/arena.wbt"), tmp_path / "project", Path("/"), linked=True)
 
     assert (folder / "bin").is_symlink()
     assert not {"etc", "proc", "tmp", "var"} & {path.name for path in (tmp_path / "project").iterdir()}
@@ -192,7 +238,7 @@ def test_of_the_root_only_what_is_not_the_system_s_is_linked(tmp_path) -> None:
 
 def test_a_world_in_the_root_has_nothing_outside(tmp_path) -> None:
     """The root has no parent, so the folder of this world is in no project."""
-    folder = project.lay_out(Path("/arena.wbt"), tmp_path / "project", linked=True)
+    folder = project.lay_out(Path("/arena.wbt"), tmp_path / "project", Path("/"), linked=True)
 
     assert not project.has_project(Path("/arena.wbt"))
     assert [path.name for path in (tmp_path / "project").iterdir()] == ["worlds"]

@@ -36,6 +36,7 @@ QUANTITY = "^[0-9]+([.][0-9]+)?(m|k|M|G|T|P|Ki|Mi|Gi|Ti|Pi)?$"
 MEMORY = "^[1-9][0-9]*(M|G|T|Mi|Gi|Ti)$"
 FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
 WORLD_FILE = "^/.+[.](wbt|xml)$"
+ABSOLUTE_FOLDER = "^(/[^/]+)+$"
 ALGORITHMS = (
     "DQN",
     "PPO",
@@ -74,6 +75,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     LABEL_VALUE: ("the value of a label", "use letters, digits, '-', '_' and '.'"),
     FOLDER: ("the name of a folder", "use letters, digits, '-', '_' and '.', no '/'"),
     WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt or .xml file"),
+    ABSOLUTE_FOLDER: ("the path of a folder", "give an absolute path without a / at its end"),
     ALGORITHM: ("an algorithm", f"use {', '.join(ALGORITHMS)} or module:Class"),
     POLICY: ("a policy", "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class"),
     CLASS_NAME: ("the name of a class", "write it as module:Class"),

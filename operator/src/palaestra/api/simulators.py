@@ -7,6 +7,7 @@ from pydantic import Field
 
 from palaestra.api.container import Environment, Resources
 from palaestra.api.fields import (
+    ABSOLUTE_FOLDER,
     MAY_CHANGE,
     WORLD_FILE,
     Count,
@@ -83,7 +84,18 @@ class World(ApiModel):
     run`: on this machine). PROTOs, meshes and textures are beside it; the rest of its Webots project, such as
     `controllers/`, is beside its folder."""
 
+    root: Annotated[str, Field(max_length=1024, pattern=ABSOLUTE_FOLDER)] | None = None
+    """Absolute path of a folder above `file`, with all files that the world names. A model of MuJoCo that
+    names one outside, also by a link, is refused. Absent: the nearest folder that holds all of them."""
+
     rules = (
+        Rule(
+            holds=lambda world: (
+                world.root is None or (world.file is not None and world.file.startswith(f"{world.root}/"))
+            ),
+            cel='!has(self.root) || (has(self.file) && self.file.startsWith(self.root + "/"))',
+            message="has a root that is not above file; set root to a folder above file, or remove it",
+        ),
         Rule(
             holds=lambda world: (
                 sum(

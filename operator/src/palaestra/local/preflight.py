@@ -20,7 +20,7 @@ from palaestra.local.rundir import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
-from palaestra_sim.errors import WorldError
+from palaestra_sim.errors import RootError, WorldError
 from palaestra_sim.world.bounded import read_bounded
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
@@ -100,8 +100,9 @@ def worlds_are_right(request: Request) -> Iterator[str]:
     """Each world in a file is correct; it is read here too, although the sidecar generates it."""
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
-            field = f"spec.simulators[{index}].world.file"
-            yield from (f"{field}: {problem}" for problem in _problems(Path(group.world.file)))
+            field = f"spec.simulators[{index}].world"
+            root = None if group.world.root is None else Path(group.world.root)
+            yield from (f"{field}.{problem}" for problem in _problems(Path(group.world.file), root))
 
 
 def initial_policy_is_there(request: Request) -> Iterator[str]:
@@ -175,10 +176,14 @@ def _simulator_program(group: SimulatorGroup) -> str:
     return group.command[0] if group.driver is Driver.COMMAND else PROGRAMS[group.driver]
 
 
-def _problems(path: Path) -> Iterator[str]:
+def _problems(path: Path, root: Path | None) -> Iterator[str]:
     try:
-        world.check(read_bounded(path), str(path), relative_addresses=True)
+        source = read_bounded(path)
+        world.check(source, str(path), relative_addresses=True)
+        world.root_of(world.placed(path), source, root)
     except OSError as error:
-        yield f"{path}: {error.strerror}; name a world of this machine"
+        yield f"file: {error.filename}: {error.strerror}; name a world of this machine"
     except WorldError as error:
-        yield str(error)
+        yield f"file: {error}"
+    except RootError as error:
+        yield f"root: {error}"

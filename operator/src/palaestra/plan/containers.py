@@ -88,6 +88,7 @@ def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> lis
     words = [
         f"--driver={group.driver.value}",
         f"--world={world}",
+        *((f"--root={group.world.root}",) if group.world.root is not None else ()),
         f"--work={replica.places(simulator.container).scratch}/work",
         f"--control={LOOPBACK}:{layout.ports.control[simulator.place]}",
         f"--health={layout.health_host}:{layout.ports.health[simulator.place]}",

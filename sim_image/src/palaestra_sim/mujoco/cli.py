@@ -26,7 +26,7 @@ def _physics() -> Physics:
     return physics
 
 
-def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut) -> Backend:
+def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut, root: Path | None) -> Backend:
     """Return the simulation of an MJCF world.
 
     Raises:
@@ -35,7 +35,7 @@ def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut) -> Backend:
         OSError: it cannot be read.
     """
     loading = importlib.import_module("palaestra_sim.mujoco.mjcf.loading")
-    simulation: Backend = loading.load(world_path, mode, leave_out)
+    simulation: Backend = loading.load(world_path, mode, leave_out, root=root)
     return simulation
 
 

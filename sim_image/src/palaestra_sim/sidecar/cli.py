@@ -108,7 +108,10 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     """Return the simulator of one slot."""
     world = _world(given, slot)
     robots = preparation.described(preparation.read(world), str(world))
-    launch = Launch(world=world, options=given.option, program=given.program)
+    root = (
+        given.root if world == Path(given.world).absolute() else preparation.root_of(given.world, given.root)
+    )
+    launch = Launch(world=world, root=root, options=given.option, program=given.program)
     left_out = _left_out(given, world)
     own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})
     started = command(driver, launch, os.environ | own)
@@ -139,7 +142,7 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
     work, as_project = given.work.absolute(), Driver(given.driver) is Driver.WEBOTS
     if given.job is None:
-        return preparation.renamed(given.world, work, given.suffix, as_project=as_project)
+        return preparation.renamed(given.world, work, given.suffix, as_project=as_project, root=given.root)
     identity = RunIdentity(
         job=given.job,
         namespace=given.namespace,
@@ -150,7 +153,7 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         slot=slot,
     )
     clock = given.clock and slot == preparation.SLOTS[0]
-    return preparation.named(given.world, work, identity, clock=clock, as_project=as_project)
+    return preparation.named(given.world, work, identity, clock=clock, as_project=as_project, root=given.root)
 
 
 def _left_out(given: argparse.Namespace, world: Path) -> Path | None:

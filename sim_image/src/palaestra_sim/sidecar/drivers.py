@@ -31,9 +31,13 @@ class Driver(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """The parts of a start: a world, options of the simulator, and its program for `command`."""
+    """The parts of a start: a world, options of the simulator, and its program for `command`.
+
+    `root` is the folder that the world's files are in; None: the simulator looks for it.
+    """
 
     world: Path
+    root: Path | None = None
     options: Sequence[str] = ()
     program: Sequence[str] = ()
 
@@ -54,7 +58,8 @@ def _stub(launch: Launch) -> list[str]:
 
 
 def _mujoco(launch: Launch) -> list[str]:
-    return ["palaestra-mujoco", str(launch.world), *launch.options]
+    root = [] if launch.root is None else [f"--root={launch.root}"]
+    return ["palaestra-mujoco", str(launch.world), *root, *launch.options]
 
 
 def _webots(launch: Launch) -> list[str]:

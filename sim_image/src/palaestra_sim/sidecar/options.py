@@ -62,6 +62,12 @@ def _add_simulator(parser: argparse.ArgumentParser) -> None:
         "--world", type=located, required=True, metavar="WORLD", help="a file, or the name of a shipped world"
     )
     group.add_argument(
+        "--root",
+        type=Path,
+        metavar="DIR",
+        help="a folder above the world, with all that it names; default: the nearest, or its Webots project",
+    )
+    group.add_argument(
         "--option", action="append", default=[], metavar="X", help="option for the simulator; repeatable"
     )
     group.add_argument(

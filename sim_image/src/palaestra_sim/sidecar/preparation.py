@@ -11,9 +11,10 @@ from functools import partial
 from pathlib import Path
 
 from palaestra_protocol.control import RobotName
-from palaestra_sim.errors import SidecarError, WorldError
+from palaestra_sim.errors import RootError, SidecarError, WorldError
 from palaestra_sim.sidecar import project
-from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots, suffix
+from palaestra_sim.world import RunIdentity, builtin_path, generate, placed, rename, robots, suffix
+from palaestra_sim.world import root_of as root_around
 from palaestra_sim.world.bounded import read_bounded
 
 SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
@@ -39,11 +40,20 @@ def read(world: Path) -> bytes:
         raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt or .xml file") from error
 
 
-def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool, as_project: bool = False) -> Path:
+def named(
+    world: Path,
+    work: Path,
+    identity: RunIdentity,
+    *,
+    clock: bool,
+    as_project: bool = False,
+    root: Path | None = None,
+) -> Path:
     """Write this simulator's world, made from `world`, into the folder `work`; return its path.
 
     With `as_project`, or if the world refers to files beside it, it is written into a Webots project in
-    `work`, with links to the files around `world`.
+    `work`, with links to the files around `world`. These go up to `root`; None: to the nearest folder that
+    holds all files.
 
     Raises:
         WorldError: the world is wrong.
@@ -51,32 +61,53 @@ def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool, as_pro
     """
     source = read(world)
     make = partial(generate, source, identity, clock=clock, name=str(world))
-    return _written(world, work / file_name(identity, suffix(source)), make, as_project=as_project)
+    path = work / file_name(identity, suffix(source))
+    return _written(world, path, make, as_project=as_project, root=root)
 
 
-def renamed(world: Path, work: Path, ending: str, *, as_project: bool = False) -> Path:
+def renamed(
+    world: Path, work: Path, ending: str, *, as_project: bool = False, root: Path | None = None
+) -> Path:
     """Write a copy of `world` with `ending` appended to its ROS names into `work`; return its path.
 
-    `as_project` is as for `named`.
+    `as_project` and `root` are as for `named`.
 
     Raises:
         WorldError, SidecarError: as `named` does.
     """
     source = read(world)
     make = partial(rename, source, ending, name=str(world))
-    return _written(world, work / f"{world.stem}{ending}{suffix(source)}", make, as_project=as_project)
+    path = work / f"{world.stem}{ending}{suffix(source)}"
+    return _written(world, path, make, as_project=as_project, root=root)
 
 
-def _written(world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool) -> Path:
+def root_of(world: Path, given: Path | None) -> Path:
+    """Return the folder around `world` that holds all that it names: `given`, or the nearest one.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    try:
+        return root_around(placed(world), read(world), given)
+    except RootError as error:
+        raise SidecarError(f"--root: {error}") from error
+    except OSError as error:
+        raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
+
+
+def _written(
+    world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool, root: Path | None
+) -> Path:
     """Write the result of `make` for `world` to `path`, or to a project in the folder of `path`."""
-    source, work = project.placed(world), path.parent
+    source, work = placed(world), path.parent
     try:
         generated, linked = make(), as_project and project.has_project(source)
     except WorldError:
         generated, linked = make(relative_addresses=True), True
+    around = root_of(world, root)
     try:
         if as_project or linked:
-            path = project.lay_out(source, work / _PROJECT, linked=linked) / path.name
+            path = project.lay_out(source, work / _PROJECT, around, linked=linked) / path.name
         return _write_whole(path, generated)
     except OSError as error:
         raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error

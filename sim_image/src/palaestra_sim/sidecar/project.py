@@ -2,17 +2,18 @@
 
 Webots takes the parent of a world's folder as its project, and looks there for `controllers/<name>/`, PROTOs
 and plugins. If a controller is missing, it starts `<generic>`, with a warning only. So the generated world
-gets a folder like that of its source, with links to everything beside the source and beside its folder.
+gets a folder like that of its source, with links to everything beside the source and beside its folder. A
+world that names files above its project gets the folders up to them, with such links in each.
 
 A world from a ConfigMap has no project: the files beside its folder belong to others and are not linked.
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from palaestra_sim.errors import SidecarError
-from palaestra_sim.world import own_controllers
+from palaestra_sim.world import own_controllers, placed
 
 # Source: Webots' guide, "The Standard File Hierarchy of a Project". One of them makes a folder a project.
 FOLDERS = ("controllers", "libraries", "plugins", "protos")
@@ -27,39 +28,36 @@ _EXTRA_PROJECTS = "WEBOTS_EXTRA_PROJECT_PATH"  # a list, as PATH
 _MOST_NAMED = 20  # robots in a warning, which is one line of the log
 
 
-def placed(world: Path) -> Path:
-    """Return the absolute path of a world; its parents are its folder and its project."""
-    return world.parent.resolve() / world.name if ".." in world.parts else world.absolute()
-
-
 def has_project(world: Path) -> bool:
     """Return whether a world, given by its absolute path, is in a Webots project."""
     root = world.parent.parent
     return root != world.parent and any(_is_folder(root / name) for name in FOLDERS)
 
 
-def lay_out(world: Path, project: Path, *, linked: bool) -> Path:
+def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
     """Return the folder for a world that is made from `world`, in the folder `project`.
 
-    With `linked`, everything beside `world` and beside its folder is linked at the same relative places.
-    Links of an earlier start are renewed. Both paths are absolute.
+    With `linked`, everything that is beside `world`, and beside each folder from it up to `root`, is linked
+    at the same relative place. Links of an earlier start are renewed. All paths are absolute.
 
     Raises:
         SidecarError: `project` is the project of `world` itself, or that cannot be read.
         OSError: the folder cannot be written.
     """
-    folder = project / (world.parent.name or "worlds")
-    if _same(project, world.parent.parent) or (not folder.is_symlink() and _same(folder, world.parent)):
+    folders = dict(_folders(world, project, root))
+    *_, folder = folders
+    if any(not made.is_symlink() and _same(made, source) for made, source in folders.items()):
         raise SidecarError(f"--work: {project.parent}: has the project of the world; give another folder")
     try:
-        wanted = dict(_links(world, folder)) if linked else {}
+        wanted = dict(_links(folders)) if linked else {}
     except OSError as error:
         raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
-    if folder.is_symlink():
-        folder.unlink()  # it was beside the folder of another world of this project
-    folder.mkdir(parents=True, exist_ok=True)
-    for link in (*project.iterdir(), *folder.iterdir()):
-        if link not in wanted and _is_ours(link, world):
+    for made in folders:
+        if made.is_symlink():
+            made.unlink()  # it was beside the folder of another world of this project
+        made.mkdir(parents=True, exist_ok=True)
+    for link in [link for made in folders for link in made.iterdir()]:
+        if link not in wanted and _is_ours(link, folders.values()):
             link.unlink()
     for link, target in wanted.items():
         _link(link, target)
@@ -95,14 +93,23 @@ def missing_controllers(world: Path, source: bytes, environment: Mapping[str, st
     )
 
 
-def _links(world: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
+def _folders(world: Path, project: Path, root: Path) -> Iterator[tuple[Path, Path]]:
+    """Yield the folders to make for a world, from `project` to its own, each with the one it stands for."""
+    names = world.parent.relative_to(root).parts
+    if not names:  # no project is around it
+        yield project / "worlds", world.parent
+        return
+    for count in range(len(names) + 1):
+        yield project.joinpath(*names[:count]), root.joinpath(*names[:count])
+
+
+def _links(folders: Mapping[Path, Path]) -> Iterator[tuple[Path, Path]]:
     """Yield each link around the folder of the generated world, with its target."""
-    source = world.parent
-    for neighbor in _inside(source.parent, folder) if source.parent != source else ():
-        if neighbor != source:
-            yield folder.parent / neighbor.name, neighbor
-    for neighbor in _inside(source, folder):
-        yield folder / neighbor.name, neighbor
+    *_, own = folders
+    for made, source in folders.items():
+        for neighbor in _inside(source, own):
+            if made / neighbor.name not in folders:
+                yield made / neighbor.name, neighbor
 
 
 def _inside(source: Path, folder: Path) -> Iterator[Path]:
@@ -113,12 +120,12 @@ def _inside(source: Path, folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _is_ours(link: Path, world: Path) -> bool:
-    """Return whether an earlier start of this container made this link."""
+def _is_ours(link: Path, sources: Collection[Path]) -> bool:
+    """Return whether an earlier start of this container made this link to what is in one of `sources`."""
     if not link.is_symlink():
         return False
     target = link.readlink()
-    return target.name == link.name and target.parent in {world.parent, world.parent.parent}
+    return target.name == link.name and target.parent in sources
 
 
 def _link(link: Path, target: Path) -> None:

@@ -1,6 +1,6 @@
 """Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
-Pure: bytes in, bytes out. No clock, no network, and no file except what ships and the PROTOs beside a world.
+Pure: bytes in, bytes out. No clock, no network, and no file except what ships and what a world names.
 
     parse(source)                              the tree of a `.wbt` world
     check(source)                              raises unless every simulator can have a world of it
@@ -8,6 +8,7 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
     rename(source, "_2")                       the world of one more, beside those that run
     robots(source)                             the robots in it that speak ROS
     own_controllers(source)                    the robots whose controllers are programs of their project
+    root_of(path, source)                      the folder around it that holds all that it names
     suffix(source)                             how its file ends: ".wbt" or ".xml"
     ros_name(identity, "robotino")             the name that such a robot gets
     builtin("arena")                           a world that ships
@@ -21,12 +22,22 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
 from palaestra_sim.errors import StandInError, UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
 from palaestra_sim.world.externs import Protos, local_protos
-from palaestra_sim.world.formats import MJCF, WBT, check, generate, own_controllers, rename, robots, suffix
+from palaestra_sim.world.formats import (
+    MJCF,
+    WBT,
+    check,
+    generate,
+    own_controllers,
+    rename,
+    robots,
+    suffix,
+)
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.parts import Part
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
 from palaestra_sim.world.reader import parse, parse_nodes
 from palaestra_sim.world.robots import WorldRobot
+from palaestra_sim.world.root import placed, root_of
 from palaestra_sim.world.stand_ins import StandIn, expand, load_stand_ins
 from palaestra_sim.world.stand_ins import shipped as shipped_stand_ins
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
@@ -62,8 +73,10 @@ __all__ = [
     "parse",
     "parse_nodes",
     "parse_proto",
+    "placed",
     "rename",
     "robots",
+    "root_of",
     "ros_name",
     "shipped_stand_ins",
     "suffix",

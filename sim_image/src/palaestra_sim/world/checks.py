@@ -111,6 +111,16 @@ def relative_address(candidate: Candidate) -> Iterator[WorldError]:
             yield candidate.source.error(token.start, fact, remedy)
 
 
+def relative_addresses(source: bytes, name: str) -> tuple[str, ...]:
+    """Return the addresses in a world that count from its folder.
+
+    Raises:
+        WorldError: the world cannot be read.
+    """
+    addresses = map(unquoted, _addresses(parse(source, name)))
+    return tuple(address for address in addresses if not _ABSOLUTE.match(address))
+
+
 def _is_robot(node: Node) -> bool:
     return node.type_name == "Robot" or "controller" in node.fields
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import posixpath
 import re
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,15 +23,16 @@ from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.world import mjcf
 from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.mjcf import Description
-from palaestra_sim.world.mjcf.elements import Element
-from palaestra_sim.world.source import Source
 
 _LINE: Final = re.compile(r"\bline (\d+)")
-_INSIDE: Final = "put it beside the world, or beside the folder of the world"
 
 
-def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> MjcfSimulation:
+def load(
+    world_path: Path, mode: Mode, leave_out: LeaveOut | None = None, *, root: Path | None = None
+) -> MjcfSimulation:
     """Return the simulation of an MJCF world, which runs in that mode at first.
+
+    The model may name files in `root`; None: in the nearest folder that holds all of them.
 
     Raises:
         WorldError: the file is wrong, or has something that no client could use.
@@ -44,10 +42,10 @@ def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> Mjc
     leave_out = leave_out or LeaveOut()
     mjcf.check(source, world_path.name, relative_addresses=True)
     description = mjcf.describe(source, world_path.name)
-    collected = _Parts(world_path.absolute().parent, description)
-    if error := refusal(chain(collected.read(), collected.beside_the_root())):
+    project = mjcf.Project(world_path, description, root)
+    if error := refusal(project.read()) or refusal(project.strays()):
         raise error
-    description = mjcf.with_parts(description, collected.roots)
+    description = mjcf.with_parts(description, project.roots)
     compiled = _compiled(world_path)
     model = Model(compiled, _keyframe(compiled, description))
     basic_step_ms = _basic_step_ms(compiled, description)
@@ -91,63 +89,6 @@ def _compiled(world_path: Path) -> Any:
         line = _LINE.search(text)
         remedy = "correct the model; MuJoCo's XML reference has every element"
         raise WorldError(world_path.name, int(line[1]) if line else 1, 1, text, remedy) from None
-
-
-class _Parts:
-    """The other files of which MuJoCo reads elements, and what they include.
-
-    MuJoCo looks for such a file beside the world, then in the folders that the world names, then beside the
-    file that includes it.
-
-    Attributes:
-        roots: the elements of the files that were read.
-    """
-
-    def __init__(self, folder: Path, description: Description) -> None:
-        self.roots: list[Element] = []
-        self._folder = folder
-        self._description = description
-        self._named = ["", *(path for _, path in mjcf.named_folders(description.root))]
-
-    def read(self) -> Iterator[WorldError]:
-        """Read all files; yield what is wrong with them, and with what they include."""
-        description = self._description
-        waiting = [("", description.source, description.root)]
-        seen: set[Path] = set()
-        while waiting:
-            beside, source, root = waiting.pop()
-            for part in mjcf.parts(root):
-                found = self._found(part, beside)
-                if found is None:
-                    fact = f"the file {part!r}, of which the model consists too, is missing"
-                    yield source.error(root.start, fact, "put it beside the world, or beside this file")
-                elif not mjcf.in_project(found):
-                    yield source.error(
-                        root.start, f"{part!r} is outside of the project of the world", _INSIDE
-                    )
-                elif (file := self._folder / found) not in seen:
-                    seen.add(file)
-                    inner = Source(data=read_bounded(file), name=part)
-                    elements = mjcf.read(inner)
-                    self.roots.append(elements)
-                    yield from mjcf.strays(inner, elements, self._named, includes=False)
-                    yield from mjcf.growing(inner, elements)
-                    waiting.append((posixpath.dirname(found), inner, elements))
-
-    def beside_the_root(self) -> Iterator[WorldError]:
-        """Yield what leaves the folder of a world whose project would be the whole file system."""
-        if self._folder.parent.parent != self._folder.parent:
-            return
-        description = self._description
-        for element, path in (*mjcf.named_files(description.root), *mjcf.named_folders(description.root)):
-            if not mjcf.in_project(posixpath.join("..", path)):
-                fact = f"{path!r} is outside of the folder of the world"
-                yield description.source.error(element.start, fact, "put the world one folder deeper")
-
-    def _found(self, part: str, beside: str) -> str | None:
-        """Return the path of the first file that there is, from the world's folder."""
-        paths = (posixpath.normpath(posixpath.join(at, part)) for at in (*self._named, beside))
-        return next((path for path in paths if (self._folder / path).is_file()), None)
 
 
 def _keyframe(model: Any, description: Description) -> int | None:

@@ -1,10 +1,11 @@
 """Worlds in MJCF, the XML of MuJoCo: the description of the robot, checks, and names.
 
-Pure text, as all of `world`: MuJoCo itself is not needed to check or to name such a world.
+MuJoCo itself is not needed to check or to name such a world. All but `project` is pure text.
 
 - `elements`: the elements of an XML file with their places
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
+- `project`: these files on a disk, and the folder that holds them
 - `growing`: elements that would take all memory
 - `checks`: the mistakes that make a world unusable
 - `naming`: the world of one simulator
@@ -21,29 +22,21 @@ from palaestra_sim.world.mjcf.description import (
     whole_step_ms,
     with_parts,
 )
-from palaestra_sim.world.mjcf.elements import read
-from palaestra_sim.world.mjcf.files import in_project, named_files, named_folders, parts, strays
-from palaestra_sim.world.mjcf.growing import growing
 from palaestra_sim.world.mjcf.naming import generate, rename, robots
+from palaestra_sim.world.mjcf.project import Project
 
 __all__ = [
     "LEFT_OUT",
     "Description",
+    "Project",
     "check",
     "describe",
     "fits",
     "fitting_timesteps_s",
     "generate",
-    "growing",
-    "in_project",
     "is_mjcf",
-    "named_files",
-    "named_folders",
-    "parts",
-    "read",
     "rename",
     "robots",
-    "strays",
     "whole_step_ms",
     "with_parts",
 ]

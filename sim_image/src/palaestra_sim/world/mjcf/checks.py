@@ -22,8 +22,9 @@ from palaestra_sim.world.mjcf.description import (
     fitting_timesteps_s,
     whole_step_ms,
 )
-from palaestra_sim.world.mjcf.files import in_project, named_files, parts, strays
+from palaestra_sim.world.mjcf.files import absolutes, named_files, parts
 from palaestra_sim.world.mjcf.growing import growing
+from palaestra_sim.world.paths import is_relative
 
 _ROS_REMAPPING: Final = re.compile(r"__\w+:=")
 
@@ -105,15 +106,15 @@ def too_large(found: Description) -> Iterator[WorldError]:
     yield from growing(found.source, found.root)
 
 
-def files_elsewhere(found: Description) -> Iterator[WorldError]:
-    """A name of a file leads out of the project of the world."""
-    yield from strays(found.source, found.root)
+def absolute_path(found: Description) -> Iterator[WorldError]:
+    """A name of a file does not count from the folder of the world."""
+    yield from absolutes(found.source, found.root)
 
 
 def relative_address(found: Description) -> Iterator[WorldError]:
     """The model names a file, but the world has none and so no folder."""
     for element, path in named_files(found.root):
-        if in_project(path):
+        if is_relative(path):
             fact = f"{path!r} is relative to the file of the world, and this one has none"
             yield found.source.error(element.start, fact, "give the world as a file (world.file)")
 
@@ -126,7 +127,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     unfit_step,
     unknown_devices,
     too_large,
-    files_elsewhere,
+    absolute_path,
 )
 """The checks for every MJCF world."""
 

@@ -1,0 +1,46 @@
+"""The folder around a world that holds all that the world names."""
+
+from pathlib import Path
+
+from palaestra_sim.errors import RootError, refusal
+from palaestra_sim.world import mjcf
+from palaestra_sim.world.checks import relative_addresses
+from palaestra_sim.world.paths import climb, is_relative
+
+
+def placed(world: Path) -> Path:
+    """Return the absolute path of a world; its parents are its folder and its project."""
+    return world.parent.resolve() / world.name if ".." in world.parts else world.absolute()
+
+
+def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
+    """Return the folder around a world that holds all that it names: `given`, or the nearest one.
+
+    The nearest one is the Webots project of the world, or above it. `world` is a path as from `placed`.
+
+    Raises:
+        RootError: `given` is not above the world, or does not hold all that the world names.
+        WorldError: a file of the model is wrong, or leads to the root of the file system.
+        OSError: a file of the model cannot be read.
+    """
+    folders = world.parents
+    nearest = folders[min(_levels(source, world, given), len(folders) - 1)]
+    if given is None:
+        return folders[1] if nearest == folders[0] and len(folders) > 1 else nearest
+    root = placed(given)
+    if root not in folders:
+        raise RootError(f"{root}: is not above {world}; name a folder that holds the world")
+    if not nearest.is_relative_to(root):
+        raise RootError(f"{root}: the world names files above it; name {nearest}")
+    return root
+
+
+def _levels(source: bytes, world: Path, given: Path | None) -> int:
+    """Return by how many folders the files that a world names, and that are there, lead above its own."""
+    if mjcf.is_mjcf(source):
+        project = mjcf.Project(world, mjcf.describe(source, str(world)), given)
+        if error := refusal(project.read()) or refusal(project.strays()):
+            raise error
+        return project.levels
+    addresses = filter(is_relative, relative_addresses(source, str(world)))
+    return max((climb(it) for it in addresses if (world.parent / it).exists()), default=0)

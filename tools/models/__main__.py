@@ -1,0 +1,61 @@
+"""`python -m tools.models DIR...`: count the models of MuJoCo below folders that start as they are.
+
+dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite bring 140 with an actuator. Their
+wheels are enough, without what they depend on:
+
+    uv pip install --no-deps --target DIR dm_control gymnasium gymnasium-robotics metaworld robosuite
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+
+DEADLINE_S: Final = 180.0
+# A file without an actuator moves nothing; one that MuJoCo refuses is a part of another.
+IS_MODEL: Final = "import mujoco, sys; sys.exit(mujoco.MjModel.from_xml_path(sys.argv[1]).nu == 0)"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the count and what is refused; return 0 if every model starts."""
+    parser = argparse.ArgumentParser(prog="python -m tools.models", description=__doc__.splitlines()[0])
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=Path)
+    folders = parser.parse_args(arguments).folders
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        answers = [it for it in pool.map(refusal, files(folders)) if it is not None]
+    refused = [it for it in answers if it]
+    for text in refused:
+        sys.stdout.write(f"{text}\n")
+    sys.stdout.write(
+        f"{len(answers) - len(refused)} of {len(answers)} models with an actuator start as they are\n"
+    )
+    return 1 if refused else 0
+
+
+def files(folders: Sequence[Path]) -> Iterator[Path]:
+    """Yield the XML files below the folders."""
+    for folder in folders:
+        yield from sorted(folder.rglob("*.xml"))
+
+
+def refusal(file: Path) -> str | None:
+    """Return why a model does not start, "" if it does; None: MuJoCo has no such model with an actuator."""
+    if run(sys.executable, "-c", IS_MODEL, file).returncode:
+        return None
+    check = run(Path(sys.executable).with_name("palaestra-mujoco"), "--check", file)
+    return f"{file}: {check.stderr.splitlines()[-1]}" if check.returncode else ""
+
+
+def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run a program to its end."""
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
