@@ -255,6 +255,35 @@ def test_a_ray_may_look_up_and_down(world, simple_robot, rays, seen):
     assert distance(load_scene(world(wall, robot=tilted))) == pytest.approx(seen, rel=1e-6)
 
 
+WATCHER = """Robot {{ translation 0 0 1 rotation {rotation} name "tower" controller "ros"
+  controllerArgs [ "--name=tower" "--synchronize" ] boundingObject Sphere {{ radius 0.1 }}
+  children [ DistanceSensor {{ translation 0.2 0 0 name "ir1" lookupTable [ 0 0 0, 9 9 0 ] }} ] }}"""
+
+
+@pytest.mark.parametrize(
+    ("rotation", "seen"),
+    [
+        ("0 1 0 0", 1.8),
+        ("0 1 0 0.25", 2.0 / math.cos(0.25) - 0.2),
+        ("0 1 0 0.8", 1.0 / math.sin(0.8) - 0.2),  # down to the floor
+        ("0 1 0 1.5707963", 0.8),
+        ("0 1 0 -0.8", 9.0),  # over the wall
+        ("1 0 0 1.2", 1.8),  # about its own axis
+        ("0.5773503 0.5773503 0.5773503 2.0943951", 9.0),  # its x axis is y of the world
+        ("0 0 1 0.4", 2.0 / math.cos(0.4) - 0.2),
+    ],
+)
+def test_a_robot_that_leans_sees_along_its_own_axes(rotation, seen):
+    """It has no wheels and watches from 1 m above the floor, 2 m before a wall; it passes its own shape."""
+    wall = "Solid { translation 2.05 0 1 boundingObject Box { size 0.1 9 2 } }"
+    text = f"#VRML_SIM R2023b utf8\nWorldInfo {{ }} {wall} {WATCHER.format(rotation=rotation)}"
+
+    simulation = load_scene(text.encode())
+    simulation.step(32)
+
+    assert simulation.robots[0].sensors["ir1"].value == pytest.approx(seen, abs=1e-5)
+
+
 @pytest.mark.parametrize("count", range(1, 31))
 def test_several_rays_are_a_cone_that_is_symmetric_about_its_axis(world, simple_robot, count):
     """In front of a wall, a sonar measures the ray on the axis, or the nearest to it."""

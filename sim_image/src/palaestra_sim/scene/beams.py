@@ -34,6 +34,12 @@ class Beam(NamedTuple):
         """Whether it stays at its height."""
         return self.slope == 0.0
 
+    def seen_from(self, pose: Pose) -> Beam:
+        """Return the same beam in the frame around that of the robot, which has `pose` there."""
+        x, y, along_x, along_y = self.ray
+        origin = pose.carry((x, y, self.height_m))
+        return beam_along(Pose(origin, pose.rotation), (along_x, along_y, self.slope), self.reach_m)
+
 
 def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
     """Return the beam that leaves a frame in a direction of this frame."""

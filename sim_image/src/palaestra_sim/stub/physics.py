@@ -73,8 +73,10 @@ class StubPhysics:
         for figure in figures:
             others = [(it, body) for it, body in self._moving if it is not figure and body.radius > 0.0]
             self._face(figure, [body for _, body in others])
-            uprights = [_upright(shape) for shape in solids] if self._sloped.get(figure) else ()
-            for sloped in self._sloped.get(figure, ()):
+            if not self._sloped.get(figure):
+                continue
+            uprights = [_upright(shape) for shape in solids if not _is_on(figure, shape)]
+            for sloped in self._sloped[figure]:
                 others_now = [_of_robot(it, body) for it, body in others]
                 sloped.face(uprights, others_now, self._surroundings.heights_m())
 
@@ -90,24 +92,17 @@ class StubPhysics:
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam of a robot travels now, in meters."""
         place, body = figure.place, figure.body
-
-        def frame() -> tuple[float, float, float, float]:
-            if isinstance(body, StubBody):
-                return body.frame
-            pose = place.ground_pose
-            return pose.position[0], pose.position[1], pose.rotation[0], pose.rotation[3]
-
-        if any(not beam.level for beam in beams):
+        if not isinstance(body, StubBody) or any(not beam.level for beam in beams):
             sloped = SlopedBeams(beams)
             self._sloped.setdefault(figure, []).append(sloped)
-            return lambda: sloped.cast(frame(), place.height_m)
+            if isinstance(body, StubBody):
+                return lambda: sloped.cast(body.frame, place.height_m)
+            return lambda: sloped.cast_from(place.ground_pose)
         fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
         heights = [beam.height_m for beam in beams]
         self._level.setdefault(figure, []).append(_Level(fan, (min(heights), max(heights))))
         cast = fan.cast
-        if isinstance(body, StubBody):
-            return lambda: cast((body.x, body.y, body.c, body.s))
-        return lambda: cast(frame())
+        return lambda: cast((body.x, body.y, body.c, body.s))
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return the same for beams that meet what is visible, and pass the robot itself."""
@@ -157,6 +152,11 @@ def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float
 def _of_robot(figure: Figure, body: StubBody) -> Upright:
     height = figure.place.height_m
     return Upright(body, body.heights[0] + height, body.heights[1] + height)
+
+
+def _is_on(figure: Figure, shape: Shape) -> bool:
+    """Return whether a shape is a part of a robot, whose own rays pass it."""
+    return figure.place in shape.place.chain()
 
 
 def _upright(shape: Shape) -> Upright:

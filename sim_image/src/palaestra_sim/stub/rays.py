@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from palaestra_sim.scene.beams import Beam, Ray
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.stub.obstacles import Neighborhood, Obstacle
+
+_GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame as `Fan.cast` takes it
 
 
 class Fan:
@@ -88,6 +91,12 @@ class SlopedBeams:
         """Return how far each beam travels in meters; `height_m` is of the robot's frame."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam, frame, height_m)
+        return self.distances
+
+    def cast_from(self, pose: Pose) -> list[float]:
+        """Return the same for a robot that may lean; `pose` is its frame in the axes of the ground."""
+        for index, beam in enumerate(self._beams):
+            self.distances[index] = self._first(beam.seen_from(pose), _GROUND, 0.0)
         return self.distances
 
     def _first(self, beam: Beam, frame: tuple[float, float, float, float], height_m: float) -> float:
