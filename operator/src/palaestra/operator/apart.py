@@ -19,7 +19,7 @@ from palaestra.plan import GivenWorld, Verdict
 
 SECONDS = 20  # of processor time for a world; the costliest of 900 kB takes 2
 MEBIBYTES = 144  # of address space; the costliest of 900 kB takes 135, and two fit into the container
-DEADLINE_S = 60.0  # for all worlds of a job; passing it is the fault of a busy node, not of a world
+DEADLINE_S = 300.0  # for all worlds of a job; passing it is the fault of a busy node, not of a world
 _CRASHES: Final = frozenset(  # 1: an exception, whose traceback is in the operator's log
     (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
 )

@@ -22,7 +22,7 @@ from palaestra_sim.world import check
 
 MOST_CHARACTERS = 4096  # of the message of a refusal; a status shows fewer
 TOO_MUCH_MEMORY = "memory"
-_NICENESS = 10  # the operator itself comes first
+_NICENESS = 5  # the operator itself comes first
 _PR_SET_PDEATHSIG = 1  # Source: linux/prctl.h
 _OOM_SCORE = Path("/proc/self/oom_score_adj")
 
