@@ -5,6 +5,7 @@ import math
 import pytest
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.scene.geometry import turn
 from palaestra_sim.scene.nodes.growing import Descriptions
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.simulation import Simulation
@@ -118,10 +119,95 @@ def test_an_unknown_system_of_axes_is_a_mistake():
         load('WorldInfo { coordinateSystem "UP" }', leave_out=LeaveOut(everything=True))
 
 
-def test_an_old_world_that_is_read_all_the_same_stands_on_its_floor():
-    """Until R2022a, y was up by default, and the parts of Webots' own PROTOs stood along it."""
-    old = load("WorldInfo { } WoodenBox { size 1 2 3 }", "R2021a", LeaveOut(types=frozenset({"WorldInfo"})))
+def test_what_comes_with_webots_is_turned_in_an_old_world():
+    """Its files are of today, so x of a box was -z of the world, and z was y."""
+    old = load("WorldInfo { } WoodenBox { translation 0 1.5 0 size 1 2 3 }", "R2021a")
     (box,) = old.scene.solids
 
-    assert box.pose.rotation[4] == pytest.approx(1.0)
-    assert sorted(box.size) == [1.0, 2.0, 3.0]
+    assert box.heights() == pytest.approx((0.0, 3.0))
+    assert box.pose.rotation == pytest.approx((0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0), abs=1e-9)
+
+
+WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis %s anchor %s }
+  device [ RotationalMotor { name "%s wheel motor" maxVelocity 9 } ]
+  endPoint Solid { translation %s rotation %s boundingObject Cylinder { radius 0.02 height 0.01 } } }"""
+CAR = """Robot { translation %s rotation %s controller "ros" controllerArgs [ "--name=a" "--synchronize" ]
+  boundingObject Pose { translation %s children [ Box { size %s } ] }
+  children [ %s %s
+    DistanceSensor { translation %s rotation %s lookupTable [ 0 0 0, 9 9 0 ] }
+    Lidar { translation %s maxRange 9 horizontalResolution 8 numberOfLayers 2 }
+    GPS { translation %s } ] }"""
+CARS = {
+    "R2023b": CAR
+    % (
+        "1 2 0", "0 0 1 0.3", "0 0 0.04", "0.1 0.06 0.04",
+        WHEEL % ("0 1 0", "0 0.05 0.02", "left", "0 0.05 0.02", "1 0 0 1.5707963"),
+        WHEEL % ("0 1 0", "0 -0.05 0.02", "right", "0 -0.05 0.02", "1 0 0 1.5707963"),
+        "0.06 0.01 0.03", "0 0 1 0", "0 0 0.1", "0.05 0.02 0.1",
+    ),
+    "R2021b": CAR
+    % (
+        "1 0 -2", "0 1 0 -1.2707963267948966", "0 0.04 0", "0.06 0.04 0.1",
+        WHEEL % ("-1 0 0", "-0.05 0.02 0", "left", "-0.05 0.02 0", "0 0 1 1.5707963"),
+        WHEEL % ("-1 0 0", "0.05 0.02 0", "right", "0.05 0.02 0", "0 0 1 1.5707963"),
+        "-0.01 0.03 -0.06", "0 1 0 1.5707963267948966", "0 0.1 0", "-0.02 0.1 -0.05",
+    ),
+}  # fmt: skip
+POSTS = {
+    "R2023b": "Solid { translation 2 2.5 0.5 boundingObject Cylinder { radius 0.2 height 1 } }",
+    "R2021b": "Solid { translation 2 0.5 -2.5 boundingObject Cylinder { radius 0.2 height 1 } }",
+}  # fmt: skip
+FORWARD = {"R2023b": (1.0, 0.0, 0.0), "R2021b": (0.0, 0.0, -1.0)}
+
+
+def load_car(release):
+    """The same car before the same post, in a world of a release, with its axes."""
+    return load(f"WorldInfo {{ basicTimeStep 16 }} {CARS[release]} {POSTS[release]}", release)
+
+
+@pytest.mark.parametrize(("left", "right"), [(3.0, 3.0), (-3.0, -2.0), (2.0, -2.0)])
+def test_a_world_of_old_axes_is_the_same_world(left, right):
+    """Robots looked along -z there, with y up, and cylinders stood along y. Webots turns what it loads."""
+    twin, robot = (drive(load_car(release), left, right) for release in CARS)
+    places = [it.parts.node.place for it in (twin, robot)]
+
+    assert places[1].translation == pytest.approx(y_up(places[0].translation), abs=1e-6)
+    ahead = [
+        turn(place.world_pose.rotation, axis) for place, axis in zip(places, FORWARD.values(), strict=True)
+    ]
+    assert ahead[1] == pytest.approx(y_up(ahead[0]), abs=1e-6)
+    assert robot.sensors["gps"].value == pytest.approx(y_up(twin.sensors["gps"].value), abs=1e-6)
+    assert robot.sensors["distance sensor"].value == pytest.approx(twin.sensors["distance sensor"].value)
+    assert robot.motion(robot.place).velocity == pytest.approx(y_up(twin.motion(twin.place).velocity))
+    lidars = [it.parts.devices.rows["lidar"][1] for it in (twin, robot)]
+    assert [list(row) for row in lidars[1].layers] == [pytest.approx(list(row)) for row in lidars[0].layers]
+
+
+def test_a_supervisor_turns_a_robot_of_old_axes_in_the_axes_of_the_file():
+    """What is written is read back, and the robot looks along its own -z."""
+    (robot,) = load_car("R2021b").robots
+    place = robot.parts.node.place
+    start = place.translation, place.rotation
+    place.translation, place.rotation = (0.5, 0.25, 1.0), (0.0, 1.0, 0.0, 0.5)
+
+    assert place.translation == pytest.approx((0.5, 0.25, 1.0))
+    assert place.rotation == pytest.approx((0.0, 1.0, 0.0, 0.5))
+    assert (robot.body.x, robot.body.y) == pytest.approx((0.5, -1.0))
+    assert turn(place.world_pose.rotation, (0.0, 0.0, -1.0)) == pytest.approx(
+        (-math.sin(0.5), 0.0, -math.cos(0.5))
+    )
+
+    robot.reset()
+
+    assert (place.translation, place.rotation) == (pytest.approx(start[0]), pytest.approx(start[1]))
+
+
+def test_a_robot_of_webots_drives_in_an_old_world():
+    """Its file is of today: Webots turns the instance, and so does the stub."""
+    forward = "0 1 0 -1.5707963267948966"  # -z is x of the world
+    wall = WALL % ("1.1 0.05 -2", "0.01 0.1 1")
+    old = load(f"WorldInfo {{ basicTimeStep 16 }} {E_PUCK % ('1 0 -2', forward)} {wall}", "R2021b")
+    twin, robot = drive(load_twin("ENU"), 3.0, 3.0), drive(old, 3.0, 3.0)
+
+    assert robot.place.translation == pytest.approx(y_up(twin.place.translation))
+    assert robot.sensors["ps0"].value == pytest.approx(twin.sensors["ps0"].value)

@@ -291,10 +291,37 @@ def test_a_table_whose_inputs_do_not_grow_is_refused(load):
         load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
 
 
-def test_a_compass_in_a_world_with_another_north_is_refused(load):
-    """There, y is up."""
-    with pytest.raises(WorldError, match=r"compass in a world with WorldInfo\.coordinateSystem 'NUE'"):
-        load("Compass { }", info='coordinateSystem "NUE"')
+STANDING = "rotation 1 0 0 -1.5707963267948966"  # of a robot with z up, in a world with y up
+
+
+@pytest.mark.parametrize(
+    ("system", "robot", "north", "height_m", "quaternion"),
+    [
+        ("ENU", "translation 0 0 0.5", (0.0, 1.0, 0.0), 400.8, (0.0, 0.0, 0.0, 1.0)),
+        ("NUE", f"translation 0 0.5 0 {STANDING}", (1.0, 0.0, 0.0), 2.8, (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)),
+        ("EUN", f"translation 0 0.5 0 {STANDING}", (0.0, -1.0, 0.0), 2.8, (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)),
+    ],
+)
+def test_the_system_of_axes_says_where_north_and_up_are(load, system, robot, north, height_m, quaternion):
+    """Its letters are those of x, y and z; an InertialUnit reads its rotation in the axes of the file."""
+    info = f'coordinateSystem "{system}" gpsReference 1 2 400'
+    simulation = load("Compass { } InertialUnit { } Altimeter { translation 0 0 0.3 }", robot, info)
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "compass") == pytest.approx(north, abs=1e-9)
+    assert value_of(simulation, "altimeter") == pytest.approx(height_m)
+    assert value_of(simulation, "inertial unit") == pytest.approx(quaternion, abs=1e-9)
+
+
+def test_gravity_of_an_old_world_may_be_a_vector():
+    """Until R2020a it had three numbers."""
+    text = '#VRML_SIM R2019a utf8\nWorldInfo { gravity 0 -3.7 0 } Robot { controller "ros" controllerArgs'
+    simulation = load_scene(
+        f'{text} [ "--name=a" "--synchronize" ] children [ Accelerometer {{ }} ] }}'.encode()
+    )
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "accelerometer") == pytest.approx((0.0, 3.7, 0.0))
 
 
 @pytest.mark.parametrize(

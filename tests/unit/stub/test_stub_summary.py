@@ -35,6 +35,16 @@ def test_a_world_that_can_start_is_described(check):
     )
 
 
+def test_an_old_world_is_turned_and_the_check_says_so(check):
+    """It was refused; a fifth of public worlds are that old."""
+    old = b"#VRML_SIM R2020a utf8\nWorldInfo { } WoodenBox { }"
+
+    code, lines = check(old)
+
+    assert code == 0
+    assert lines[-1] == "a world of R2020a: its nodes are turned to the axes of today, as by Webots"
+
+
 def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
     """Both differ from Webots without an error."""
     code, lines = check('E-puck { name "a" controller "patrol" } WoodenBox { } WoodenBox { } Floor { }')

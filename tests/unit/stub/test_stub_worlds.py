@@ -249,22 +249,6 @@ def test_a_conveyor_belt_is_refused():
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 
 
-@pytest.mark.parametrize("release", ["R2021b", "V8.6.2"])
-def test_a_world_with_old_axes_is_refused_unless_the_user_leaves_them_out(release):
-    """Read with the axes of today, its robots would lie."""
-    world = parse(f"#VRML_SIM {release} utf8\nViewpoint {{ }}\nWorldInfo {{ }}".encode(), "my.wbt")
-    fact = f"a world of {release}: before R2022a, robots, devices and shapes had other axes"
-
-    with pytest.raises(WorldError) as caught:
-        Simulation.of(world, StubPhysics(), "my.wbt")
-    assert str(caught.value).startswith(f"my.wbt:3:1: {fact}; convert it")
-
-    simulation = Simulation.of(
-        world, StubPhysics(), "my.wbt", leave_out=LeaveOut(types=frozenset({"WorldInfo"}))
-    )
-    assert len(simulation.scene.left_out) == 1
-
-
 def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
     """Webots turns them when it loads the file; a box and a stand-in have no such axis."""
     post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-from palaestra_sim.scene.axes import frame_of_shapes, standing
 from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle
 from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.places import Place
 
 Kind = Literal["box", "ball", "cylinder", "capsule", "mesh"]
@@ -164,7 +164,6 @@ def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
     looks = [it for it in node.inside() if it.type_name in {"Appearance", "PBRAppearance"}]
     look = _look(looks[0]) if looks else None
-    frame = frame._replace(pose=frame.pose.after(frame_of_shapes(node)))
     for outline in node.nodes("boundingObject"):
         for pose in outline.nodes():
             for geometry in pose.nodes():
@@ -236,6 +235,7 @@ def _mesh(node: SceneNode, pose: Pose) -> tuple[Pose, Mesh] | None:
         case "IndexedFaceSet":
             mesh = face_set(node)
         case "ElevationGrid":
+            pose = standing(node, pose)
             mesh = elevation_grid(node)
     return None if mesh is None else (pose, mesh)
 

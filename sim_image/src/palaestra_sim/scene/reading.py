@@ -16,6 +16,7 @@ from typing import Final
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import of_instance, of_old_axes
 from palaestra_sim.scene.places import Place
 
 _DRAWN: Final = frozenset(("CadShape", "Shape"))
@@ -55,6 +56,7 @@ class Reading:
         simulator: its name, for messages.
         left_out: the nodes that were left out, each with its place and the reason.
         world_info: the WorldInfo of the world; None if it has none.
+        system: the letters of what its axes point to: east, north, up.
         top: the frame around everything; None if z of the world points up.
         floors: the place and the local frame of each level Plane that looks up.
     """
@@ -70,6 +72,7 @@ class Reading:
         self.simulator = simulator
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
+        self.system = "ENU"
         self.top: Place | None = None
         self.floors: list[tuple[Place, Pose]] = []
 
@@ -116,6 +119,16 @@ class Reading:
         """Return the number of a field; `default` if the field is refused."""
         return self.vector(node, field, (default,))[0]
 
+    def gravity(self) -> float:
+        """Return WorldInfo.gravity in m/s2; in a file from before R2022a it may be a vector."""
+        node = self.world_info
+        if node is None:
+            return 9.81
+        numbers = node.numbers("gravity") or ()
+        if len(numbers) == len("xyz") and of_old_axes(node):
+            return math.hypot(*numbers)
+        return self.number(node, "gravity", 9.81)
+
     def translation(self, node: SceneNode) -> Vector:
         """Return `translation` in meters."""
         x, y, z = self.vector(node, "translation", (0.0, 0.0, 0.0))
@@ -124,7 +137,7 @@ class Reading:
     def rotation(self, node: SceneNode) -> AxisAngle:
         """Return `rotation`, axis and angle."""
         x, y, z, angle_rad = self.vector(node, "rotation", (0.0, 0.0, 1.0, 0.0))
-        return x, y, z, angle_rad
+        return of_instance(node, (x, y, z, angle_rad))
 
     def scale(self, node: SceneNode) -> Vector:
         """Return `scale`, which only a Transform has, and before R2023a a Solid; 1 1 1 if it has none."""

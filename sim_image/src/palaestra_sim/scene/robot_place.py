@@ -60,3 +60,47 @@ class RobotPlace(Place):
     def height_m(self) -> float:
         """The height of its origin in the world."""
         return self._height_m
+
+
+class TurnedPlace(Place):
+    """The frame that the file gives a robot, turned in the one that has z up.
+
+    Clients read and write the frame of the file, and move the other one with it.
+
+    Args:
+        upright: the frame with z up.
+        turn: of the frame of the file in it.
+    """
+
+    def __init__(self, upright: Place, turn: AxisAngle) -> None:
+        super().__init__(upright, (0.0, 0.0, 0.0), turn)
+        self._upright = upright
+        self._turn = Pose(rotation=from_axis_angle(turn))
+
+    @property
+    def pose(self) -> Pose:
+        """The frame, in the one with z up."""
+        return self._turn
+
+    @property
+    def translation(self) -> Vector:
+        """Both frames have one origin."""
+        return self._upright.translation
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        self._upright.translation = value
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """The rotation of the frame of the file, in the frame around the robot."""
+        return to_axis_angle(multiply(from_axis_angle(self._upright.rotation), self._turn.rotation))
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        inverse = transposed(self._turn.rotation)
+        self._upright.rotation = to_axis_angle(multiply(from_axis_angle(value), inverse))
+
+    def return_to_start(self) -> None:
+        """Return with the frame that has z up."""
+        self._upright.return_to_start()

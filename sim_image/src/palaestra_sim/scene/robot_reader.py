@@ -7,6 +7,7 @@ Everything else on a joint moves with it, but touches nothing, unless the physic
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -17,18 +18,28 @@ from palaestra_sim.scene.bodies import Body, Build
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Devices, Kind, Part, Shaft
 from palaestra_sim.scene.drive import find_drive
-from palaestra_sim.scene.geometry import Vector, turn
+from palaestra_sim.scene.geometry import (
+    AxisAngle,
+    Pose,
+    Vector,
+    from_axis_angle,
+    multiply,
+    to_axis_angle,
+    transposed,
+    turn,
+)
 from palaestra_sim.scene.joint_reader import parameters_of, read_joint
 from palaestra_sim.scene.joints import Joint, JointPlace, unit
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.matter import Matter
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place, YUp
 from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
-from palaestra_sim.scene.robot_place import RobotPlace
+from palaestra_sim.scene.robot_place import RobotPlace, TurnedPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.wheels import Driven, wheels_among
 
@@ -54,6 +65,8 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
+Y_TO_Z: Final[AxisAngle] = (1.0, 0.0, 0.0, math.pi / 2.0)
+_Y_UP: Final = Pose(rotation=transposed(from_axis_angle(Y_TO_Z)))  # of a frame with z up, in one with y up
 _STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
@@ -91,8 +104,9 @@ class _RobotReader:
         self._parent = parent
         self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
-        # Where the robot stands does not matter to its parts: they are read in its own frame.
-        self._frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+        # Where the robot stands does not matter to its parts: they are read in its own frame, with z up.
+        self._lies = self._is_drawn_with_y_up()
+        self._frame = Place(None, (0.0, 0.0, 0.0), Y_TO_Z if self._lies else (0.0, 0.0, 1.0, 0.0))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
         self._carried: list[Shape] = []  # of what motors move, if forces matter
@@ -127,14 +141,15 @@ class _RobotReader:
                 Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
             )
         place = self._place(body)
-        self._settle(place)
+        own = TurnedPlace(place, Y_TO_Z) if self._lies else place
+        self._settle(own)
         return RobotParts(
             node=node,
             name=node.text("name") or "robot",
             place=place,
             devices=self._devices,
             body=body,
-            standing=() if moves else tuple(self._on(place, shape) for shape in shapes),
+            standing=() if moves else tuple(self._on(own, shape) for shape in shapes),
             arguments=read_arguments(reading, node) if self._by_ros else None,
             links=links,
         )
@@ -153,8 +168,20 @@ class _RobotReader:
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
         """Return whether a robot without a drive has a body: upright, at the top of the world."""
-        pose = Place(self._parent, *_where(self._reading, self._node)).ground_pose
-        return bool(shapes) and self._at_top and pose.upright
+        return bool(shapes) and self._at_top and Place(self._parent, *self._start).ground_pose.upright
+
+    def _is_drawn_with_y_up(self) -> bool:
+        """Return whether y of the robot points up, as in worlds whose y axis does."""
+        frame = Place(self._parent, *_where(self._reading, self._node))
+        return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(_Y_UP).upright
+
+    @property
+    def _start(self) -> tuple[Vector, AxisAngle]:
+        """Where the frame of the robot with z up is at first, in the frame around it."""
+        translation, rotation = _where(self._reading, self._node)
+        if self._lies:
+            rotation = to_axis_angle(multiply(from_axis_angle(rotation), _Y_UP.rotation))
+        return translation, rotation
 
     @property
     def _at_top(self) -> bool:
@@ -168,8 +195,8 @@ class _RobotReader:
         return max(min(ends), floor + _STEP_M), max(ends)
 
     def _place(self, body: Body | None) -> Place:
-        reading, node = self._reading, self._node
-        translation, rotation = reading.translation(node), reading.rotation(node)
+        node = self._node
+        translation, rotation = self._start
         if body is None:
             return Place(self._parent, translation, rotation)
         if not self._at_top:
@@ -233,7 +260,7 @@ class _RobotReader:
             return
         self._outline += shapes
         if motor is not None and shapes:
-            frame = place.world_pose
+            frame = standing(node, place.world_pose)
             lowest = min(shapes, key=lambda shape: shape.heights()[0])
             axle = turn(frame.rotation, (0.0, 1.0, 0.0))
             self._driven.append(

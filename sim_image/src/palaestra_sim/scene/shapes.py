@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-from palaestra_sim.scene.axes import frame_of_shapes, standing
 from palaestra_sim.scene.geometry import IDENTITY, Matrix, Pose, Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
 
@@ -68,7 +68,7 @@ class Shape:
 
 def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
     """Yield the shapes of a node's boundingObject that can be simulated; the others are refused."""
-    grown = _Grown(frame_of_shapes(owner), (place.scale, place.scale, place.scale))
+    grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
         yield from _shapes(reading, node, place, grown)
 

@@ -10,6 +10,7 @@ from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, DistanceSensorType
 from palaestra_sim.scene.devices.kind import Kind
 from palaestra_sim.scene.nodes.types import is_base_type
+from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
@@ -44,6 +45,8 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     stand_ins = Counter(node.proto_name for node in simulation.tree.nodes.values() if node.stand_in)
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
+    if release := _old_release(simulation):
+        yield f"a world of {release}: its nodes are turned to the axes of today, as by Webots"
     silent = silent_devices(simulation.robots)
     if silent:
         yield f"devices without readings, whose enable answers failure: {silent}"
@@ -54,6 +57,14 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     if error := refusal(lacks(simulation)):
         yield "left out:" if chosen else "cannot be simulated; --leave-out leaves it out:"
         yield from str(error).splitlines()
+
+
+def _old_release(simulation: Described) -> str:
+    """Return the release of a world whose nodes have other axes than today; "" for another one."""
+    first = next(iter(simulation.tree.root.nodes()), None)
+    if first is None or first.origin is None or not of_old_axes(first):
+        return ""
+    return first.origin.source.header().split()[-2]
 
 
 def lacks(simulation: Described) -> list[WorldError]:

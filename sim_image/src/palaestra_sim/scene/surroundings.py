@@ -70,9 +70,7 @@ def read_surroundings(
     for node in world_info.nodes("contactProperties"):
         pair = frozenset(node.text(f"material{side}") or DEFAULT for side in (1, 2))
         frictions.setdefault(pair, _coefficient(node))
-    return Surroundings(
-        gravity_m_s2=reading.number(world_info, "gravity", 9.81), frictions=frictions, floor=material
-    )
+    return Surroundings(gravity_m_s2=reading.gravity(), frictions=frictions, floor=material)
 
 
 def material_of(node: SceneNode) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from palaestra_sim.scene import picture_files
-from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading

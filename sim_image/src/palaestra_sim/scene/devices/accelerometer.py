@@ -32,12 +32,11 @@ class Accelerometer:
 
 
 def _read(part: Part) -> Accelerometer:
-    (gravity,) = part.world_numbers("gravity", (9.81,))
     return Accelerometer(
         name=part.name,
         model=part.text("model"),
         place=part.place,
-        gravity=gravity,
+        gravity=part.reading.gravity(),
         axes=read_axes(part),
     )
 

@@ -34,12 +34,11 @@ class Altimeter:
 
 
 def _read(part: Part) -> Altimeter:
-    part.require_enu("altimeter")
     return Altimeter(
         name=part.name,
         model=part.text("model"),
         place=part.place,
-        reference=part.world_numbers("gpsReference", (0.0, 0.0, 0.0))[2],
+        reference=part.world_numbers("gpsReference", (0.0, 0.0, 0.0))[part.axis_to("U")],
         accuracy=part.number("accuracy", 0.0),
         resolution=part.number("resolution", -1.0),
     )
@@ -50,7 +49,7 @@ def _sampler(altimeters: Sequence[Altimeter], robot: Carrier) -> Sample:
 
     def sample() -> None:
         for altimeter in altimeters:
-            height = altimeter.reference + altimeter.place.world_position[2]
+            height = altimeter.reference + altimeter.place.height_m
             if altimeter.accuracy:
                 height += altimeter.accuracy * gauss(0.0, 1.0)
             altimeter.value = discrete(height, altimeter.resolution)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Stream, Topic
 from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
 from palaestra_sim.scene.devices.recognition import (
@@ -19,6 +18,7 @@ from palaestra_sim.scene.devices.recognition import (
     recognition_stream,
 )
 from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Handler, Row
 

@@ -1,7 +1,7 @@
 """Compass: the direction of north, a unit vector in the sensor's frame.
 
-North is +y of the world, as WorldInfo.coordinateSystem "ENU" has it; another system is refused. Source:
-WbCompass.cpp of Webots.
+North is the axis of the world that is N in WorldInfo.coordinateSystem. Source: WbCompass.cpp and
+WbWorldInfo.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from palaestra_sim.scene.geometry import Vector, transposed, turn
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Row
 
-_NORTH: Final = (0.0, 1.0, 0.0)
-
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Compass:
@@ -28,12 +26,15 @@ class Compass:
     model: str
     place: Place
     axes: Axes
+    north: Vector
     value: Vector = (math.nan, math.nan, math.nan)
 
 
 def _read(part: Part) -> Compass:
-    part.require_enu("compass")
-    return Compass(name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part))
+    x, y, z = (float(axis == part.axis_to("N")) for axis in range(3))
+    return Compass(
+        name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part), north=(x, y, z)
+    )
 
 
 def _sampler(compasses: Sequence[Compass], robot: Carrier) -> Sample:
@@ -41,7 +42,7 @@ def _sampler(compasses: Sequence[Compass], robot: Carrier) -> Sample:
 
     def sample() -> None:
         for compass in compasses:
-            north = turn(transposed(compass.place.world_pose.rotation), _NORTH)
+            north = turn(transposed(compass.place.world_pose.rotation), compass.north)
             compass.value = compass.axes.respond(north, gauss)
 
     return sample

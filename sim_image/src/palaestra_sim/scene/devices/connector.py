@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from palaestra_sim.scene.devices.kind import Kind, Part, Topic
 from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.old_axes import pointing
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Row, UnsimulatedError
 
@@ -98,7 +99,7 @@ def _read(part: Part) -> Connector:
     return Connector(
         name=part.name,
         model=part.text("model"),
-        place=part.place,
+        place=pointing(part.node, part.place),
         kind=kind,
         reach_m=part.number("distanceTolerance", 0.01),
         tilt_rad=part.number("axisTolerance", 0.2),

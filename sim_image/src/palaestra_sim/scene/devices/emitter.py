@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.scene.old_axes import pointing
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Handler, Row
 
@@ -65,7 +66,7 @@ def _read(part: Part) -> Emitter:
     return Emitter(
         name=part.name,
         model=part.text("model"),
-        place=part.place,
+        place=pointing(part.node, part.place),
         buffer_size=int(part.number("bufferSize", -1.0)),
         channel=int(part.number("channel", 0.0)),
         range_m=part.number("range", -1.0),

@@ -39,7 +39,6 @@ class InertialUnit:
 
 
 def _read(part: Part) -> InertialUnit:
-    part.require_enu("inertial unit")
     if not all(part.node.flag(axis, default=True) for axis in ("xAxis", "yAxis", "zAxis")):
         part.lack("an inertial unit with an axis that is switched off")
     return InertialUnit(

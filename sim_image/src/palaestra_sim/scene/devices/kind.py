@@ -120,11 +120,9 @@ class Part:
         world_info = self.reading.world_info
         return default if world_info is None else world_info.text(name) or default
 
-    def require_enu(self, name: str) -> None:
-        """Note that a device of this name needs a world whose y axis is north and whose z axis is up."""
-        system = self.world_text("coordinateSystem", "ENU")
-        if system != "ENU":
-            self.lack(f"{name} in a world with WorldInfo.coordinateSystem {system!r}")
+    def axis_to(self, letter: str) -> int:
+        """Return the axis of the world, 0 to 2, that points up, north or east: `U`, `N` or `E`."""
+        return self.reading.system.index(letter)
 
     def refuse(self, fact: str, remedy: str) -> None:
         """Note a mistake in the world."""

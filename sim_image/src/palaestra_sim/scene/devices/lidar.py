@@ -19,6 +19,7 @@ from palaestra_sim.scene.beams import Beam, beam_along
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.devices.response import discrete
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.seam import Fields, Row, UnsimulatedError
 
 _FLOAT_BYTES: Final = 4
@@ -136,6 +137,7 @@ def _read(part: Part) -> Lidar:
         part.refuse(f"a lidar with {rays} rays", f"use {_MOST_RAYS} at most")
         info.update(horizontalResolution=1, numberOfLayers=1)
     directions = tuple(_layers(info))
+    frame = looking(part.node, part.place).world_pose
     return Lidar(
         name=part.name,
         model=part.text("model"),
@@ -149,8 +151,7 @@ def _read(part: Part) -> Lidar:
         resolution=number("resolution", -1.0),
         directions=directions,
         beams=tuple(
-            tuple(beam_along(part.place.world_pose, direction, info["maxRange"]) for direction in row)
-            for row in directions
+            tuple(beam_along(frame, direction, info["maxRange"]) for direction in row) for row in directions
         ),
         layers=[_blank(len(row)) for row in directions],
     )

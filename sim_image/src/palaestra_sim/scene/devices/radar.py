@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.echoes import Bounds, Echoes, Target
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Row
 

@@ -9,10 +9,10 @@ from array import array
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
 from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
 from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Row
 

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 from palaestra_sim.scene.devices.emitter import EVERYWHERE, require_radio
 from palaestra_sim.scene.devices.kind import Kind, Part, Topic
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.old_axes import pointing
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Row
 
@@ -62,7 +63,7 @@ def _read(part: Part) -> Receiver:
     return Receiver(
         name=part.name,
         model=part.text("model"),
-        place=part.place,
+        place=pointing(part.node, part.place),
         buffer_size=int(part.number("bufferSize", -1.0)),
         channel=int(part.number("channel", 0.0)),
     )

@@ -14,6 +14,7 @@ from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.devices.response import Gauss, discrete, table_rows, table_service
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.seam import Row
 
@@ -45,10 +46,13 @@ class TouchSensor:
     table: LookupTable | None = field(default_factory=lambda: lookup_table(*_TABLE))
     resolution: float = -1.0
     value: Any = False
+    of_old_axes: bool = False
 
     def feel(self, gauss: Gauss) -> None:
         """Take the force of this moment."""
         x, y, z = _NOTHING if self.link is None else self.link.force
+        if self.of_old_axes:
+            x, y, z = z, x, y
         if self.type == _FORCE:
             self.value = self._response(max(0.0, -x), gauss)  # a pull is no pressure
         else:
@@ -78,7 +82,13 @@ def _read(part: Part) -> TouchSensor:
     if type_name != "bumper" and not part.forces:
         part.lack("a touch sensor that measures force")
     # Without physics of its own, a bumper is part of the robot in Webots too.
-    sensor = TouchSensor(name=part.name, model=part.text("model"), outline=part.take_outline(), type=kind)
+    sensor = TouchSensor(
+        name=part.name,
+        model=part.text("model"),
+        outline=part.take_outline(),
+        type=kind,
+        of_old_axes=of_old_axes(part.node),
+    )
     if kind and part.forces:
         rows = table_rows(part, _TABLE, "forces")
         sensor.table = lookup_table(*rows) if rows else None

@@ -15,7 +15,7 @@ from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.nodes.scene_node import Content, FieldContent, Origin, SceneNode
 from palaestra_sim.scene.nodes.scope import Scope, definitions
 from palaestra_sim.scene.nodes.types import is_base_type
-from palaestra_sim.world import Is, Item, Node, Proto, Value, World
+from palaestra_sim.world import Is, Item, Node, Proto, Value, World, builtin_protos
 from palaestra_sim.world.parts import Part
 from palaestra_sim.world.source import Source
 from palaestra_sim.world.stand_ins import StandIn, expand
@@ -134,6 +134,7 @@ class Grower:
         node = self._grow(proto.body, inner, parent)
         if node is not None:
             node.proto_name = proto.name
+            node.shipped = builtin_protos().get(proto.name) is proto
             node.def_name = source.def_name or ""
             node.origin = Origin(source, scope.source)
         return node
@@ -143,6 +144,7 @@ class Grower:
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name
+        node.shipped = True
         node.stand_in = True
         node.def_name = source.def_name or ""
         for name, declared in stand_in.fields.items():

@@ -57,6 +57,7 @@ class SceneNode:
         twins: this node and those that are the same one in the file, `DEF` and `USE`: a write reaches all.
         place: its frame; None for a node without one, such as an appearance.
         outline: whether it, or a twin, is part of a boundingObject.
+        shipped: whether it is an instance of a PROTO of Webots, which a file of today describes.
         stand_in: whether it is a simple solid in the place of a PROTO.
         unusable: why its PROTO cannot be expanded; "" if that is not the case.
         left_out: whether it is not simulated, because the user left it out.
@@ -73,6 +74,7 @@ class SceneNode:
         self.twins: list[SceneNode] = [self]
         self.place: Place | None = None
         self.outline = False
+        self.shipped = False
         self.stand_in = False
         self.unusable = ""
         self.left_out = False

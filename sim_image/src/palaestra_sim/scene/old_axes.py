@@ -1,0 +1,63 @@
+"""Nodes of files from before R2022a, whose axes Webots turns when it loads them.
+
+There robots looked along -z, cylinders stood along y, and many devices looked along other axes. Webots turns
+these nodes, and the instances of its own PROTOs, whose files are of today. A RangeFinder is turned here too,
+so that it looks where its author pointed it.
+Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from palaestra_sim.scene.geometry import (
+    AxisAngle,
+    Matrix,
+    Pose,
+    from_axis_angle,
+    multiply,
+    to_axis_angle,
+)
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+
+# Each has the axes of today as columns, in those of the file.
+_LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
+_POINTING: Final[Matrix] = (0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
+_STANDING: Final = Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, -math.pi / 2.0)))
+
+
+def of_old_axes(node: SceneNode) -> bool:
+    """Return whether a node was written in a file from before R2022a."""
+    return node.origin is not None and node.origin.source.older_than(2022, "")
+
+
+def standing(node: SceneNode, frame: Pose) -> Pose:
+    """Return the frame of a shape or a Track that is along z, although it was along y in its file."""
+    if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
+        return frame
+    return frame.after(_STANDING)
+
+
+def looking(node: SceneNode, place: Place) -> Place:
+    """Return the frame of a device that looks along x with z up; in an old file it is -z with y up."""
+    return _turned(node, place, _LOOKING)
+
+
+def pointing(node: SceneNode, place: Place) -> Place:
+    """Return the frame of a device that points along x with z up; in an old file it is z with y up."""
+    return _turned(node, place, _POINTING)
+
+
+def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
+    """Return the rotation of a node; Webots turns an instance of a PROTO of its own that an old file has."""
+    if not (node.shipped and of_old_axes(node)):
+        return rotation
+    return to_axis_angle(multiply(from_axis_angle(rotation), _LOOKING))
+
+
+def _turned(node: SceneNode, place: Place, axes: Matrix) -> Place:
+    if not of_old_axes(node):
+        return place
+    return Place(place, (0.0, 0.0, 0.0), to_axis_angle(axes))
