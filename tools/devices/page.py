@@ -24,16 +24,17 @@ def page(text: str) -> str:
 
 
 def table() -> str:
-    """Return a row for each type of device: its topics with their messages, and its services."""
+    """Return a row for each type of device: its topics, services, and fields without effect."""
     rows = (_row(kind) for kind in DEVICES.values())
-    return "\n".join(("| node | topics | services |", "|---|---|---|", *rows, ""))
+    return "\n".join(("| node | topics | services | fields without effect |", "|---|---|---|---|", *rows, ""))
 
 
 def _row(kind: Kind[Any]) -> str:
     device = _device(kind)
     topics = ", ".join(f"`{it.name}` ({it.type_name})" for it in kind.topics(device))
     services = ", ".join(f"`{path}`" for path, _, _ in kind.services(device))
-    return f"| {kind.node} | {topics} | {services} |"
+    ignored = ", ".join(f"`{name}`" for name in kind.without_effect.split())
+    return f"| {kind.node} | {topics} | {services} | {ignored} |"
 
 
 def _device(kind: Kind[Any]) -> object:

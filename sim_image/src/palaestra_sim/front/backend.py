@@ -78,6 +78,11 @@ class Backend(Protocol):
         ...
 
     @property
+    def forces(self) -> bool:
+        """Whether the nodes of the world have masses and frictions that matter."""
+        ...
+
+    @property
     def basic_step_ms(self) -> int:
         """WorldInfo.basicTimeStep."""
         ...

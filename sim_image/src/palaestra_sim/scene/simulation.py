@@ -123,6 +123,11 @@ class Simulation:
         return (*self.scene.left_out, *self.tree.ignored)
 
     @property
+    def forces(self) -> bool:
+        """Whether the nodes of the world have masses and frictions that matter."""
+        return self.scene.physics.abilities.forces
+
+    @property
     def basic_step_ms(self) -> int:
         """WorldInfo.basicTimeStep."""
         return self.scene.basic_step_ms

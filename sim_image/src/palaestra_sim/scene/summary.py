@@ -7,11 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final, Protocol
 
 from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, DistanceSensorType
 from palaestra_sim.scene.devices.kind import Kind
+from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.tree.catalogue import without_effect
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 _ROLLS_AND_TURNS: Final = 2
@@ -26,6 +29,11 @@ class Described(Protocol):
     @property
     def robots(self) -> Sequence[Robot]:
         """Its robots."""
+        ...
+
+    @property
+    def forces(self) -> bool:
+        """Whether the nodes of the world have masses and frictions that matter."""
         ...
 
     @property
@@ -94,6 +102,7 @@ def differences(simulation: Described) -> Iterator[str]:
     outlines = [node for node in simulation.tree.nodes.values() if node.outline]
     meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
     yield from _not_in_webots(devices)
+    yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
         yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
     if lidars:
@@ -121,6 +130,24 @@ def _not_in_webots(devices: Iterable[tuple[Kind[Any], Any]]) -> Iterator[str]:
         more = ", ..." if len(of_type) > _MOST_NAMES else ""
         named = ", ".join(of_type[:_MOST_NAMES])
         yield f"{len(of_type)} {type_name}, a type that Webots does not have: {named}{more}"
+
+
+def _without_effect(simulation: Described) -> Iterator[str]:
+    """Yield a line for each type of node with fields that have an effect in Webots alone."""
+    by_ros = [robot.parts.node for robot in simulation.robots if robot.parts.arguments is not None]
+    fields: dict[str, Counter[str]] = {}
+    for node in simulation.tree.nodes.values():
+        matters = _is_on(node, by_ros) if node.type_name in DEVICES else simulation.forces
+        if matters and not node.left_out:
+            fields.setdefault(node.type_name, Counter()).update(without_effect(node))
+    for type_name, names in sorted(fields.items()):
+        if names:
+            yield f"{max(names.values())} {type_name}: without effect: {', '.join(sorted(names))}"
+
+
+def _is_on(node: SceneNode, robots: Sequence[SceneNode]) -> bool:
+    """Return whether a device is on one of these robots."""
+    return any(around in robots for around in node.ancestors())
 
 
 def _of_robot(robot: Robot) -> Iterator[str]:

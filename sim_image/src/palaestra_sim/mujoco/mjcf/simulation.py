@@ -53,6 +53,7 @@ class MjcfSimulation:
         self.time_ms = 0
         self.mode = mode
         self.quit_status: int | None = None
+        self.forces = False  # masses and frictions are MuJoCo's own
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)

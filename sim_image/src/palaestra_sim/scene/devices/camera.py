@@ -185,6 +185,8 @@ def _topics(camera: Camera) -> tuple[Topic, ...]:
 CAMERA: Final = Kind(
     node="Camera",
     name="camera",
+    without_effect="""exposure antiAliasing ambientOcclusionRadius bloomThreshold motionBlur noise
+        noiseMaskUrl lens focus lensFlare""",
     fields="""fieldOfView SFFloat 0.7854; width SFInt32 64; height SFInt32 64; spherical SFBool FALSE;
         near SFFloat 0.01; far SFFloat 0; exposure SFFloat 1; antiAliasing SFBool FALSE;
         ambientOcclusionRadius SFFloat 0; bloomThreshold SFFloat -1; motionBlur SFFloat 0;

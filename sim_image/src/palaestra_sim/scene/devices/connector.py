@@ -124,6 +124,7 @@ def _topics(connector: Connector) -> tuple[Topic, ...]:
 CONNECTOR: Final = Kind(
     node="Connector",
     name="connector",
+    without_effect="autoLock unilateralLock unilateralUnlock snap tensileStrength shearStrength",
     fields="""type SFString symmetric; isLocked SFBool FALSE; autoLock SFBool FALSE;
         unilateralLock SFBool TRUE; unilateralUnlock SFBool TRUE; distanceTolerance SFFloat 0.01;
         axisTolerance SFFloat 0.2; rotationTolerance SFFloat 0.5; numberOfRotations SFInt32 4;

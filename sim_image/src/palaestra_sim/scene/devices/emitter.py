@@ -98,6 +98,7 @@ def _setter(command: Callable[[Any], None]) -> Handler:
 EMITTER: Final = Kind(
     node="Emitter",
     name="emitter",
+    without_effect="aperture baudRate byteSize allowedChannels",
     fields="""type SFString radio; range SFFloat -1; maxRange SFFloat -1; aperture SFFloat -1;
         channel SFInt32 0; baudRate SFInt32 -1; byteSize SFInt32 8; bufferSize SFInt32 -1;
         allowedChannels MFInt32""",

@@ -260,6 +260,7 @@ class Kind(Generic[DeviceT]):
         node: the type of its node.
         name: of a device whose node has none.
         fields: of the node, written as in `catalogue`, beside `name` and, if it is one, those of a Solid.
+        without_effect: those of them that Webots applies and no simulator here does, with blanks between.
         solid: whether a node off joints is a Solid.
         role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
         read: returns the device of a node.
@@ -278,6 +279,7 @@ class Kind(Generic[DeviceT]):
     node: str
     name: str
     fields: str
+    without_effect: str = ""
     solid: bool = True
     role: str = ""
     read: Callable[[Part], DeviceT]

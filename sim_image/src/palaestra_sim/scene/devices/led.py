@@ -36,6 +36,7 @@ def _services(led: Led) -> tuple[Row, ...]:
 LED: Final = Kind(
     node="LED",
     name="led",
+    without_effect="color gradual",
     fields="color MFColor 1 0 0; gradual SFBool FALSE",
     read=_read,
     services=_services,

@@ -298,6 +298,7 @@ def _cloud(lidar: Lidar) -> Topic:
 LIDAR: Final = Kind(
     node="Lidar",
     name="lidar",
+    without_effect="near spherical rotatingHead",
     fields="""tiltAngle SFFloat 0; horizontalResolution SFInt32 512; fieldOfView SFFloat 1.5708;
         verticalFieldOfView SFFloat 0.2; numberOfLayers SFInt32 4; near SFFloat 0.01;
         minRange SFFloat 0.01; maxRange SFFloat 1; spherical SFBool TRUE; type SFString fixed;

@@ -183,6 +183,7 @@ def _unable(motor: Motor, effort: str) -> Handler:
 ROTATIONAL_MOTOR: Final = Kind(
     node="RotationalMotor",
     name="rotational motor",
+    without_effect="consumptionFactor sound muscles",
     fields=_FIELDS.format("maxTorque", "rotational_motor"),
     role="motor",
     read=_reader("maxTorque"),
@@ -193,6 +194,7 @@ ROTATIONAL_MOTOR: Final = Kind(
 LINEAR_MOTOR: Final = Kind(
     node="LinearMotor",
     name="linear motor",
+    without_effect="consumptionFactor sound muscles",
     fields=_FIELDS.format("maxForce", "linear_motor"),
     role="motor",
     read=_reader("maxForce"),

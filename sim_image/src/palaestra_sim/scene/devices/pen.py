@@ -38,6 +38,7 @@ def _services(pen: Pen) -> tuple[Row, ...]:
 PEN: Final = Kind(
     node="Pen",
     name="pen",
+    without_effect="inkColor inkDensity leadSize maxDistance",
     fields="""inkColor SFColor 0 0 0; inkDensity SFFloat 0.5; leadSize SFFloat 0.002; maxDistance SFFloat 0;
         write SFBool TRUE""",
     read=_read,

@@ -112,6 +112,7 @@ def _topics(finder: RangeFinder) -> tuple[Topic, ...]:
 RANGE_FINDER: Final = Kind(
     node="RangeFinder",
     name="range-finder",
+    without_effect="motionBlur noise lens",
     fields="""fieldOfView SFFloat 0.7854; width SFInt32 64; height SFInt32 64; spherical SFBool FALSE;
         near SFFloat 0.01; minRange SFFloat 0.01; maxRange SFFloat 1; motionBlur SFFloat 0;
         noise SFFloat 0; resolution SFFloat -1; lens SFNode""",

@@ -105,6 +105,7 @@ def _topics(receiver: Receiver) -> tuple[Topic, ...]:
 RECEIVER: Final = Kind(
     node="Receiver",
     name="receiver",
+    without_effect="aperture baudRate byteSize signalStrengthNoise directionNoise allowedChannels",
     fields="""type SFString radio; aperture SFFloat -1; channel SFInt32 0; baudRate SFInt32 -1;
         byteSize SFInt32 8; bufferSize SFInt32 -1; signalStrengthNoise SFFloat 0;
         directionNoise SFFloat 0; allowedChannels MFInt32""",

@@ -44,6 +44,7 @@ def _services(skin: Skin) -> tuple[Row, ...]:
 SKIN: Final = Kind(
     node="Skin",
     name="skin",
+    without_effect="modelUrl appearance bones castShadows",
     fields="""translation SFVec3f 0 0 0; rotation SFRotation 0 0 1 0; scale SFVec3f 1 1 1; modelUrl SFString;
         appearance MFNode; bones MFNode; castShadows SFBool TRUE; translationStep SFFloat 0.01;
         rotationStep SFFloat 0.261799387""",

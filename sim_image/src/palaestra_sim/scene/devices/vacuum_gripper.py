@@ -67,6 +67,7 @@ def _topics(gripper: VacuumGripper) -> tuple[Topic, ...]:
 VACUUM_GRIPPER: Final = Kind(
     node="VacuumGripper",
     name="vacuum gripper",
+    without_effect="tensileStrength shearStrength",
     fields="isOn SFBool FALSE; tensileStrength SFFloat -1; shearStrength SFFloat -1",
     read=_read,
     services=_services,

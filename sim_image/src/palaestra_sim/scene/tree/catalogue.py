@@ -135,6 +135,35 @@ _FIELDS: Final = {
     "Plane": "size SFVec2f 1 1",
 }
 
+_WITHOUT_EFFECT: Final = {
+    "WorldInfo": "CFM ERP physics defaultDamping inkEvaporation",
+    "Solid": "immersionProperties",
+    "Robot": "immersionProperties selfCollision",
+    "HingeJointParameters": """
+        suspensionSpringConstant suspensionDampingConstant suspensionAxis stopERP stopCFM""",
+    "Physics": "damping",
+    "ContactProperties": """
+        frictionRotation rollingFriction bounce bounceVelocity forceDependentSlip softERP softCFM""",
+}
+
+
+def without_effect(node: SceneNode) -> list[str]:
+    """Return the fields of a node that Webots applies and no simulator here does, except at defaults."""
+    kind = DEVICES.get(node.type_name)
+    names = (kind.without_effect if kind else _WITHOUT_EFFECT.get(node.type_name, "")).split()
+    kinds = _kinds(node.type_name)
+    return [name for name in names if name in node.fields and not _is_default(kinds[name], node.fields[name])]
+
+
+def _is_default(kind: FieldKind, content: FieldContent) -> bool:
+    """Return whether a field has the value that it has in a node that does not name it."""
+    items = [item for item in content.items if item not in {None, ""}]
+    if kind.type in {FieldType.STRING, FieldType.NODE}:
+        return items == ([kind.default] if kind.default else [])
+    if kind.type is FieldType.BOOL:
+        return items == [kind.default == "TRUE"]
+    return items == [float(word) for word in kind.default.split()]
+
 
 def field_kinds(type_name: str) -> dict[str, FieldKind]:
     """Return the fields of a node type in the order that indices count; {} for an unknown type."""

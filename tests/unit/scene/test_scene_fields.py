@@ -1,0 +1,120 @@
+"""No field of a device is accepted that is neither applied, nor refused, nor named at the start."""
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.summary import differences
+from palaestra_sim.scene.tree.catalogue import FieldType, field_kinds
+from palaestra_sim.stub.physics import StubPhysics
+
+OTHER = {
+    FieldType.INT32: "3",
+    FieldType.FLOAT: "0.7",
+    FieldType.VEC3F: "0.3 0.4 0.5",
+    FieldType.ROTATION: "0 0 1 0.3",
+    FieldType.COLOR: "0.2 0.3 0.4",
+    FieldType.STRING: '"x"',
+}
+NODES = {
+    "physics": "Physics { }",
+    "boundingObject": "Box { }",
+    "children": "[ Pose { } ]",
+    "muscles": "[ Muscle { } ]",
+    "lens": "Lens { }",
+    "lensFlare": "LensFlare { }",
+    "focus": "Focus { }",
+    "zoom": "Zoom { }",
+    "recognition": "Recognition { }",
+    "rotatingHead": "Solid { }",
+    "appearance": "[ Appearance { } ]",
+    "bones": "[ SolidReference { } ]",
+}
+# Steps of an editor, texts for people, and what Webots itself ignores.
+FOR_PEOPLE = {
+    "translationStep",
+    "rotationStep",
+    "description",
+    "locked",
+    "GPS.type",
+    "TouchSensor.lookupTable",
+}
+# Where it would matter, it is looked at: for a light, a bumper of another type, a radar, a fluid and so on.
+ELSEWHERE = {
+    "LightSensor.colorFilter", "LightSensor.occlusion",  # the stub refuses lights
+    "TouchSensor.resolution", "DistanceSensor.redColorSensitivity", "GPS.noiseCorrelation",
+    "radarCrossSection", "recognitionColors", "contactMaterial", "immersionProperties", "physics",
+}  # fmt: skip
+
+
+def sample(kind, name):
+    """Return a value of a field that is not its default."""
+    if kind.type is FieldType.NODE:
+        return NODES[name]
+    if kind.type is FieldType.BOOL:
+        return "FALSE" if kind.default == "TRUE" else "TRUE"
+    return f"[ {OTHER[kind.type]} ]" if kind.multiple else OTHER[kind.type]
+
+
+def load(type_name, field, physics):
+    """Return the simulation of a robot with a device that has that field."""
+    kind = DEVICES[type_name]
+    device = f"{type_name} {{ {field} }}"
+    part = f"HingeJoint {{ device {device} }}" if kind.on_joint else device
+    arguments = 'controllerArgs [ "--name=r" "--synchronize" ]'
+    robot = f'Robot {{ controller "ros" {arguments} children [ {part} ] }}'
+    return Simulation.load(f"#VRML_SIM R2023b utf8\nWorldInfo {{ }} {robot}\n".encode(), physics)
+
+
+FIELDS = [
+    (type_name, name)
+    for type_name in DEVICES
+    for name in field_kinds(type_name)
+    if not {name, f"{type_name}.{name}"} & (FOR_PEOPLE | ELSEWHERE)
+]
+
+
+@pytest.mark.parametrize("physics", [StubPhysics, MujocoPhysics])
+def test_no_field_of_a_device_is_ignored_in_silence(physics):
+    """Somebody would train with a noise, a delay or an aperture that is not there."""
+    ignored = []
+    for type_name, name in FIELDS:
+        kind = field_kinds(type_name)[name]
+        try:
+            simulation = load(type_name, f"{name} {sample(kind, name)}", physics())
+        except WorldError:
+            continue
+        nodes = [it for it in simulation.tree.nodes.values() if it.type_name == type_name]
+        named = any(f"{type_name}: without effect: {name}" in line for line in differences(simulation))
+        if not named and not any(name in node.looked_at for node in nodes):
+            ignored.append(f"{type_name}.{name}")
+
+    assert ignored == []
+
+
+@pytest.mark.parametrize(
+    ("type_name", "name"),
+    [(kind.node, name) for kind in DEVICES.values() for name in kind.without_effect.split()],
+)
+def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, name):
+    """A world that was saved by Webots has many defaults."""
+    kind = field_kinds(type_name)[name]
+    line = f"1 {type_name}: without effect: {name}"
+    words = {FieldType.STRING: f'"{kind.default}"', FieldType.NODE: "NULL"}.get(kind.type, kind.default)
+    default = ("[ ]" if kind.multiple and not kind.default else words) or "NULL"
+
+    assert line in list(differences(load(type_name, f"{name} {sample(kind, name)}", StubPhysics())))
+    assert line not in list(differences(load(type_name, f"{name} {default}", StubPhysics())))
+
+
+def test_fields_of_physics_without_effect_are_named_where_forces_act():
+    """The stub has none, so nobody expects bounces of it."""
+    bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 }"
+    world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
+
+    assert list(differences(Simulation.load(world, MujocoPhysics()))) == [
+        "1 ContactProperties: without effect: bounce"
+    ]
+    assert list(differences(Simulation.load(world, StubPhysics()))) == []
