@@ -108,9 +108,8 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     """Return the simulator of one slot."""
     world = _world(given, slot)
     robots = preparation.described(preparation.read(world), str(world))
-    root = (
-        given.root if world == Path(given.world).absolute() else preparation.root_of(given.world, given.root)
-    )
+    unchanged = world == Path(given.world).absolute()
+    root = given.root if unchanged else preparation.root_of_model(given.world, given.root)
     launch = Launch(world=world, root=root, options=given.option, program=given.program)
     left_out = _left_out(given, world)
     own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})

@@ -13,7 +13,7 @@ from pathlib import Path
 from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import RootError, SidecarError, WorldError
 from palaestra_sim.sidecar import project
-from palaestra_sim.world import RunIdentity, builtin_path, generate, placed, rename, robots, suffix
+from palaestra_sim.world import MJCF, RunIdentity, builtin_path, generate, placed, rename, robots, suffix
 from palaestra_sim.world import root_of as root_around
 from palaestra_sim.world.bounded import read_bounded
 
@@ -95,6 +95,15 @@ def root_of(world: Path, given: Path | None) -> Path:
         raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
 
 
+def root_of_model(world: Path, given: Path | None) -> Path | None:
+    """Return the same for a model of MuJoCo; None for another world, of which no simulator here asks it.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    return root_of(world, given) if suffix(read(world)) == MJCF else None
+
+
 def _written(
     world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool, root: Path | None
 ) -> Path:
@@ -104,9 +113,9 @@ def _written(
         generated, linked = make(), as_project and project.has_project(source)
     except WorldError:
         generated, linked = make(relative_addresses=True), True
-    around = root_of(world, root)
     try:
         if as_project or linked:
+            around = root_of(world, root)
             path = project.lay_out(source, work / _PROJECT, around, linked=linked) / path.name
         return _write_whole(path, generated)
     except OSError as error:
