@@ -111,7 +111,7 @@ def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, na
 
 def test_fields_of_physics_without_effect_are_named_where_forces_act():
     """The stub has none, so nobody expects bounces of it."""
-    bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 }"
+    bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 } ContactProperties { bounce 0 }"
     world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
 
     assert list(differences(Simulation.load(world, MujocoPhysics()))) == [

@@ -55,10 +55,10 @@ class Source:
         return match.group().decode()
 
     def older_than(self, year: int, letter: str) -> bool:
-        """Return whether the file is of a release before R`year``letter`, such as R2022a."""
+        """Return whether the file is of a release of Webots before R`year``letter`, such as R2022a."""
         match = _RELEASE.match(self.data, self.begin)
         if match is None:
-            return not self.headless
+            return not self.headless and _HEADER.match(self.data, self.begin) is not None
         return (int(match["year"]), match["letter"].decode()) < (year, letter)
 
     def error(self, offset: int, fact: str, remedy: str) -> WorldError:

@@ -147,17 +147,24 @@ _WITHOUT_EFFECT: Final = {
 }
 
 
+_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of such fields with which nothing differs
+
+
 def without_effect(node: SceneNode) -> list[str]:
     """Return the fields of a node that Webots applies and no simulator here does, except at defaults."""
     kind = DEVICES.get(node.type_name)
     names = (kind.without_effect if kind else _WITHOUT_EFFECT.get(node.type_name, "")).split()
     kinds = _kinds(node.type_name)
-    return [name for name in names if name in node.fields and not _is_default(kinds[name], node.fields[name])]
+    return [
+        name for name in names if name in node.fields and not _is_plain(name, kinds[name], node.fields[name])
+    ]
 
 
-def _is_default(kind: FieldKind, content: FieldContent) -> bool:
-    """Return whether a field has the value that it has in a node that does not name it."""
+def _is_plain(name: str, kind: FieldKind, content: FieldContent) -> bool:
+    """Return whether a field has its default, or the value with which nothing differs."""
     items = [item for item in content.items if item not in {None, ""}]
+    if items == _AS_SIMULATED.get(name):
+        return True
     if kind.type in {FieldType.STRING, FieldType.NODE}:
         return items == ([kind.default] if kind.default else [])
     if kind.type is FieldType.BOOL:
