@@ -65,8 +65,8 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
-Y_TO_Z: Final[AxisAngle] = (1.0, 0.0, 0.0, math.pi / 2.0)
-_Y_UP: Final = Pose(rotation=transposed(from_axis_angle(Y_TO_Z)))  # of a frame with z up, in one with y up
+_Y_TO_Z: Final[AxisAngle] = (1.0, 0.0, 0.0, math.pi / 2.0)
+_Y_UP: Final = Pose(rotation=transposed(from_axis_angle(_Y_TO_Z)))  # of a frame with z up, in one with y up
 _STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
@@ -105,8 +105,8 @@ class _RobotReader:
         self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
         # Where the robot stands does not matter to its parts: they are read in its own frame, with z up.
-        self._lies = self._is_drawn_with_y_up()
-        self._frame = Place(None, (0.0, 0.0, 0.0), Y_TO_Z if self._lies else (0.0, 0.0, 1.0, 0.0))
+        self._y_points_up = self._has_y_up()
+        self._frame = Place(None, (0.0, 0.0, 0.0), _Y_TO_Z if self._y_points_up else (0.0, 0.0, 1.0, 0.0))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
         self._carried: list[Shape] = []  # of what motors move, if forces matter
@@ -141,7 +141,7 @@ class _RobotReader:
                 Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
             )
         place = self._place(body)
-        own = TurnedPlace(place, Y_TO_Z) if self._lies else place
+        own = TurnedPlace(place, _Y_TO_Z) if self._y_points_up else place
         self._settle(own)
         return RobotParts(
             node=node,
@@ -170,7 +170,7 @@ class _RobotReader:
         """Return whether a robot without a drive has a body: upright, at the top of the world."""
         return bool(shapes) and self._at_top and Place(self._parent, *self._start).ground_pose.upright
 
-    def _is_drawn_with_y_up(self) -> bool:
+    def _has_y_up(self) -> bool:
         """Return whether y of the robot points up, as in worlds whose y axis does."""
         frame = Place(self._parent, *_where(self._reading, self._node))
         return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(_Y_UP).upright
@@ -179,7 +179,7 @@ class _RobotReader:
     def _start(self) -> tuple[Vector, AxisAngle]:
         """Where the frame of the robot with z up is at first, in the frame around it."""
         translation, rotation = _where(self._reading, self._node)
-        if self._lies:
+        if self._y_points_up:
             rotation = to_axis_angle(multiply(from_axis_angle(rotation), _Y_UP.rotation))
         return translation, rotation
 
