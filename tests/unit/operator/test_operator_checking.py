@@ -58,8 +58,9 @@ def slow() -> Iterator[Slow]:
 
 
 @pytest.fixture
-def begin() -> Iterator[Begin]:
-    """A function that starts the checks, which end with the test."""
+def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Begin]:
+    """A function that starts the checks, which end with the test; a busy machine ends no turn before."""
+    monkeypatch.setattr("palaestra.operator.checking.HANDED_S", 60.0)
     begun: list[Checking] = []
 
     def start(apart: Slow) -> Checking:
