@@ -45,7 +45,7 @@ def files(folders: Sequence[Path]) -> Iterator[Path]:
 
 
 def refusal(file: Path) -> str | None:
-    """Return why a model does not start, "" if it does; None: MuJoCo has no such model with an actuator."""
+    """Return the refusal of a model, "" if it starts, None if MuJoCo loads no model with an actuator."""
     if run(sys.executable, "-c", IS_MODEL, file).returncode:
         return None
     check = run(Path(sys.executable).with_name("palaestra-mujoco"), "--check", file)

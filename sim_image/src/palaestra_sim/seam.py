@@ -108,7 +108,7 @@ def topic_name(name: str) -> str:
     return name.translate(_REPLACED)
 
 
-def ros_name(name: str) -> str:
+def as_ros_name(name: str) -> str:
     """Return a name with an underscore in the place of each character that `is_ros_name` refuses."""
     return "/".join(_ILLEGAL.sub("_", part) for part in name.split("/") if part) or "_"
 

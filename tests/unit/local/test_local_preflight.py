@@ -154,7 +154,7 @@ def test_the_error_for_a_missing_world_file_has_its_path(request_for):
 
 
 def test_a_world_without_an_end_is_refused(request_for, tmp_path):
-    """It would fill the memory, or wait for somebody who writes."""
+    """A device without an end fills the memory, and opening a pipe blocks the check."""
     device, pipe = tmp_path / "device.wbt", tmp_path / "pipe.wbt"
     device.symlink_to("/dev/zero")
     os.mkfifo(pipe)

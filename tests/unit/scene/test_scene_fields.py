@@ -5,6 +5,7 @@ import pytest
 from palaestra_sim.errors import WorldError
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.summary import differences
 from palaestra_sim.scene.tree.catalogue import FieldType, field_kinds
@@ -76,9 +77,35 @@ FIELDS = [
 ]
 
 
+class Watched(dict):
+    """The fields of a node, which record those whose values somebody gets."""
+
+    def __init__(self):
+        super().__init__()
+        self.looked_at = set()
+
+    def get(self, name, default=None):
+        """Return the content of a field."""
+        self.looked_at.add(name)
+        return super().get(name, default)
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    """Record, of each node, the fields whose values somebody gets."""
+    begin = SceneNode.__init__
+
+    def begun(node, *given):
+        begin(node, *given)
+        node.fields = Watched()
+
+    monkeypatch.setattr(SceneNode, "__init__", begun)
+
+
+@pytest.mark.usefixtures("watched")
 @pytest.mark.parametrize("physics", [StubPhysics, MujocoPhysics])
 def test_no_field_of_a_device_is_ignored_in_silence(physics):
-    """Somebody would train with a noise, a delay or an aperture that is not there."""
+    """A user would train without the noise, the delay or the aperture that the world sets."""
     ignored = []
     for type_name, name in FIELDS:
         kind = field_kinds(type_name)[name]
@@ -88,7 +115,7 @@ def test_no_field_of_a_device_is_ignored_in_silence(physics):
             continue
         nodes = [it for it in simulation.tree.nodes.values() if it.type_name == type_name]
         named = any(f"{type_name}: without effect: {name}" in line for line in differences(simulation))
-        if not named and not any(name in node.looked_at for node in nodes):
+        if not named and not any(name in node.fields.looked_at for node in nodes):
             ignored.append(f"{type_name}.{name}")
 
     assert ignored == []
@@ -110,7 +137,7 @@ def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, na
 
 
 def test_fields_of_physics_without_effect_are_named_where_forces_act():
-    """The stub has none, so nobody expects bounces of it."""
+    """The stub simulates no forces, so its users expect no bounces."""
     bouncing = "ContactProperties { bounce 0.9 softCFM 0.001 } ContactProperties { bounce 0 }"
     world = f"#VRML_SIM R2023b utf8\nWorldInfo {{ contactProperties [ {bouncing} ] }}\n".encode()
 

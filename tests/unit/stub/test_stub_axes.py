@@ -184,7 +184,7 @@ def test_a_world_of_old_axes_is_the_same_world(left, right):
 
 
 def test_a_supervisor_turns_a_robot_of_old_axes_in_the_axes_of_the_file():
-    """What is written is read back, and the robot looks along its own -z."""
+    """A read returns the value of the last write, and the robot looks along its own -z axis."""
     (robot,) = load_car("R2021b").robots
     place = robot.parts.node.place
     start = place.translation, place.rotation

@@ -7,7 +7,7 @@ ACTUATOR = '<actuator><motor joint="hinge"/></actuator>'
 
 
 def test_only_models_with_an_actuator_count_and_a_refused_one_is_named(tmp_path, capsys):
-    """A part of a model, and a file that MuJoCo refuses too, are nobody's world."""
+    """The count skips parts of models, and files that MuJoCo refuses."""
     skin = tmp_path / "skin.png"
     texture = f'<asset><texture type="2d" file="{skin}" width="1" height="1" builtin="flat"/></asset>'
     for name, text in {"good": BODY + ACTUATOR, "part": BODY, "bad": texture + BODY + ACTUATOR}.items():

@@ -109,6 +109,11 @@ def from_axis_angle(rotation: AxisAngle) -> Matrix:
     )
 
 
+def turned(rotation: AxisAngle, by: Matrix) -> AxisAngle:
+    """Return a rotation after a turn `by` in its own frame."""
+    return to_axis_angle(multiply(from_axis_angle(rotation), by))
+
+
 def to_axis_angle(m: Matrix) -> AxisAngle:
     """Return axis and angle in [0, pi] of a rotation; of no rotation, the z axis."""
     x, y, z, w = to_quaternion(m)

@@ -8,24 +8,16 @@ Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
-from palaestra_sim.scene.geometry import (
-    AxisAngle,
-    Matrix,
-    Pose,
-    from_axis_angle,
-    multiply,
-    to_axis_angle,
-)
+from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, to_axis_angle, transposed, turned
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.places import Y_UP, Place
 
 # Each has the axes of today as columns, in those of the file.
 _LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
 _POINTING: Final[Matrix] = (0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
-_STANDING: Final = Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, -math.pi / 2.0)))
+_STANDING: Final = Pose(rotation=transposed(Y_UP))
 
 
 def of_old_axes(node: SceneNode) -> bool:
@@ -54,7 +46,7 @@ def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
     """Return the rotation of a node; Webots turns an instance of a PROTO of its own that an old file has."""
     if not (node.shipped and of_old_axes(node)):
         return rotation
-    return to_axis_angle(multiply(from_axis_angle(rotation), _LOOKING))
+    return turned(rotation, _LOOKING)
 
 
 def _turned(node: SceneNode, place: Place, axes: Matrix) -> Place:

@@ -14,7 +14,7 @@ from typing import Final
 
 from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, Vector, from_axis_angle, transposed, turn
 
-_Y_UP: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
+Y_UP: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
 
 
 class Place:
@@ -125,4 +125,4 @@ class YUp(Place):
     @property
     def axes(self) -> Matrix:
         """The rotation that makes z of y."""
-        return _Y_UP
+        return Y_UP

@@ -5,12 +5,14 @@ from __future__ import annotations
 from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.geometry import (
     AxisAngle,
+    Matrix,
     Pose,
     Vector,
     from_axis_angle,
     multiply,
     to_axis_angle,
     transposed,
+    turned,
 )
 from palaestra_sim.scene.places import Place
 
@@ -72,15 +74,15 @@ class TurnedPlace(Place):
         turn: of the frame of the file in it.
     """
 
-    def __init__(self, upright: Place, turn: AxisAngle) -> None:
-        super().__init__(upright, (0.0, 0.0, 0.0), turn)
+    def __init__(self, upright: Place, turn: Matrix) -> None:
+        super().__init__(upright, (0.0, 0.0, 0.0), to_axis_angle(turn))
         self._upright = upright
-        self._turn = Pose(rotation=from_axis_angle(turn))
+        self._turn = turn
 
     @property
     def pose(self) -> Pose:
         """The frame, in the one with z up."""
-        return self._turn
+        return Pose(rotation=self._turn)
 
     @property
     def translation(self) -> Vector:
@@ -94,12 +96,11 @@ class TurnedPlace(Place):
     @property
     def rotation(self) -> AxisAngle:
         """The rotation of the frame of the file, in the frame around the robot."""
-        return to_axis_angle(multiply(from_axis_angle(self._upright.rotation), self._turn.rotation))
+        return turned(self._upright.rotation, self._turn)
 
     @rotation.setter
     def rotation(self, value: AxisAngle) -> None:
-        inverse = transposed(self._turn.rotation)
-        self._upright.rotation = to_axis_angle(multiply(from_axis_angle(value), inverse))
+        self._upright.rotation = turned(value, transposed(self._turn))
 
     def return_to_start(self) -> None:
         """Return with the frame that has z up."""

@@ -7,7 +7,6 @@ Everything else on a joint moves with it, but touches nothing, unless the physic
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -19,14 +18,14 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Devices, Kind, Part, Shaft
 from palaestra_sim.scene.drive import find_drive
 from palaestra_sim.scene.geometry import (
+    IDENTITY,
     AxisAngle,
     Pose,
     Vector,
-    from_axis_angle,
-    multiply,
     to_axis_angle,
     transposed,
     turn,
+    turned,
 )
 from palaestra_sim.scene.joint_reader import parameters_of, read_joint
 from palaestra_sim.scene.joints import Joint, JointPlace, unit
@@ -36,7 +35,7 @@ from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Place, YUp
+from palaestra_sim.scene.places import Y_UP, Place, YUp
 from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
 from palaestra_sim.scene.robot_place import RobotPlace, TurnedPlace
@@ -65,8 +64,6 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
-_Y_TO_Z: Final[AxisAngle] = (1.0, 0.0, 0.0, math.pi / 2.0)
-_Y_UP: Final = Pose(rotation=transposed(from_axis_angle(_Y_TO_Z)))  # of a frame with z up, in one with y up
 _STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
@@ -106,7 +103,7 @@ class _RobotReader:
         self._devices = Devices()
         # Where the robot stands does not matter to its parts: they are read in its own frame, with z up.
         self._y_points_up = self._has_y_up()
-        self._frame = Place(None, (0.0, 0.0, 0.0), _Y_TO_Z if self._y_points_up else (0.0, 0.0, 1.0, 0.0))
+        self._frame = Place(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
         self._carried: list[Shape] = []  # of what motors move, if forces matter
@@ -141,7 +138,7 @@ class _RobotReader:
                 Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
             )
         place = self._place(body)
-        own = TurnedPlace(place, _Y_TO_Z) if self._y_points_up else place
+        own = TurnedPlace(place, Y_UP) if self._y_points_up else place
         self._settle(own)
         return RobotParts(
             node=node,
@@ -173,14 +170,15 @@ class _RobotReader:
     def _has_y_up(self) -> bool:
         """Return whether y of the robot points up, as in worlds whose y axis does."""
         frame = Place(self._parent, *_where(self._reading, self._node))
-        return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(_Y_UP).upright
+        z_up = Pose(rotation=transposed(Y_UP))
+        return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(z_up).upright
 
     @property
     def _start(self) -> tuple[Vector, AxisAngle]:
         """Where the frame of the robot with z up is at first, in the frame around it."""
         translation, rotation = _where(self._reading, self._node)
         if self._y_points_up:
-            rotation = to_axis_angle(multiply(from_axis_angle(rotation), _Y_UP.rotation))
+            rotation = turned(rotation, transposed(Y_UP))
         return translation, rotation
 
     @property

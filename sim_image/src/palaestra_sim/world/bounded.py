@@ -18,7 +18,7 @@ def read_bounded(path: Path) -> bytes:
     Raises:
         OSError: it cannot be read, is no regular file, or is too large.
     """
-    if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe waits for somebody who writes
+    if not stat.S_ISREG(path.stat().st_mode):  # opening a pipe blocks until a process writes to it
         raise OSError(errno.EINVAL, "is no regular file", str(path))
     with path.open("rb") as file:
         found = file.read(MOST_BYTES + 1)

@@ -17,7 +17,7 @@ from palaestra_sim.scene.devices.kind import Devices, Kind, Sample, Shaft
 from palaestra_sim.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.reading import LeaveOut
-from palaestra_sim.seam import ros_name
+from palaestra_sim.seam import as_ros_name
 from palaestra_sim.world.mjcf import LEFT_OUT, Description
 
 _ACTUATOR: Final = "actuator"
@@ -180,9 +180,9 @@ class _Fitter:
         """
         key = f"{section}/{default}"
         self._known.add(key)
-        plain = ros_name(default)
+        plain = as_ros_name(default)
         if key not in self._names and f"{folder}{plain}" in self._found.devices.rows:
-            return f"{folder}{ros_name(other)}"
+            return f"{folder}{as_ros_name(other)}"
         name = self._names.get(key, plain)
         return None if name == LEFT_OUT else f"{folder}{name}"
 

@@ -338,7 +338,7 @@ class Devices:
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
 
     def trouble_with(self, name: str) -> str | None:
-        """Return why no client could reach another device of that name; None: one could."""
+        """Return the reason to refuse another device of that name, None if there is none."""
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):

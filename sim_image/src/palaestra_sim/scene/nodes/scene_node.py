@@ -54,7 +54,6 @@ class SceneNode:
         def_name: "" if it has none.
         parent: None for the root.
         fields: those that were written or set, by name.
-        looked_at: the names of the fields whose values were asked for.
         twins: this node and those that are the same one in the file, `DEF` and `USE`: a write reaches all.
         place: its frame; None for a node without one, such as an appearance.
         outline: whether it, or a twin, is part of a boundingObject.
@@ -72,7 +71,6 @@ class SceneNode:
         self.proto_name = ""
         self.def_name = ""
         self.fields: dict[str, FieldContent] = {}
-        self.looked_at: set[str] = set()
         self.twins: list[SceneNode] = [self]
         self.place: Place | None = None
         self.outline = False
@@ -83,7 +81,6 @@ class SceneNode:
 
     def numbers(self, name: str) -> tuple[float, ...] | None:
         """Return the numbers of a field; None if it is absent or has another value."""
-        self.looked_at.add(name)
         content = self.fields.get(name)
         if content is None:
             return None
@@ -125,6 +122,5 @@ class SceneNode:
             node = node.parent
 
     def _items(self, name: str) -> list[Content]:
-        self.looked_at.add(name)
         content = self.fields.get(name)
         return [] if content is None else content.items
