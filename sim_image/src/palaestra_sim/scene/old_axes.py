@@ -34,12 +34,12 @@ def standing(node: SceneNode, frame: Pose) -> Pose:
 
 def looking(node: SceneNode, place: Place) -> Place:
     """Return the frame of a device that looks along x with z up; in an old file it is -z with y up."""
-    return _turned(node, place, _LOOKING)
+    return _in_axes(node, place, _LOOKING)
 
 
 def pointing(node: SceneNode, place: Place) -> Place:
     """Return the frame of a device that points along x with z up; in an old file it is z with y up."""
-    return _turned(node, place, _POINTING)
+    return _in_axes(node, place, _POINTING)
 
 
 def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
@@ -49,7 +49,7 @@ def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
     return turned(rotation, _LOOKING)
 
 
-def _turned(node: SceneNode, place: Place, axes: Matrix) -> Place:
+def _in_axes(node: SceneNode, place: Place, axes: Matrix) -> Place:
     if not of_old_axes(node):
         return place
     return Place(place, (0.0, 0.0, 0.0), to_axis_angle(axes))

@@ -376,7 +376,7 @@ class _RobotReader:
             self._reading.lacks(node, trouble, _NAME_IT)
         if node.left_out:
             return None
-        self._devices.rows[name] = kind, device
+        self._devices.add(name, kind, device)
         self._devices.nodes[name] = node
         if shaft is not None:
             self._devices.shafts[name] = shaft

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from palaestra_sim.errors import RootError, refusal
+from palaestra_sim.errors import RootError
 from palaestra_sim.world import mjcf
 from palaestra_sim.world.checks import relative_addresses
 from palaestra_sim.world.paths import climb, is_relative
@@ -39,8 +39,7 @@ def _levels(source: bytes, world: Path, given: Path | None) -> int:
     """Return by how many folders the files that a world names, and that are there, lead above its own."""
     if mjcf.is_mjcf(source):
         project = mjcf.Project(world, mjcf.describe(source, str(world)), given)
-        if error := refusal(project.read()) or refusal(project.strays()):
-            raise error
+        project.open()
         return project.levels
     addresses = filter(is_relative, relative_addresses(source, str(world)))
     return max((climb(it) for it in addresses if (world.parent / it).exists()), default=0)

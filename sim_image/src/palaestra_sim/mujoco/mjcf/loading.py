@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
-from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.errors import WorldError
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.mjcf.model import Model
 from palaestra_sim.mujoco.mjcf.robot import Equipment, body_of, equip
@@ -43,8 +43,7 @@ def load(
     mjcf.check(source, world_path.name, relative_addresses=True)
     description = mjcf.describe(source, world_path.name)
     project = mjcf.Project(world_path, description, root)
-    if error := refusal(project.read()) or refusal(project.strays()):
-        raise error
+    project.open()
     description = mjcf.with_parts(description, project.roots)
     compiled = _compiled(world_path)
     model = Model(compiled, _keyframe(compiled, description))

@@ -163,7 +163,7 @@ class _Fitter:
             error = self._description.error(section, name, trouble, remedy)
             self._found.refused.append(error)
             return False
-        devices.rows[name] = kind, device
+        devices.add(name, kind, device)
         if joint is not None:
             shaft = devices.shafts[name] = self._shaft(joint)
             shaft.names.setdefault(kind.role, name)

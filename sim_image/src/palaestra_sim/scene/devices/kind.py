@@ -321,6 +321,12 @@ class Devices:
     rows: dict[str, tuple[Kind[Any], Any]] = field(default_factory=dict)
     nodes: dict[str, SceneNode] = field(default_factory=dict)
     shafts: dict[str, Shaft] = field(default_factory=dict)
+    _by_topic: dict[str, str] = field(default_factory=dict)
+
+    def add(self, name: str, kind: Kind[Any], device: Any) -> None:
+        """Add a device, or exchange that of the same name."""
+        self.rows[name] = kind, device
+        self._by_topic[topic_name(name)] = name
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -344,7 +350,7 @@ class Devices:
         if not is_ros_name(name):
             return f"a device {name!r}, a name that ROS does not take"
         path = topic_name(name)
-        same = next((known for known in self.rows if topic_name(known) == path), None)
+        same = self._by_topic.get(path)
         return None if same is None else f"devices {same!r} and {name!r}, whose topics are both {path!r}"
 
     def of(self, kind: Kind[DeviceT]) -> tuple[DeviceT, ...]:

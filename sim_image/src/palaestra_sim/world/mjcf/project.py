@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from palaestra_sim.errors import WorldError
+from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.world.bounded import read_bounded
 from palaestra_sim.world.mjcf.description import Description
 from palaestra_sim.world.mjcf.elements import Element, read
@@ -60,7 +60,17 @@ class Project:
         self._description = description
         self._named: list[_Named] = []
 
-    def read(self) -> Iterator[WorldError]:
+    def open(self) -> None:
+        """Read all included files, and look where all files are.
+
+        Raises:
+            WorldError: an included file is wrong, or a file is outside of the project.
+            OSError: an included file cannot be read.
+        """
+        if error := refusal(self._read()) or refusal(self._strays()):
+            raise error
+
+    def _read(self) -> Iterator[WorldError]:
         """Read all included files; yield what is wrong with them."""
         description = self._description
         waiting = [("", description.source, description.root)]
@@ -89,7 +99,7 @@ class Project:
         """By how many folders the files lead above that of the world."""
         return max((climb(named.path) for named in self._named), default=0)
 
-    def strays(self) -> Iterator[WorldError]:
+    def _strays(self) -> Iterator[WorldError]:
         """Yield an error for each file that is outside of the project."""
         nearest = None if self.levels >= self._top else (self._folder, *self._folder.parents)[self.levels]
         root = self._root or nearest
