@@ -24,7 +24,6 @@ def refused(scene, words, **event):
         'Error creating: pods "job-0-x" is forbidden: exceeded quota: compute',
         'Error creating: pods "job-0-x" is forbidden: violates PodSecurity "restricted:latest"',
         'Error creating: admission webhook "sizes.example.com" denied the request: too large',
-        'Error creating: pods "job-0-x" is forbidden: minimum cpu usage per Container is 1',
     ],
 )
 def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
@@ -37,6 +36,53 @@ def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
     assert scene.replica().reason == "PodsRefused"
     assert scene.replica().message == f"no pod can be created: {words}"
     assert scene.status.phase is Phase.PENDING
+
+
+MASTER, TRAINER = "spec.rosMaster.resources", "spec.trainer.resources"
+SIMULATORS = "spec.simulators[].resources"
+EVERY = f"{MASTER}, {SIMULATORS} and {TRAINER}"
+
+
+@pytest.mark.parametrize(
+    ("words", "fields"),
+    [
+        ("failed quota: q: must specify limits.cpu for: install-sidecar,ros-master", MASTER),
+        ("failed quota: q: must specify limits.cpu for: sim-collect-0,sim-evaluate-0", SIMULATORS),
+        (
+            "failed quota: q: must specify limits.cpu for: ros-master; requests.cpu for: trainer",
+            f"{MASTER} and {TRAINER}",
+        ),
+        (
+            "minimum cpu usage per Container is 100m, but request is 25m",
+            EVERY,
+        ),
+        (
+            "memory max limit to request ratio per Container is 2, but provided ratio is 4.000000",
+            EVERY,
+        ),
+        ("maximum cpu usage per Pod is 1, but limit is 2", EVERY),
+    ],
+)
+def test_a_pod_refused_for_its_sizes_names_the_fields_that_set_them(accepted, words, fields):
+    """A job has no `ros-master` or `install-sidecar`: the API server's words lead to no field of it."""
+    scene = accepted()
+    refused(scene, f'Error creating: pods "job-0-x" is forbidden: {words}')
+
+    scene.settle()
+
+    assert scene.replica().message.endswith(
+        f"{words}; a new job sets {fields}, the chart sets jobs.resources for all jobs"
+    )
+
+
+def test_a_pod_refused_for_a_webhooks_container_names_no_field_of_the_job(accepted):
+    """No field of a job sets the sizes of a mesh's proxy."""
+    scene = accepted()
+    refused(scene, "failed quota: q: must specify limits.cpu for: istio-proxy")
+
+    scene.settle()
+
+    assert scene.replica().message.endswith("limits.cpu for: istio-proxy")
 
 
 def test_an_old_refusal_does_not_count(accepted):

@@ -350,7 +350,7 @@ ROWS: dict[Reason, Row] = {
         "run `kubectl describe pvc`; a volume of a lost node is detached when the Node object is deleted",
     ),
     Reason.PODS_REFUSED: Row(
-        "no pod can be created: {words}",
+        "no pod can be created: {words}{remedy}",
         "the API server refuses a pod or its claim because of a quota, a LimitRange, Pod Security, a webhook "
         "or a missing PriorityClass; the message quotes it",
         "raise the quota, or allow what the message names ([queues and quotas](queues.md#quotas)); "

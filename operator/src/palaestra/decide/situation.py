@@ -12,6 +12,7 @@ from palaestra.decide.counting import Counted
 from palaestra.decide.holding import Hold
 from palaestra.decide.times import Times, Wait
 from palaestra.observe.views import ContainerView, PodView, ReplicaObserved
+from palaestra.plan.replica import SIMULATOR_PREFIX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,4 +138,4 @@ def _members(job: TrainingJob) -> list[tuple[SimulatorGroup, int]]:
 
 
 def _container(group: SimulatorGroup, index: int) -> str:
-    return f"sim-{group.name}-{index}"
+    return f"{SIMULATOR_PREFIX}{group.name}-{index}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
+from palaestra.decide.admission import remedy_of
 from palaestra.decide.checkpoints import next_pod
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, failed_by_itself
@@ -17,6 +18,7 @@ from palaestra.decide.suspending import ended_by_suspension
 from palaestra.decide.times import Wait
 from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
+from palaestra.plan.replica import SIMULATOR_PREFIX
 from palaestra_protocol.pod.status import SimulatorStatus, Termination
 
 LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
@@ -37,7 +39,7 @@ def objects_refused(situation: Situation) -> Finding | None:
     if situation.seen.job is not None or not situation.seen.denied or situation.pod is not None:
         return None
     phase = Phase.SUSPENDED if situation.job.spec.suspend else Phase.PENDING
-    return Finding(explanation=explain(Reason.PODS_REFUSED, words=situation.seen.denied), phase=phase)
+    return Finding(explanation=_not_admitted(situation.seen.denied), phase=phase)
 
 
 def name_taken(situation: Situation) -> Finding | None:
@@ -62,7 +64,14 @@ def pods_refused(situation: Situation) -> Finding | None:
     """The API server refuses to create the pod; only the Job's events have the reason."""
     refused = situation.seen.refused
     words = situation.seen.denied or (refused.message if refused is not None else "")
-    return None if situation.pod is not None or not words else found(Reason.PODS_REFUSED, words=words)
+    if situation.pod is not None or not words:
+        return None
+    return Finding(explanation=_not_admitted(words))
+
+
+def _not_admitted(words: str) -> Explanation:
+    """Quote the API server, and name the fields of the job that it may not have by name."""
+    return explain(Reason.PODS_REFUSED, words=words, remedy=remedy_of(words))
 
 
 def node_lost(situation: Situation) -> Finding | None:
@@ -127,7 +136,7 @@ def simulator_not_up(situation: Situation) -> Finding | None:
         return None
     up = {sidecar.name: sidecar for sidecar in situation.pod.sidecars if sidecar.running_since is not None}
     states = (
-        (simulator, up.get(f"sim-{simulator.name}"))
+        (simulator, up.get(f"{SIMULATOR_PREFIX}{simulator.name}"))
         for simulator in polled.status.simulators
         if simulator.state != "ready"
     )

@@ -12,10 +12,10 @@ from typing import Any
 
 from palaestra.plan import Verdicts
 from palaestra.plan.pod import GRACE_S
-from palaestra.plan.replica import ROS_MASTER, TRAINER
+from palaestra.plan.replica import ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
-SIDECARS = ("sim-", ROS_MASTER)  # beginnings of the names of the plan's sidecars
+SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # beginnings of the names of the plan's sidecars
 
 Raw = Mapping[str, Any]  # an object as untrusted JSON
 

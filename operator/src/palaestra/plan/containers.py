@@ -9,7 +9,7 @@ from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
 from palaestra.plan.claim import INITIAL, initial_volume
 from palaestra.plan.layout import Places
-from palaestra.plan.replica import ROS_MASTER, TRAINER, PlannedSimulator, Replica
+from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, TRAINER, PlannedSimulator, Replica
 from palaestra.plan.text import literal
 from palaestra.plan.training import FILE, LOOPBACK
 from palaestra.plan.worlds import world_path
@@ -128,7 +128,7 @@ def install_sidecar(replica: Replica) -> Container | None:
         return None
     target = replica.places(SIDECAR).sidecar
     return {
-        "name": "install-sidecar",
+        "name": INSTALL_SIDECAR,
         "image": replica.layout.images.stub,
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         # The contents of the folder only: cp may not set the times of the volume's own folder.

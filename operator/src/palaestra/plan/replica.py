@@ -17,6 +17,8 @@ UID_LABEL = "palaestra.dev/job-uid"  # a job that is made again has the name of 
 RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"  # annotation of a TrainingJob: any new value
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"
+INSTALL_SIDECAR = "install-sidecar"
+SIMULATOR_PREFIX = "sim-"  # of a container's name; the simulator's name follows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +37,7 @@ class PlannedSimulator:
     @property
     def container(self) -> str:
         """Return the name of its sidecar's container."""
-        return f"sim-{self.name}"
+        return f"{SIMULATOR_PREFIX}{self.name}"
 
     @property
     def keeps_clock(self) -> bool:
