@@ -18,19 +18,19 @@ from palaestra_trainer.configuration import (
     SimulatorConfiguration,
     load,
 )
-from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.robots.choosing import robot_class
+from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import limit_of
-from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.offers import withdraw
+from palaestra_trainer.webots.facade_registry import withdraw
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:

@@ -20,10 +20,10 @@ from palaestra_trainer.errors import (
     SimulatorRefused,
     TrainerError,
 )
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.facade_registry import offer, withdraw
 from palaestra_trainer.webots.observer import Mode, Observer
-from palaestra_trainer.webots.offers import offer, withdraw
 from palaestra_trainer.webots.supervisor import Supervisor
 
 Result = TypeVar("Result")
