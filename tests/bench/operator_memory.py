@@ -158,7 +158,8 @@ def finished_status():
         for kind in ("Accepted", "Succeeded")
     ]
     images = {
-        name: f"registry.example.com/robots/palaestra-{name}:0.1.0" for name in ("trainer", "stub", "webots")
+        name: f"registry.example.com/robots/palaestra-{name}:0.1.0"
+        for name in ("trainer", "stub", "mujoco", "webots")
     }
     log = [f"2026-01-01T00:00:{line:02d}Z line {line} of what the trainer wrote last" for line in range(10)]
     replica = {

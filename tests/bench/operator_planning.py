@@ -46,7 +46,7 @@ def measure(scale=1.0):
         "world_kb": round(len(text) / 1000),
         "config_map_kb": round(len(json.dumps(planned.replicas[0].config_map)) / 1000),
         "seconds_for_all": cpu_s(lambda: plan(job, layout)),
-        "seconds_for_one": cpu_s(lambda: plan(job, layout, mounted={0: ()})),
+        "seconds_for_one": cpu_s(lambda: plan(job, layout, replicas=[0])),
         "seconds_for_the_check": cpu_s(lambda: check(text.encode())),
     }
 

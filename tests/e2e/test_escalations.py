@@ -264,7 +264,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
     }
     job["status"] = {
         "phase": "Succeeded",
-        "release": {"trainer": "mine:1", "stub": "mine:1", "webots": "mine:1"},
+        "release": {"trainer": "mine:1", "stub": "mine:1", "mujoco": "mine:1", "webots": "mine:1"},
     }
 
     made = planned(job, strict=False)

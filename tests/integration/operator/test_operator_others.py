@@ -78,8 +78,8 @@ def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place,
     assert patches(control_plane, place) == 2
 
 
-def test_a_job_of_an_earlier_release_that_is_suspended_is_taken_as_it_stands(place, start, control_plane):
-    """It has no annotation; the operator that follows neither resumes it nor adds one."""
+def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start, control_plane):
+    """The patch sets the annotation too; a suspension after it is left alone."""
     first = start()
     place.train()
     place.pods()
@@ -88,10 +88,12 @@ def test_a_job_of_an_earlier_release_that_is_suspended_is_taken_as_it_stands(pla
     as_kueue(place, control_plane, suspend=True)
 
     start()
+    eventually(lambda: place.get(JOBS, "job-0")["spec"]["suspend"] is False)
+    as_kueue(place, control_plane, suspend=True)
     eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, "))
 
-    assert patches(control_plane, place) == 0
-    assert SUSPEND_SET not in place.get(JOBS, "job-0")["metadata"].get("annotations", {})
+    assert patches(control_plane, place) == 1
+    assert place.get(JOBS, "job-0")["metadata"]["annotations"][SUSPEND_SET] == "false"
 
 
 def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):

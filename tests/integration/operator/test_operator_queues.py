@@ -58,7 +58,7 @@ def old_kueue(installed):
 
 @pytest.fixture
 def old_role(installed):
-    """The operator's role without Workloads, as earlier releases have it."""
+    """The operator's role without Workloads, as a role that was not updated may be."""
     rules = installed.get(ROLES, None, NAME)["rules"]
     others = [each for each in rules if each["apiGroups"] != [GROUP]]
     installed.merge(ROLES, None, NAME, {"rules": others})

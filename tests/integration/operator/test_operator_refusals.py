@@ -292,7 +292,6 @@ def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_i
 
     [job] = eventually(lambda: place.all(JOBS, "job"), 60)
     assert job["spec"]["template"]["spec"]["imagePullSecrets"] == [{"name": "token"}]
-    assert place.status()["release"]["pullSecretsForJobs"] is True
 
 
 def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):

@@ -181,7 +181,7 @@ def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> Non
 NEWER_STATUS = {
     "phase": "Running",
     "ofTomorrow": {"deep": [1]},
-    "release": {"trainer": "t:1", "stub": "s:1", "webots": "w:1", "gazebo": "g:1"},
+    "release": {"trainer": "t:1", "stub": "s:1", "mujoco": "m:1", "webots": "w:1", "gazebo": "g:1"},
     "conditions": [
         {
             "type": type_,

@@ -67,7 +67,7 @@ def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
 
 
 def test_a_job_that_failed_is_degraded_also_without_the_condition(training, last_word, health):
-    """A definition of an earlier release does not take it."""
+    """A definition that lacks it does not take it."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

@@ -102,16 +102,15 @@ def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_gro
         (2, "ConfigurationWrong: it", "ConfigurationRefused"),
         (70, "Unexpected: it", "TrainerFailed"),
         (75, "MasterLost: it", "Interrupted"),
-        (80, "FaultBudgetSpent: it", "SimulatorBudgetSpent"),
+        (80, "SimulatorBudgetSpent: it", "SimulatorBudgetSpent"),
         (81, "Diverged: loss is NaN at step 5", "Diverged"),
         (82, "SimulatorHung: it", "SimulatorHung"),
         (82, "Stalled: it", "Stalled"),
         (1, "StorageFull: it", "StorageFull"),
-        (1, "DiskFull: it", "StorageFull"),
     ],
 )
 def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
-    """By exit code and last word, those of an older release too."""
+    """By exit code and last word."""
     scene, pod = training()
     scene.end(pod, code, last_word(reason=word))
 

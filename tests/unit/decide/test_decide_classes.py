@@ -61,7 +61,7 @@ def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
     assert found == []
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, reason)
     assert scene.replica().message.startswith("container sim-collect-0")
-    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (0, None)
+    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (0, 0)
 
 
 def test_a_name_that_no_image_can_have_is_final(accepted):

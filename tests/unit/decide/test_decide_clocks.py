@@ -196,8 +196,8 @@ def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(t
     assert kills(scene) == [3]
 
 
-def test_a_kill_is_counted_once_though_the_definition_of_before_drops_its_run(training):
-    """An older definition keeps neither pod nor run; the count must not grow with each look."""
+def test_a_kill_is_counted_once_though_the_status_has_no_room_for_its_run(training):
+    """A large status keeps neither pod nor run; the count must not grow with each look."""
     scene, pod = training()
     kill(scene, pod, 0)
     for _ in range(3):

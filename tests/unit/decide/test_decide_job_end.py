@@ -88,11 +88,10 @@ def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(tra
     assert scene.replica().message.startswith("SimulatorHung: collect-0: no answer within 600 s; ")
 
 
-@pytest.mark.parametrize("word", ["StorageFull", "DiskFull"])
-def test_a_full_volume_is_reported_with_its_remedy(training, last_word, word):
-    """Also in the word of an older release."""
+def test_a_full_volume_is_reported_with_its_remedy(training, last_word):
+    """A person can mend it, so the message says how."""
     scene, pod = training(backoffLimit=0)
-    scene.end(pod, 1, last_word(reason=f"{word}: checkpoints/5: disk full"))
+    scene.end(pod, 1, last_word(reason="StorageFull: checkpoints/5: disk full"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
 
     scene.settle()
@@ -102,21 +101,6 @@ def test_a_full_volume_is_reported_with_its_remedy(training, last_word, word):
         "the volume of the run is full: checkpoints/5: disk full; "
         "free some space, or request more with spec.storage.size"
     )
-
-
-def test_a_reason_of_an_older_release_is_read_as_what_it_is_called_now(training, last_word):
-    """An upgraded operator finds it in the status, and in the replica that failed beside others."""
-    scene, pod = training(replicas=2)
-    scene.end(pod, 80, last_word())
-    scene.end_job("Failed", 0, "PodFailurePolicy")
-    scene.settle()
-    scene.raw["status"]["replicas"][0]["reason"] = "FaultBudgetSpent"
-    scene.end(scene.running_pod(1), 80, last_word())
-    scene.end_job("Failed", 1, "PodFailurePolicy")
-
-    scene.settle()
-
-    assert scene.status.phase is Phase.FAILED
 
 
 @pytest.mark.parametrize("word", [True, False])

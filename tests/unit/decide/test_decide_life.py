@@ -33,14 +33,6 @@ MUJOCO = [
 ]
 
 
-def test_only_a_job_with_mujoco_holds_its_image(make_scene):
-    """A release that does not know the driver refuses a status with that field."""
-    held, without = make_scene(simulators=MUJOCO).step(), make_scene().step()
-
-    assert held.status.release.mujoco == "mujoco:1"
-    assert without.status.release.mujoco is None
-
-
 def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
     """As every other image of the job."""
     scene = make_scene(simulators=MUJOCO)
@@ -82,26 +74,6 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
     scene.objects["config_maps"].clear()
 
     assert kinds(scene.step()) == ["ConfigMap"]
-
-
-def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
-    """It held each simulator's own world; its name, which the Job mounts, has a hash of them."""
-    world = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
-    stored = {"world": world, "recycle": {"afterResets": 24}}  # the default then, written out
-    scene, _ = training(
-        simulators=[
-            {"name": "collect", "role": "Collect", **stored},
-            {"name": "evaluate", "role": "Evaluate", **stored},
-        ]
-    )
-    scene.objects["config_maps"].clear()
-    volume = scene.job()["spec"]["template"]["spec"]["volumes"][0]
-    volume["configMap"]["name"] = "job-0-6311dc3b59"  # what a5276f3 called it
-
-    [made] = [each.object for each in scene.step().actions]
-
-    assert made["metadata"]["name"] == "job-0-6311dc3b59"
-    assert made["data"].keys() == {"training.yaml", "collect-0.wbt", "evaluate-0.wbt"}
 
 
 def test_only_a_replica_that_lacks_an_object_is_planned(accepted):

@@ -62,18 +62,3 @@ def test_the_replica_starts_when_the_old_pod_has_ended(make_scene):
     pod["status"]["phase"] = "Failed"
 
     assert jobs(scene.settle()) == ["job-0"]
-
-
-def test_a_job_that_is_made_again_keeps_the_claim_of_an_earlier_release(make_scene):
-    """That release did not bound the claim's name; the run must not begin again on another claim."""
-    scene, name = make_scene(), "quadruped-blind-locomotion-rough-terrain-ppo-a"
-    scene.raw["metadata"]["name"] = name
-    before = f"{name}-0-{scene.raw['metadata']['uid']}"
-    scene.objects["claims"].append({"kind": "PersistentVolumeClaim", "metadata": {"name": before}})
-
-    scene.settle()
-
-    [job] = scene.objects["jobs"]
-    volumes = job["spec"]["template"]["spec"]["volumes"]
-    assert {"claimName": before} in [each.get("persistentVolumeClaim") for each in volumes]
-    assert len(scene.objects["claims"]) == 1

@@ -394,21 +394,6 @@ def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(train
     assert restarts(scene) == (3, 0, 0, 2)
 
 
-def test_a_suspension_by_an_earlier_release_goes_by_its_times(training):
-    """That release wrote neither annotation; the upgrade came before the resumption."""
-    scene, pod = training()
-    pause(scene, pod, resumes=False)
-    scene.job()["metadata"].pop("annotations")
-    scene.settle(15)
-    scene.raw["metadata"]["generation"] = 2
-    resume(scene)
-    scene.running_pod()
-
-    scene.settle()
-
-    assert restarts(scene) == (2, 0, 0, 1)
-
-
 ENDS = ("failure", "taken", "deleted", "suspended")
 
 

@@ -106,7 +106,7 @@ def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
 
 
 def test_the_status_shows_goodput_and_faults(training, simulator):
-    """In whole seconds, if the trainer reports them; that of an older release does not."""
+    """In whole seconds, if the trainer reports them."""
     scene, pod = training()
     scene.poll(pod, step=1)
     scene.settle()
@@ -123,16 +123,6 @@ def test_the_status_shows_goodput_and_faults(training, simulator):
     assert replica.steps_lost == 9
     [told] = replica.simulators
     assert (told.flapping, told.given_up, told.standby) == (True, True, "ready")
-
-
-@pytest.mark.parametrize(("seconds", "written"), [(0.4, None), (7.2, 7)])
-def test_recycling_is_written_once_there_was_some(training, seconds, written):
-    """Command lines of an older release refuse a field that they do not know."""
-    scene, pod = training()
-    scene.poll(pod, goodput={"stepping": 50.9, "recycling": seconds})
-    scene.settle()
-
-    assert scene.replica().goodput.recycling == written
 
 
 def test_every_cause_and_every_kind_of_fault_has_a_field():

@@ -21,7 +21,7 @@ def by_kueue(scene, *, suspend):
 
 
 def without_annotation(scene):
-    """Let the Job be one that an earlier release has made, and its status be written."""
+    """Let somebody remove the annotation of the Job, and its status be written."""
     scene.job()["metadata"].pop("annotations", None)
     scene.settle()
 
@@ -96,18 +96,22 @@ def test_what_was_set_is_written_by_the_same_patch():
     assert patch == {"metadata": {"annotations": annotations}, "spec": {"suspend": True}}
 
 
-def test_a_job_of_an_earlier_release_is_taken_as_it_stands(training):
-    """It has no annotation; the release that made it kept it as the spec was."""
+def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(training):
+    """Nobody knows any more what the operator set last; from then on the annotation is there again."""
     scene, _ = training()
     without_annotation(scene)
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
 
+    assert scene.step().actions == (SetSuspend(job="job-0", replica=0, suspend=False),)
+
+    by_kueue(scene, suspend=True)
+
     assert scene.settle().actions == ()
     assert scene.replica().message.startswith("suspended by kueue, ")
 
 
-def test_the_author_suspends_and_resumes_a_job_of_an_earlier_release(training):
+def test_the_author_suspends_and_resumes_a_job_without_its_annotation(training):
     """From then on it has the annotation."""
     scene, _ = training()
     without_annotation(scene)
@@ -120,18 +124,6 @@ def test_the_author_suspends_and_resumes_a_job_of_an_earlier_release(training):
     resumed = scene.settle().actions
 
     assert [each.suspend for each in (*suspended, *resumed)] == [True, False]
-
-
-def test_a_job_that_an_earlier_release_suspended_is_resumed_by_this_one(training):
-    """An upgrade between the two is no reason to wait for ever."""
-    scene, _ = training()
-    scene.raw["spec"]["suspend"] = True
-    scene.settle()
-    without_annotation(scene)
-    scene.raw["spec"]["suspend"] = False
-    scene.raw["metadata"]["generation"] = 2
-
-    assert scene.step().actions == (SetSuspend(job="job-0", replica=0, suspend=False),)
 
 
 WORLD = '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'
@@ -223,10 +215,12 @@ def test_suspending_asks_for_no_label(make_scene):
     assert scene.settle().actions == (SetSuspend(job="job-0", replica=0, suspend=True),)
 
 
-def test_a_refused_patch_of_a_job_of_an_earlier_release_is_sent_again(training):
+@pytest.mark.parametrize("annotated", [True, False])
+def test_a_refused_patch_of_a_job_is_sent_again(training, annotated):
     """The status that is written after the refusal must not make it look like somebody else's doing."""
     scene, _ = training()
-    without_annotation(scene)
+    if not annotated:
+        without_annotation(scene)
     scene.raw["spec"]["suspend"] = True
     scene.raw["metadata"]["generation"] = 2
 

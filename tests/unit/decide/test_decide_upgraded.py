@@ -1,10 +1,10 @@
-"""A job that an earlier release accepted goes on, whatever a new rule says about its spec."""
+"""A job that was accepted goes on, whatever a new rule says about its spec."""
 
 import pytest
 
 from palaestra.api.status import Phase
 
-# What this release no longer accepts in a new job.
+# What an operator does not accept in a new job.
 ANTI_AFFINITY = {
     "requiredDuringSchedulingIgnoredDuringExecution": [
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
@@ -17,7 +17,6 @@ ACCEPTED_EARLIER = {
     "a runtime": {"scheduling": {"runtimeClassName": "kata"}},
     "a toleration": {"scheduling": {"tolerations": [{"key": "dedicated", "operator": "Exists"}]}},
     "an anti-affinity": {"scheduling": {"affinity": {"podAntiAffinity": ANTI_AFFINITY}}},
-    "a pull Secret without the label": {"imagePullSecrets": [{"name": "registry"}]},
 }
 
 

@@ -84,7 +84,7 @@ def test_it_is_deleted_after_its_time_to_live():
 
 def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
     """An upgrade with jobs running must not touch a pod."""
-    release = {"trainer": "t:1", "stub": "s:1", "webots": "w:1"}
+    release = {"trainer": "t:1", "stub": "s:1", "mujoco": "m:1", "webots": "w:1"}
     obj = raw(SAC, {"phase": "Running", "release": release})
 
     decision = reject(obj, refused(obj), NOW)

@@ -38,7 +38,7 @@ def examined(*refused, workloads="kueue.x-k8s.io/v1beta2"):
 
 
 def test_a_role_that_cannot_read_workloads_is_a_warning_where_kueue_is():
-    """With the role of an earlier release jobs train; only the words of Kueue are missing."""
+    """Without this right jobs train; only the words of Kueue are missing."""
     [found] = examined(WORKLOADS)
 
     assert found.verdict is CheckStatus.WARNING

@@ -195,18 +195,6 @@ def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_pa
         )
 
 
-def test_a_default_of_an_older_release_that_is_left_out_now_is_no_change(tmp_path):
-    """Up to a5276f3 every group was written with afterResets: 24, a default of then."""
-    before = {"name": "a", "startDeadlineSeconds": 60, "recycle": {"afterResets": 24}}
-    run_directory.prepare(tmp_path, record(simulators=[before]))
-
-    run_directory.refuse_another_job(tmp_path, record())
-    with pytest.raises(RunRefused, match=r"recycle.afterResets: was 24, is 3"):
-        run_directory.refuse_another_job(
-            tmp_path, record(simulators=[before | {"recycle": {"afterResets": 3}}])
-        )
-
-
 def test_the_record_of_a_newer_release_is_compared_as_it_stands(tmp_path):
     """What it asked for and is unknown here is named, not left out."""
     now = run_directory.record_of(validate({**JOB, "spec": {}}))
@@ -352,7 +340,7 @@ def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
 
 
 def test_the_summary_has_the_interval_of_the_success_rate(directory):
-    """It is in summary.json, where outcome.json of an older release has no place for it."""
+    """The trainer writes it into summary.json."""
     interval = {"low": 0.8882, "high": 0.9785, "episodes": 100}
     (directory / "summary.json").write_text(json.dumps({"success_interval": interval}))
 
@@ -363,7 +351,7 @@ def test_the_summary_has_the_interval_of_the_success_rate(directory):
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"success_interval": null}', '{"success_interval": 3}'])
 def test_a_summary_without_an_interval_shows_the_rate_alone(directory, content):
-    """That of a run of an older release, or of a program of one's own."""
+    """A program of one's own may write any file of that name."""
     (directory / "summary.json").write_text(content)
 
     assert summary(RunOutcome(exit_code=0, success_rate=0.951), directory)[0].split()[-1] == "95%"

@@ -80,7 +80,7 @@ def test_nobody_is_asked_about_a_job_that_does_not_wait_in_a_queue(queued, pods,
 
 @pytest.mark.parametrize("refusal", [Forbidden(403, "Forbidden", "no"), NotFound(404, "NotFound", "no")])
 def test_a_refusal_is_no_word_and_no_error(refusal, server):
-    """The operator's role may be of an earlier release, and Kueue may serve other versions."""
+    """The operator's role may be without Workloads, and Kueue may serve other versions."""
     server.refusal = refusal
 
     _, answers = asked(server, job())

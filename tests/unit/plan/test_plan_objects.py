@@ -303,14 +303,6 @@ def test_no_name_of_a_claim_is_longer_than_a_label(make_job):
     assert names[0].startswith("quadruped-blind-locomotion-rough-terrain-ppo")
 
 
-def test_a_claim_of_an_earlier_release_is_found_again(make_job):
-    """A run that began on it would silently begin again on another one."""
-    job = make_job(LONG)
-    before = f"{LONG}-0-{job.metadata.uid}"
-
-    assert claims_of(plan(job, LAYOUT, mounted={0: [before]})) == [before]
-
-
 def test_a_short_name_of_a_claim_has_the_whole_uid(make_job):
     """Nothing that is deployed changes its name."""
     job = make_job("walk")

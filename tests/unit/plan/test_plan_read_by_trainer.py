@@ -74,7 +74,7 @@ def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
 
 
 def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_job):
-    """Trainers of older releases log an unknown field."""
+    """A trainer whose release does not know a field logs it."""
     initial = {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}
 
     assert read_back(make_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
@@ -83,7 +83,7 @@ def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_
 
 @pytest.mark.parametrize("cnn", ["small", None])
 def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
-    """A field that a job leaves out is absent, for trainers of older releases."""
+    """A field that a job leaves out is absent."""
     job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
 
     assert read_back(job).algorithm.cnn == cnn
@@ -160,7 +160,7 @@ def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(make_job, resource
 
 
 def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(make_job):
-    """Its ConfigMap is named after its content, and older trainers refuse words that they don't know."""
+    """Its ConfigMap is named after its content, so what a job does not ask for is left out."""
     planned = plan(identified(make_job(), "uid"), LAYOUT).replicas[0]
 
     assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])

@@ -14,7 +14,6 @@ from palaestra_sim.world import RunIdentity, WorldError, builtin, generate, pars
 
 LAYOUT = ClusterLayout(images=Images.of_release("1"))
 ARENA = builtin("arena").decode()
-EARLIER = "job-0-b4a6144287"  # what a5276f3 called the ConfigMap of the job below
 
 
 def group(name="collect", role="Collect", **fields):
@@ -108,32 +107,10 @@ def test_a_world_that_ships_is_not_parsed(make_job):
 
 def test_only_the_replicas_that_are_asked_for_are_planned(make_job):
     """A job with hundred replicas, of which one lacks an object, is planned for that one."""
-    planned = plan(make_job(replicas=3), LAYOUT, mounted={1: ()})
+    planned = plan(make_job(replicas=3), LAYOUT, replicas=[1])
 
     assert planned.replicas.keys() == {1}
     assert planned.replicas[1] == plan(make_job(replicas=3), LAYOUT).replicas[1]
-
-
-def test_a_job_of_an_earlier_version_gets_its_own_config_map_again(make_job):
-    """Those held a world a simulator; the name has a hash of every byte of it and of training.yaml."""
-    stored = {"recycle": {"afterResets": 24}}  # the default then, written out by the API server
-    job = make_job(simulators=[group(count=2, **stored), EVALUATE | stored])
-    planned = plan(job, LAYOUT, mounted={0: {EARLIER}})
-
-    assert planned.replicas[0].config_map["metadata"]["name"] == EARLIER
-    assert data(planned).keys() == {"training.yaml", "collect-0.wbt", "collect-1.wbt", "evaluate-0.wbt"}
-
-
-def test_names_are_those_that_earlier_versions_wrote(make_job):
-    """A sidecar makes the same bytes of a source as of a world that has its names already."""
-    job = make_job(simulators=[group(count=2), EVALUATE])
-    earlier = data(plan(job, LAYOUT, mounted={0: {EARLIER}}))
-
-    assert list(named(plan(job, LAYOUT)).values()) == [
-        earlier["collect-0.wbt"],
-        earlier["collect-1.wbt"],
-        earlier["evaluate-0.wbt"],
-    ]
 
 
 def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
@@ -180,16 +157,6 @@ def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_create
 
     with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
         in_cluster(simulators=[group(), group("evaluate", "Evaluate", world={"inline": twice})])
-
-
-def test_a_job_of_an_earlier_version_whose_worlds_did_not_fit_has_its_sources(make_job):
-    """Sixteen copies of a big world were more than a ConfigMap holds."""
-    big = ARENA + "# " + "x" * (MOST_BYTES // 5)
-    job = make_job(simulators=[group(world={"inline": big}, count=8), EVALUATE])
-
-    planned = plan(job, LAYOUT, mounted={0: {"of-an-earlier-version"}})
-
-    assert data(planned).keys() == {"training.yaml", "collect.wbt", "evaluate.wbt"}
 
 
 def test_worlds_that_fit_nowhere_are_refused(make_job):

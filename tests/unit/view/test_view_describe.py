@@ -78,7 +78,7 @@ def test_slow_steps_are_listed_apart_from_faults():
 
 
 def test_recycling_is_listed_apart_from_recovering():
-    """It is planned: nothing has to be mended. An older release reports none."""
+    """It is planned: nothing has to be mended."""
     lines = told(make_job(goodput={"stepping": 75, "recycling": 25}))
 
     assert "Time spent:     stepping 75%, recycling 25%" in lines
