@@ -32,7 +32,6 @@ simulators:
   role: Collect
   control: http://127.0.0.1:7100
   world: /w/collect-0.wbt
-  namesPrefix: move_to_target_r1_collect_0a
   minSimulators: 1
   recycle: {afterResets: 24, afterMinutes: 90, aboveMemoryBytes: 419430400}
   standby: true

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import errno
 import json
-from zipfile import ZipFile
 
 import pytest
 
 from palaestra_trainer.run.summary import finished, summarise, write_summary
 from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
-from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.progress import Progress
 
 
 @pytest.fixture
@@ -57,22 +56,6 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
         replace_file(path, fail)
     assert path.read_text() == "old"
     assert [it.name for it in tmp_path.iterdir()] == ["model.zip"]
-
-
-def test_the_summary_of_a_run_of_an_earlier_release_is_of_its_best_line(directory):
-    """Its model.zip does not say which evaluation it is from."""
-    for step, rate in ((10, 0.5), (20, 0.9), (30, 0.7)):
-        append_line(directory.evaluations, {"step": step, "success_rate": rate, "mean_return": 1.0})
-    with ZipFile(directory.model, "w") as archive:
-        archive.writestr("data", "{}")
-    progress = Progress(30, [("collect-0", "Collect")], lambda: 0.0)
-    progress.resumed(30, Counters(goodput={"learning": 1.5, "starting": 0.5}))
-
-    summary = summarise(directory, progress)
-
-    assert (summary["success_rate"], summary["best_step"]) == (0.9, 20)
-    assert (summary["steps"], summary["steps_per_second"], summary["faults"]) == (30, 15.0, 0)
-    assert (summary["duration_s"], summary["trained_share"]) == (2.0, 0.75)
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):

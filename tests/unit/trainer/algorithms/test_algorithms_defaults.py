@@ -85,26 +85,6 @@ def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play,
     assert json.loads(directory.hyperparameters.read_text())["gamma"] == 0.5
 
 
-def test_a_run_that_began_at_a5276f3_goes_on_with_what_it_had(interrupted, play, directory):
-    """That release gave every environment the arena's defaults, and wrote no such file."""
-    directory.hyperparameters.unlink()
-
-    code, _ = play(interrupted)
-
-    assert (code, discount(directory)) == (0, 0.93)
-    assert not directory.hyperparameters.exists()
-
-
-def test_a_run_of_a5276f3_without_a_checkpoint_goes_on_with_what_it_had(play, job, directory):
-    """It was interrupted before its first one."""
-    directory.path.mkdir()
-    directory.begin_attempt("", "new run")
-
-    play(job("DQN"))
-
-    assert discount(directory) == 0.93
-
-
 @pytest.mark.usefixtures("interrupted")
 def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, directory, tmp_path):
     """And keeps them: the other may be gone when it resumes."""

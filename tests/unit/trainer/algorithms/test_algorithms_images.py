@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import shutil
 import signal
 import zipfile
 
@@ -185,19 +184,6 @@ def test_a_network_for_images_is_refused_where_there_are_none(make_member):
         ConfigurationError, match=r"algorithm\.cnn: has no effect, since the environment's obs"
     ):
         make_model(Algorithm(name="PPO", cnn="small"), env, seed=1)
-
-
-def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):
-    """That release gave it MlpPolicy; its tensors fit no other."""
-    _, directory = play("run", "PPO", signal_at=28)
-    directory.hyperparameters.unlink()
-    shutil.rmtree(directory.checkpoints)
-
-    code, _ = play("run", "PPO")
-
-    assert code == 0
-    names, _ = outcome(directory)
-    assert not any("cnn" in name for name in names)
 
 
 @pytest.mark.parametrize(

@@ -187,7 +187,7 @@ def test_wrappers_with_statistics_are_refused_as_ever(name):
 
 
 def test_without_wrappers_the_environment_stays_as_it_is():
-    """A job of an older release trains in the same one."""
+    """A job that asks for nothing gets nothing around it."""
     env = Count()
 
     assert wrapped(env, Environment(id=NAME)) is env

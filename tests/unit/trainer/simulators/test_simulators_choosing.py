@@ -20,7 +20,7 @@ def test_a_class_may_name_the_supervisor():
 
 
 def test_a_class_without_a_name_drives_the_first_robot_that_is_no_supervisor():
-    """So does one whose name only a PROTO has, or that a sidecar of an older release does not report."""
+    """So does one whose name only a PROTO has."""
     assert driven_robot([REFEREE, GATE, FIRST], "") is GATE
     assert driven_robot([REFEREE, GATE, FIRST], "ROVER_9") is GATE
     assert driven_robot([REFEREE], "") is None

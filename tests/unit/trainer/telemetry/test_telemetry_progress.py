@@ -194,8 +194,8 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
     assert {cause: it for cause, it in counted.goodput.items() if it} == {"learning": 5.0, "starting": 2.0}
 
 
-def test_time_of_a_checkpoint_that_does_not_know_recycling_stays_where_it_was(progress, clock):
-    """An older release counted recycling as recovering, and nobody can tell the two apart any more."""
+def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, clock):
+    """A release may add a cause; nobody can tell any more what the one before counted it as."""
     saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
     progress.resumed(40, saved)
     with progress.spending(Cause.RECYCLING):

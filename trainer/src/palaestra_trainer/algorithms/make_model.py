@@ -101,16 +101,13 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
 
     Where the algorithm is to normalize, the model's own environment does, see `normalization`.
-    The hyperparameter `policy` is that of a run that began when every observation got MlpPolicy.
 
     Raises:
         ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
     """
     entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters
-    policy = given.pop("policy", None) or policy_of_spaces(
-        algorithm, entry, env.observation_space, env.action_space
-    )
+    policy = policy_of_spaces(algorithm, entry, env.observation_space, env.action_space)
     added = noise.action_noise(given, env) if entry.takes_noise else None
     chosen = hyperparameters.arguments(
         entry.original,
