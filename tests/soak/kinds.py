@@ -11,7 +11,7 @@ ROW = re.compile(
 )
 ALGORITHMS = (LITTLE_DQN, LITTLE_PPO)
 FAULT_KINDS = {"dead", "hung", "wrong_data"}
-EXIT_CODES = {"Succeeded": 0, "FaultBudgetSpent": 80, "SimulatorBudgetSpent": 80}
+EXIT_CODES = {"Succeeded": 0, "SimulatorBudgetSpent": 80}
 # A multiple of PPO's rollout. Episodes so short that there are more than 25 resets between two restarts.
 STEPS = 96
 EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}

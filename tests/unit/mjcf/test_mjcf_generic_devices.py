@@ -73,7 +73,7 @@ def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
 
 
 def test_a_sensor_of_one_number_stays_a_position_sensor(load):
-    """Worlds of before keep their devices."""
+    """One number fits the message of that device."""
     simulation = load(FORCE, '<user name="one" dim="1"/>')
 
     assert "one" in simulation.robots[0].sensors

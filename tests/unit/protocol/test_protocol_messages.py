@@ -189,12 +189,6 @@ def test_a_text_that_is_too_long_is_cut_by_its_writer(state) -> None:
     assert read.detail == "x" * 500
 
 
-def test_what_was_left_out_is_absent_unless_there_is_some(state, status) -> None:
-    """A trainer or operator of an older release refuses a field that it does not know."""
-    for message in (state(), status()):
-        assert "left_out" not in message.to_json()
-
-
 @pytest.mark.parametrize(("lines", "read"), [(16, "line 15"), (17, "and 2 more")])
 def test_lines_that_do_not_fit_are_counted(state, status, lines, read) -> None:
     """A list that ends without a word would pass for the whole list."""
@@ -228,12 +222,6 @@ def test_an_interval_travels_with_its_rate(status) -> None:
     assert Termination.from_message(word.to_message()).success_interval == interval
 
 
-def test_an_interval_that_is_not_known_is_no_field(status) -> None:
-    """Programs of a5276f3 refuse a field that they do not know."""
-    assert "success_interval" not in status(success_interval=None).to_json()
-    assert "success_interval" not in Termination(step=1, reason="done").to_json()
-
-
 @pytest.mark.parametrize(
     ("changes", "mistake"),
     [
@@ -260,13 +248,6 @@ def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
         TrainerStatus.from_json(content)
 
 
-def test_an_age_that_is_not_known_is_absent(status) -> None:
-    """A reader of an older release never sees the field then; a null would be one more thing to read."""
-    assert "last_progress_age_s" not in status().to_json()
-    assert "last_progress_age_s" not in status(last_progress_age_s=math.inf).to_json()
-    assert status(last_progress_age_s=0.0).to_json()["last_progress_age_s"] == 0.0
-
-
 @pytest.mark.parametrize("age_s", [-0.1, math.nan, math.inf, 10**400, "5", True])
 def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
     """Stalls are judged by it: a negative age, or an endless one, is a lie."""
@@ -274,14 +255,6 @@ def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
 
     with pytest.raises(ProtocolError, match=r"^last_progress_age_s: "):
         TrainerStatus.from_json(content)
-
-
-def test_a_trainer_of_an_older_release_reports_no_age(status) -> None:
-    """It stays readable; its steps are all that is seen of its progress then."""
-    content = status(last_progress="2025-01-31T12:00:00Z", last_progress_age_s=7.0).to_json()
-    del content["last_progress_age_s"]
-
-    assert TrainerStatus.from_json(content).last_progress_age_s is None
 
 
 def test_a_nested_mistake_says_where_it_is(status) -> None:

@@ -53,7 +53,7 @@ def test_a_world_without_arguments_gets_them_behind_its_root():
 
 @pytest.mark.parametrize("source", [NAMED, PLAIN])
 def test_the_world_of_a_generated_world_is_the_same(source):
-    """ConfigMaps of older releases hold generated worlds."""
+    """A person may take the world of a simulator that ran for the source of a job."""
     made = generate(source, IDENTITY, clock=True)
 
     assert generate(made, IDENTITY, clock=True) == made

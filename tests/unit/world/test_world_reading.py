@@ -132,6 +132,6 @@ def test_a_header_may_have_blanks_after_its_hash() -> None:
 
 
 def test_a_header_may_be_the_whole_file() -> None:
-    """An empty world is a world, and older releases numbered differently."""
+    """An empty world is a world, and older versions of Webots are numbered differently."""
     assert parse(b"#VRML_SIM V8.6.2 utf8").nodes == ()
     assert parse(b"#VRML_SIM R2021b utf8\r\n").header == "#VRML_SIM R2021b utf8"

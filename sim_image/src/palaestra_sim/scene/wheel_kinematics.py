@@ -134,7 +134,7 @@ def _ring(wheels: Sequence[Wheel]) -> Ring | None:
     """Return the drive of three wheels on radial axles, 120 degrees apart counter-clockwise; None: no ring.
 
     The first one counts: the others may differ by the rounding of a file. Otherwise a robot would turn a
-    little as it drives straight on. The arena's Robotino would not repeat what it did in earlier releases.
+    little as it drives straight on.
     """
     if len(wheels) != _THREE or any(wheel.roller for wheel in wheels):
         return None

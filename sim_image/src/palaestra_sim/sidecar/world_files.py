@@ -1,8 +1,7 @@
 """Put the world that the simulator will run where it can run it.
 
 Only the sidecar writes names into a world. It gets a source world, from the image or from the replica's
-ConfigMap. ConfigMaps of older releases hold a generated world for each simulator; the generator makes the
-same world again from a generated one.
+ConfigMap.
 """
 
 import os
