@@ -143,8 +143,7 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
 
 
 def test_a_test_of_a_release_is_reported_once(release, kubectl, api):
-    """Without nodes the pod ends by hand; a failed test of an earlier release left its account."""
-    kubectl("create", "serviceaccount", "palaestra-test", f"--namespace={NAMESPACE}")
+    """Without nodes the pod ends by hand."""
     release("install", "palaestra")
 
     with ThreadPoolExecutor() as threads:
