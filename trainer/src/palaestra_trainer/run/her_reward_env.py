@@ -18,7 +18,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Attached, Webots
-from palaestra_trainer.webots.facade_registry import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 # No simulator has this name. An environment that asks for readings gets SimulatorDead with it.
 _NAME = "judge"
@@ -31,7 +31,7 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
         ConfigurationError: it does not fit the job's robot, or has no `compute_reward`.
     """
     webots = Webots(_NAME, wanted.simulators[0].world, launcher=Attached())
-    withdraw(webots)
+    open_facades.withdraw(webots)
     robot = robot_class(wanted.robot or DEFAULT_ROBOT)(webots)
     judge = make_environment(wanted.environment, robot, SimulatedScene(webots, robot))
     if not callable(getattr(judge.unwrapped, COMPUTE_REWARD, None)):

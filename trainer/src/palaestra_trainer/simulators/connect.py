@@ -30,7 +30,7 @@ from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.facade_registry import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
@@ -115,7 +115,7 @@ class OwnSimulator:
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
         supervisor, robot = _WORLDS[world]
         self.webots = Webots(supervisor, world, driver=driver)
-        withdraw(self.webots)
+        open_facades.withdraw(self.webots)
         self.robot = robot_class(robot)(self.webots)
         self.scene = SimulatedScene(self.webots, self.robot)
         try:

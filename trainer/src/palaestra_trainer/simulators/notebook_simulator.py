@@ -16,7 +16,7 @@ from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.connect import robot_for
 from palaestra_trainer.simulators.interface import Environment, Step
 from palaestra_trainer.webots import Webots
-from palaestra_trainer.webots.facade_registry import give_back, offered, take
+from palaestra_trainer.webots.facade import open_facades
 
 
 class NotebookSimulator:
@@ -38,12 +38,12 @@ class NotebookSimulator:
         self.scene = SimulatedScene(webots, self.robot)
         if webots.available():
             self.robot.connect()
-        take(webots)
+        open_facades.take(webots)
 
     def release(self) -> None:
         """Close the robot's connections and offer the facade again; safe to repeat."""
         self.robot.close()
-        give_back(self.webots)
+        open_facades.give_back(self.webots)
 
 
 def offered_simulator(world: str) -> NotebookSimulator | None:
@@ -51,7 +51,7 @@ def offered_simulator(world: str) -> NotebookSimulator | None:
 
     Its robot is that of PALAESTRA_CONFIG; without that, the one in the world that ships for the environment.
     """
-    webots = offered()
+    webots = open_facades.offered()
     return None if webots is None else NotebookSimulator(webots, robot_for(world))
 
 

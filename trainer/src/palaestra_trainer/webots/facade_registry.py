@@ -9,41 +9,40 @@ from __future__ import annotations
 
 import itertools
 import os
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 from weakref import WeakSet, WeakValueDictionary
 
-if TYPE_CHECKING:
-    from palaestra_trainer.webots.facade import Webots
-
-_numbers = itertools.count()
-_open: WeakValueDictionary[tuple[int, int], Webots] = WeakValueDictionary()  # by process and number
-_taken: WeakSet[Webots] = WeakSet()
+Facade = TypeVar("Facade")
 
 
-def offer(webots: Webots) -> None:
-    """Offer a new facade to environments."""
-    _open[os.getpid(), next(_numbers)] = webots
+class FacadeRegistry(Generic[Facade]):
+    """The open facades of this process and its parents; it keeps none of them alive."""
 
+    def __init__(self) -> None:
+        self._numbers = itertools.count()
+        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by process, number
+        self._taken: WeakSet[Facade] = WeakSet()
 
-def withdraw(webots: Webots) -> None:
-    """Offer a facade to no environment any more; safe to repeat."""
-    for key, known in list(_open.items()):
-        if known is webots:
-            _open.pop(key, None)
+    def offer(self, facade: Facade) -> None:
+        """Offer a new facade to environments."""
+        self._open[os.getpid(), next(self._numbers)] = facade
 
+    def withdraw(self, facade: Facade) -> None:
+        """Offer a facade to no environment any more; safe to repeat."""
+        for key, known in list(self._open.items()):
+            if known is facade:
+                self._open.pop(key, None)
 
-def offered() -> Webots | None:
-    """Return the newest facade that no environment has; None: there is none."""
-    mine = sorted(key for key in list(_open.keys()) if key[0] == os.getpid())
-    free = (known for key in reversed(mine) if (known := _open.get(key)) is not None and known not in _taken)
-    return next(free, None)
+    def offered(self) -> Facade | None:
+        """Return the newest facade that no environment has, None if each has one."""
+        mine = sorted(key for key in list(self._open.keys()) if key[0] == os.getpid())
+        known = (self._open.get(key) for key in reversed(mine))
+        return next((facade for facade in known if facade is not None and facade not in self._taken), None)
 
+    def take(self, facade: Facade) -> None:
+        """Reserve a facade for one environment."""
+        self._taken.add(facade)
 
-def take(webots: Webots) -> None:
-    """Reserve a facade for one environment."""
-    _taken.add(webots)
-
-
-def give_back(webots: Webots) -> None:
-    """Offer a facade again, unless it was closed or withdrawn."""
-    _taken.discard(webots)
+    def give_back(self, facade: Facade) -> None:
+        """Offer a facade again, unless it was closed or withdrawn."""
+        self._taken.discard(facade)
