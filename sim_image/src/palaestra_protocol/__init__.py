@@ -3,7 +3,7 @@
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
 - `ros`: between trainer and simulator: connections, types and values of ROS 1
-- `elsewhere`: words of other projects, and their places in a TrainingJob
+- `foreign_words`: words of other projects, and their places in a TrainingJob
 - `fields`: checks of received JSON, because its sender is not trusted
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
@@ -12,7 +12,7 @@
 - `shadowing`: a user's modules that shadow those of Python and of dependencies
 - `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
-- `places`: the connections that this server keeps
+- `connection_limits`: the connections that this server keeps
 
 This package imports none of the others. All modules except `http`, `imports`, `places`, `shadowing`,
 `signals` and `ros.sockets` are pure: values and bytes.

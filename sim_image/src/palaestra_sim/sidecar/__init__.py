@@ -2,9 +2,9 @@
 
 It may have a second simulator as a standby. The two share the process and its ports, and nothing else.
 
-- `entry`: the start: signals are held back before anything else is imported; `blocked`: which ones
+- `entry`: the start: signals are held back before anything else is imported; `blocked_signals`: which ones
 - `cli`: the command line: check everything, then run; `options`: its options
-- `preparation`: the world that the simulator will run, with its own ROS names
+- `world_files`: the world that the simulator will run, with its own ROS names
 - `project`: the Webots project around that world: a folder, and links to what is around the source
 - `drivers`: the command lines of stub, Webots and other programs
 - `lifecycle`: the events that each state allows, as a table; pure
@@ -15,6 +15,6 @@ It may have a second simulator as a standby. The two share the process and its p
 - `output`: the simulator's output, forwarded line by line
 - `left_out`: the simulator's report on what it leaves out of its world
 - `server`: the routes of the two ports: control, and health with metrics and state
-- `families`: every metric by name, as data
+- `metric_definitions`: every metric by name, as data
 - `metrics`: the content of /metrics
 """

@@ -5,7 +5,7 @@ its services, its topics with their messages, and the rule of its `enable`. The 
 `wrong_value` follows from the topic. A new device is one file in this package and one line in `DEVICES`;
 CONTRIBUTING.md has the steps.
 
-- `kind`: what a row is
+- `device_type`: what a row is
 - `distance_sensor`, `touch_sensor`: the rows of what feels obstacles
 - `motors`, `brake`, `position_sensor`: the rows of joints
 - `lidar`: the row of many rays
@@ -15,12 +15,12 @@ CONTRIBUTING.md has the steps.
 - `connector`: the row of what feels another of its kind
 - `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
 - `camera`, `range_finder`: the rows of what sees
-- `pictures`, `recognition`: the lens that both have, and the objects that a camera finds
+- `camera_common`, `recognition`: the lens that both have, and the objects that a camera finds
 - `radar`: the row of what measures the distances of targets
 - `vacuum_gripper`: the row of what would hold things
 - `skin`: the row of meshes that move, of which there are none
-- `response`: lookup tables, resolution and axes, which several of them have
-- `imu`: the topic of those that send a sensor_msgs/Imu
+- `sensor_response`: lookup tables, resolution and axes, which several of them have
+- `imu_topic`: the topic of those that send a sensor_msgs/Imu
 """
 
 from __future__ import annotations

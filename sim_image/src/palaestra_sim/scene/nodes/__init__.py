@@ -2,6 +2,6 @@
 
 - `scene_node`: one node: fields as they are now, place, the nodes inside
 - `scope`: `DEF`, `USE` and `IS`, by file
-- `growing`: from files to nodes; PROTOs are expanded here
+- `instantiate`: from files to nodes; PROTOs are expanded here
 - `types`: the types of Webots that are no PROTOs, with their numbers
 """

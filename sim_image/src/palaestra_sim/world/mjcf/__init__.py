@@ -6,7 +6,7 @@ MuJoCo itself is not needed to check or to name such a world. All but `project` 
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
 - `project`: these files on a disk, and the folder that holds them
-- `growing`: elements that would take all memory
+- `size_checks`: elements that would take all memory
 - `checks`: the mistakes that make a world unusable
 - `naming`: the world of one simulator
 """
