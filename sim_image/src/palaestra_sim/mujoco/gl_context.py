@@ -89,9 +89,7 @@ def _open_context() -> Any:
     logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     try:
         return import_module(f"mujoco.{name}").GLContext(1, 1)
-    except (
-        Exception
-    ) as error:  # OpenGL libraries raise ImportError, AttributeError and their own errors
+    except Exception as error:  # OpenGL libraries raise ImportError, AttributeError and their own errors
         raise UnsimulatedError(
             f"pictures need OpenGL ({name}), which does not work here: {error};"
             f" install the Debian packages {_BACKENDS[name]}"

@@ -38,7 +38,7 @@ class RunningSimulator:
         mode: the mode at the start.
         clock: returns seconds of real time, from any origin.
 
-        Attributes:
+    Attributes:
         simulation: of the world that is loaded now.
         controllers: by ROS name, of the robots whose controller is "ros".
         quit_status: the exit status from `simulation_quit`; None before.
