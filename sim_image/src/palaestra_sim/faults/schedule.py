@@ -1,9 +1,9 @@
 """The schedule of a life: the faults at its k-th event.
 
 Pure, and a function rather than a stream: the random draw for an event is a hash over the seed, the
-    simulator,
-its life, the fault and the event's number. So a draw does not depend on earlier draws, and one more fault
-does not change the others. Two lives of a simulator, or two simulators of a group, have different draws.
+simulator, its life, the fault and the event's number. So a draw does not depend on earlier draws, and one
+more fault does not change the others. Two lives of a simulator, or two simulators of a group, have different
+draws.
 """
 
 from __future__ import annotations

@@ -104,8 +104,7 @@ class RunningSimulator:
         """Load another world, after the response to the current call; return False if it cannot be loaded.
 
         All controllers end, and those of the new world start: services disappear and reappear, and all
-            devices
-        are off.
+        devices are off.
         """
         world_path = Path(path).absolute()
         try:

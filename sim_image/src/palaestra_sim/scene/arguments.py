@@ -31,7 +31,7 @@ def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
     Both are required: without `--name` two robots collide, without `--synchronize` no client controls the
-        steps.
+    steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]

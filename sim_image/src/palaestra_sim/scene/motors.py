@@ -22,11 +22,10 @@ class MotorSpec:
     """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
 
     Units of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited. Equal `min_rad` and
-        `max_rad`
-    mean that commands have no limits. Equal `stops` mean that the joint has no stops, which the shaft never
-    passes. `start_rad` is the position in the world file. `gains` are P, I and D of its controller.
-    `multiplier` scales the positions, velocities and torques that a client sets. `forces`: whether the
-    physics has forces.
+    `max_rad` mean that commands have no limits. Equal `stops` mean that the joint has no stops, which the
+    shaft never passes. `start_rad` is the position in the world file. `gains` are P, I and D of its
+    controller. `multiplier` scales the positions, velocities and torques that a client sets. `forces`:
+    whether the physics has forces.
     """
 
     name: str

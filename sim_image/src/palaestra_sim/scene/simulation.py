@@ -169,8 +169,7 @@ class Simulation:
         """Request a reset of the world within the next basic step.
 
         Restored: time, poses of all solids and robots, motors, noise (with the current seed in customData).
-            Not
-        restored: other fields that were written.
+        Not restored: other fields that were written.
         """
         self._reset_asked = True
 

@@ -52,8 +52,7 @@ class Action(StrEnum):
 
     spawn: start the process. wait: let it end by itself, until the deadline of the request.
     terminate: send SIGTERM to its process group, with a deadline. kill: kill all of its processes.
-    note: read its report on the nodes that it left out. blame: count a fault. accept: record an expected
-        exit.
+    note: read its report on left-out nodes. blame: count a fault. accept: record an expected exit.
     """
 
     NOTHING = "nothing"

@@ -1,7 +1,7 @@
 """Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
 Pure: bytes in, bytes out. No clock, no network, and no file except built-in ones and those that a world
-    names.
+names.
 
     parse(source)                              the tree of a `.wbt` world
     check(source)                              raises unless a world can be generated for every simulator

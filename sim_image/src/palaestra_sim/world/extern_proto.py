@@ -43,8 +43,7 @@ class Protos:
 
     `local` were read from files. `remote` are the types whose addresses have a scheme. `refused` has the
     errors of all other types: the file is missing, is not a PROTO, has a template, or names itself through
-        other
-    files.
+    other files.
     """
 
     local: dict[str, Proto] = field(default_factory=dict)
