@@ -88,7 +88,7 @@ class RobotName:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -120,7 +120,7 @@ class LastExit:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -184,7 +184,7 @@ class SimulatorState:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -217,7 +217,7 @@ class StopRequest:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else, or has an additional field.

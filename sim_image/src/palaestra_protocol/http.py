@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 
 class Address(NamedTuple):
-    """Where a server listens; port 0 stands for any free port."""
+    """The address on which a server listens; port 0 stands for any free port."""
 
     host: str
     port: int

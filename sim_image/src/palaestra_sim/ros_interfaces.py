@@ -18,7 +18,7 @@ Row = tuple[str, str, Handler]  # of a table of services: last part of the path,
 
 
 class UnsimulatedError(SimError, NotImplementedError):
-    """Webots does what the request asks for, and this simulator does not."""
+    """Webots supports the request, but this simulator does not."""
 
 
 class Service(NamedTuple):

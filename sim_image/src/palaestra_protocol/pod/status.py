@@ -66,7 +66,7 @@ class CheckpointStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -95,7 +95,7 @@ class SuccessInterval:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -147,7 +147,7 @@ class SimulatorStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -241,7 +241,7 @@ class TrainerStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -298,7 +298,7 @@ class FaultRecord:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -379,7 +379,7 @@ class Termination:
 
     @classmethod
     def from_message(cls, message: str) -> Self:
-        """Return what `to_message` wrote.
+        """Return the object that `to_message` wrote.
 
         Raises:
             ProtocolError: it is anything else, such as the end of a log, or too long.
@@ -388,7 +388,7 @@ class Termination:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.

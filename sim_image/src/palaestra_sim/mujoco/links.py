@@ -54,7 +54,7 @@ class Ground:
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
     def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
-        """Return the frame of the body around a place, and that body."""
+        """Return the frame of the body around the frame `place`, and that body."""
         around = () if place is None else place.chain()
         for outer in around:
             if outer in self.roots:

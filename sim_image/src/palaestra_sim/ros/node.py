@@ -267,7 +267,7 @@ class ServiceEnd:
         self._persistent = persistent
 
     def receive(self, payload: bytes) -> None:
-        """Take a request from the link."""
+        """Receive a request from the connection."""
         self._node.request(self, payload)
 
     def handle(self, payload: bytes) -> None:

@@ -31,7 +31,7 @@ class MobileBase:
         drive: the kinematics of these wheels; None if they do not move the robot.
 
     Attributes:
-        drive: as given.
+        drive: the argument.
         vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
     """
 

@@ -109,7 +109,7 @@ class NodeMotion:
 def _place(node: SceneNode) -> Frame:
     """Return the frame of a node; in Webots a node without a frame crashes the controller."""
     if node.place is None:
-        raise UnsimulatedError(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
+        raise UnsimulatedError(f"a {node.type_name} has no position; use a Pose, Solid or Robot")
     return node.place
 
 

@@ -21,8 +21,8 @@ class Floor:
     """A level Plane of a boundingObject; in Webots it is infinite.
 
     Attributes:
-        place: of its Solid.
-        local: its frame in that place.
+        place: the frame of its Solid.
+        local: its pose in that frame.
     """
 
     place: Frame

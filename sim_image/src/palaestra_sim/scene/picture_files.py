@@ -42,7 +42,7 @@ def save(
     elif ending in _JPEG:
         data = _jpeg(size, pixels, quality)
     else:
-        raise UnsimulatedError(f"{path}: no PNG or JPEG file; use a name that ends in .png or .jpg")
+        raise UnsimulatedError(f"{path}: is not a PNG or JPEG file; use a name that ends in .png or .jpg")
     try:
         Path(path).write_bytes(data)
     except OSError:

@@ -137,7 +137,7 @@ def _read_world_info(reading: NodeReader, node: SceneNode, scene: SceneContents)
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
         fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
-        reading.refuse(node, fact, "the controller counts whole ones; write one")
+        reading.refuse(node, fact, "write a whole number, because the controller counts whole milliseconds")
     scene.basic_step_ms = int(step_ms)
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
 

@@ -43,7 +43,7 @@ class Robot:
         body: None if nothing moves it and nothing can collide with it.
         powered: whether its motors turn; without energy they do not.
         links: the parts that forces move on its joints.
-        battery: its battery; its value is -1 if the robot has none in the world.
+        battery: its battery; its value is -1 if the robot has no battery.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int, physics: Physics, view: View) -> None:

@@ -99,7 +99,7 @@ class SupervisedSimulator:
         try:
             return answers.get(timeout=_ANSWER_S)
         except queue.Empty:
-            raise NoAnswer(f"no answer to {event} within {_ANSWER_S:g} s") from None
+            raise NoAnswer(f"no response to {event} within {_ANSWER_S:g} s") from None
 
     def shut_down(self) -> None:
         """End the simulator and make `run` return; safe from any thread."""

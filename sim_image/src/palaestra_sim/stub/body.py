@@ -33,8 +33,7 @@ class StubBody(Disc):
         heights: z of their lower and upper ends, in the robot's frame.
 
     Attributes:
-        base: as given.
-        rim, heights: as given.
+        base, rim, heights: the arguments.
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
@@ -123,7 +122,7 @@ class StubBody(Disc):
         self.s = math.sin(heading_rad)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the first part that it meets; enter > leave if it misses."""
+        """Return the meters to where a ray enters and leaves the first part; enter > leave if it misses."""
         crossings = [disc.crossing(frame, ray) for disc in self.discs]
         met = [crossing for crossing in crossings if crossing[1] >= 0.0 and crossing[0] <= crossing[1]]
         return min(met, default=(math.inf, -math.inf))

@@ -40,7 +40,7 @@ class FlatObstacle(Protocol):
         ...
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the shape, in meters along it; enter > leave if it misses."""
+        """Return the meters to where a ray enters and leaves the shape; enter > leave if it misses."""
         ...
 
 
@@ -89,7 +89,7 @@ class Disc:
                 reach[i] = min(reach[i], max(0.0, along - math.sqrt(half)))
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the disc, in meters along it; enter > leave if it misses."""
+        """Return the meters to where a ray enters and leaves the disc; enter > leave if it misses."""
         x, y, c, s = frame
         dx = self.x - x
         dy = self.y - y
@@ -150,7 +150,7 @@ class Block:
                 reach[i] = min(reach[i], enter)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the block, in meters along it; enter > leave if it misses."""
+        """Return the meters to where a ray enters and leaves the block; enter > leave if it misses."""
         x, y = self._local(frame[0], frame[1])
         c = frame[2] * self.c + frame[3] * self.s
         s = frame[3] * self.c - frame[2] * self.s

@@ -74,7 +74,7 @@ def local_protos(
 ) -> Protos:
     """Return the PROTOs that `world` and its local PROTO files name.
 
-    `world_path` is the file of the world, None if it has none; `name` is its name in errors. Types in
+    `world_path` is the file of the world, None without a file; `name` is its name in errors. Types in
     `without` are ignored: their files are not read, and the result does not contain them. `read` returns the
     bytes of a file or raises OSError, `files_below` the PROTO files in a folder and its subfolders.
     """

@@ -45,7 +45,7 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock` if its world asks for it; true for at most one simulator of a
+    `clock`: this simulator may publish `/clock` if its world requests it; true for at most one simulator of a
     ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:

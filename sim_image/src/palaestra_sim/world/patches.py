@@ -63,4 +63,4 @@ def _check(result: Source, meant: Sequence[bytes]) -> None:
     for token, text in zip(tokenize(result), meant, strict=False):
         if token.text != text:
             fact = f"the generated world has {token.text!r} where {text!r} was meant"
-            raise result.error(token.start, fact, "report this world, the generator is wrong")
+            raise result.error(token.start, fact, "report this world; the generator has a bug")

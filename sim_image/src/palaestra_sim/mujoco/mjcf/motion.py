@@ -88,5 +88,5 @@ class BodyMotion:
     def _body(self, node: SceneNode) -> int:
         number = self._bodies.get(node)
         if number is None:
-            raise UnsimulatedError(f"a {node.type_name} has no motion; ask for a Robot or Solid")
+            raise UnsimulatedError(f"a {node.type_name} has no motion; use a Robot or Solid")
         return number

@@ -253,7 +253,7 @@ def _pose(node: SceneNode) -> Pose:
 def _place(node: SceneNode) -> Frame:
     """Return the frame of a node; in Webots a node without a frame crashes the controller."""
     if node.place is None:
-        raise ServiceFailed(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
+        raise ServiceFailed(f"a {node.type_name} has no position; use a Pose, Solid or Robot")
     return node.place
 
 

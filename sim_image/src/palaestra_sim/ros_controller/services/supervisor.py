@@ -154,7 +154,7 @@ def _refuse_get(_request: Any) -> Fields:
 
 
 def _no_headset(_request: Any) -> Fields:
-    raise ServiceFailed("no virtual-reality headset is used; virtual_reality_headset_is_used answers so")
+    raise ServiceFailed("no virtual-reality headset is used; check virtual_reality_headset_is_used first")
 
 
 def _nothing_selected(_request: Any) -> Fields:

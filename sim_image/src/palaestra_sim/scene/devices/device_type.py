@@ -249,7 +249,7 @@ def whole_steps(period_ms: int, step_ms: int) -> bool:
 
 
 def never(_period_ms: int, _step_ms: int) -> bool:
-    """Refuse every period: Webots publishes readings of this device, but the simulator has none."""
+    """Refuse every period: in Webots this device publishes readings, but here it does not."""
     return False
 
 

@@ -88,8 +88,8 @@ def _named(found: Description, new: str, *, clock: bool) -> bytes:
         text = data[start:end] if tuple(arguments) == found.arguments else value
     result = data[:start] + text + data[end:]
     if describe(result, found.source.name).arguments != tuple(arguments):
-        fact = f"the generated world has not the arguments {' '.join(arguments)}"
-        raise found.source.error(start, fact, "report this world, the generator is wrong")
+        fact = f"the generated world lacks the arguments {' '.join(arguments)}"
+        raise found.source.error(start, fact, "report this world; the generator has a bug")
     return result
 
 

@@ -48,7 +48,7 @@ def growing(source: Source, root: Element) -> Iterator[WorldError]:
 
 
 def _size(element: Element) -> float:
-    """Return the product of an element's size numbers; 1 if it has none."""
+    """Return the product of an element's size numbers; 1 without such numbers."""
     texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
     numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
     return math.prod(numbers)
