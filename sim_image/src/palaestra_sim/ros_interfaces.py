@@ -44,7 +44,7 @@ class PublisherInterface(Protocol):
     def send_value(self, value: Any) -> None:
         """Send a message stamped with the wall clock: the template, and `value` in its last field.
 
-        A field of several numbers takes a tuple of them.
+        If the field has several numbers, `value` is a tuple of them.
         """
         ...
 

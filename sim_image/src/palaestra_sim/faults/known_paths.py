@@ -47,7 +47,7 @@ def survey(load: Load, world_path: Path) -> KnownPaths:
     """Return the services and topics of the world in that file, loaded by `load`.
 
     Raises:
-        WorldError: the file is wrong, or has something that cannot be simulated.
+        WorldError: the file is wrong, or contains an object that cannot be simulated.
         OSError: it cannot be read.
     """
     nodes: list[_Listener] = []

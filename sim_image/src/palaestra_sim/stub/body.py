@@ -70,7 +70,7 @@ class StubBody(Disc):
         self.heights = heights
         self._parts = tuple(outline)
         self._stride_m = _STRIDE * min((radius for _, _, radius in outline), default=0.0)
-        # Of the farthest axis; a turn moves nothing of a cylinder that stands in the middle.
+        # Distance of the farthest axis; a turn does not move a cylinder whose axis is in the middle.
         self._arm_m = max((math.hypot(x, y) for x, y, _ in outline), default=0.0)
         self._solids = Neighborhood((), 0.0)
         self._others: tuple[StubBody, ...] = ()

@@ -1,4 +1,4 @@
-"""Refuse writes of fields that have an effect in Webots but none here.
+"""Refuse writes of fields that have an effect in Webots but not here.
 
 Otherwise a client that randomizes a world would read back its writes, but train in a world that does not
 change.
