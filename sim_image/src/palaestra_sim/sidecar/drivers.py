@@ -88,7 +88,7 @@ def _for_mujoco(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return Webots' variables: a user, which containers often lack, and one against extra files."""
+    """Return Webots' variables: a user, which containers often lack, and one that prevents extra files."""
     return {
         "USER": environment.get("USER", _NOT_ROOT),
         "WEBOTS_DISABLE_SAVE_SCREEN_PERSPECTIVE_ON_CLOSE": "true",

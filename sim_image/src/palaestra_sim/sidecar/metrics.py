@@ -23,7 +23,7 @@ def registry(simulators: Sequence[SupervisedSimulator]) -> CollectorRegistry:
 
 
 class _Simulators(Collector):
-    """Creates the metrics of the simulators, each with all of its labels, so that every series exists at once."""
+    """Creates the metrics of the simulators with all their labels, so that every series exists at once."""
 
     def __init__(self, simulators: Sequence[SupervisedSimulator]) -> None:
         self._simulators = dict(zip(SLOTS, simulators, strict=False))
