@@ -116,7 +116,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        RunRefused: they differ in fields that a run cannot change, and this is no correction; one line for each
+        RunRefused: they differ in fields that a run cannot change, and this is no correction; one line for
+        each
             field.
     """
     changes = _changes(directory, record)
