@@ -1,6 +1,6 @@
 """Record the generated files anew: `python -m tests.golden`.
 
-- `tests/golden/`: the plans of the examples, see `plans.py`
+- `tests/golden/`: the plans of the examples and of the cases, see `plans.py`
 - `manifests/crd.yaml`, docs/trainingjob.md: made from the API's models
 - `docs/trainingjob.md`: the default hyperparameters of the algorithms
 - `docs/algorithms.md`: which algorithm works with which observations and actions
@@ -12,7 +12,7 @@
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
 - `manifests/install.yaml`: the chart with its default values, where Helm is built
 
-A new example needs no new test: its plans are recorded here and compared by test_golden.py.
+A new example or case needs no new test: its plans are recorded here and compared by test_golden.py.
 """
 
 import sys
@@ -53,7 +53,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
 
 
 def main() -> int:
-    """Write every file; recorded plans of examples that are gone are removed."""
+    """Write every file; recorded plans of examples and cases that are gone are removed."""
     current = set()
     for path, text in recorded():  # one by one: the installation is rendered from what stands before it
         path.write_text(text)

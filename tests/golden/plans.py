@@ -3,6 +3,7 @@
 - `minimal.<layout>.yaml`: the whole plan of manifests/examples/minimal.yaml, in a cluster and on a laptop
 - `examples/<example>.diff`: each other example, compared with minimal.yaml under the example's name; first
   the hunks that are the same in both layouts, then those of one layout
+- `cases/<case>.plan.diff`: each `cases/<case>.job.yaml`, merged into minimal.yaml, in a cluster
 
 In a difference, a world is one line with its checksum, and the name of a ConfigMap is without the hash of its
 data, because the data are there.
@@ -14,18 +15,24 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import reduce
 from operator import and_
 from pathlib import Path
+from typing import Any
 
 from palaestra.api import TrainingJob, load
 from palaestra.api.simulators import Builtin
+from palaestra.api.yaml_io import read, write
+from palaestra.errors import TrainingJobError
 from palaestra.objects import Object
 from palaestra.plan import ClusterLayout, Images, Layout, LocalLayout, identified, plan
 from palaestra.plan.training import FILE
 from palaestra.plan.yaml_text import as_yaml
+from palaestra_sim.errors import WorldError
 from palaestra_sim.world import builtin
 from tests.golden.difference import difference
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "manifests" / "examples"
+CASES = HERE / "cases"
+JOB = ".job.yaml"
 SMALLEST = "minimal"
 LAYOUTS = ("cluster", "local")
 IMAGES = Images.of_release("0.0.0")  # of no release, so that a release changes no plan
@@ -41,6 +48,14 @@ def recorded() -> Iterator[tuple[Path, str]]:
         yield HERE / f"{SMALLEST}.{layout}.yaml", text_of(smallest, layout)
     for name in examples():
         yield HERE / "examples" / f"{name}.diff", compared(f"{name}.yaml", plans_of(name))
+    before = comparable(smallest, "cluster")
+    for path in cases():
+        try:
+            now = comparable(case(path), "cluster")
+        except (TrainingJobError, WorldError) as error:
+            error.add_note(f"in {path}")
+            raise
+        yield plan_of(path), compared(path.name, {"cluster": (before, now)})
 
 
 def on_disk() -> set[Path]:
@@ -56,6 +71,32 @@ def examples() -> list[str]:
 def example(name: str) -> TrainingJob:
     """Return the job of manifests/examples/<name>.yaml, with a uid."""
     return identified(load((EXAMPLES / f"{name}.yaml").read_text(), name), UID)
+
+
+def cases() -> list[Path]:
+    """Return the files with the jobs of the cases."""
+    return sorted(CASES.glob(f"*{JOB}"))
+
+
+def plan_of(path: Path) -> Path:
+    """Return the file with the plan of a case."""
+    return path.with_name(f"{path.name.removesuffix(JOB)}.plan.diff")
+
+
+def case(path: Path) -> TrainingJob:
+    """Return the smallest job with the fields of a case."""
+    smallest, changes = (read(file.read_text(), file.name) for file in (EXAMPLES / f"{SMALLEST}.yaml", path))
+    return identified(load(write(merged(smallest, changes)), path.name), UID)
+
+
+def merged(base: Any, changes: Any) -> Any:
+    """Return `base` with `changes`; fields are merged, and items of a list that have the same `name`."""
+    if isinstance(base, dict) and isinstance(changes, dict):
+        return {**base, **{key: merged(base.get(key), value) for key, value in changes.items()}}
+    if isinstance(base, list) and isinstance(changes, list):
+        items = {item["name"]: item for item in base}
+        return list(merged(items, {item["name"]: item for item in changes}).values())
+    return changes
 
 
 def renamed(job: TrainingJob, name: str) -> TrainingJob:

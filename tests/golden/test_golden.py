@@ -33,9 +33,19 @@ def test_a_generated_file_is_current(path):
     assert not change, f"{path.relative_to(ROOT)} is not current; run `make golden`, read its diff:\n{shown}"
 
 
-def test_every_recorded_plan_has_its_example():
+def test_every_recorded_plan_has_its_example_or_case():
     """A reader would believe a recorded plan that nothing makes any more."""
     assert plans.on_disk() <= recorded().keys()
+
+
+@for_each("job", plans.cases)
+def test_a_case_says_what_it_shows_and_shows_it(job):
+    """The first line is the caption of the pair; a case without a difference shows nothing."""
+    caption, _, fields = job.read_text().partition("\n")
+
+    assert caption.startswith("# ")
+    assert fields.startswith("spec:")
+    assert "@@" in plans.plan_of(job).read_text()
 
 
 @for_each("name, layout", lambda: [(name, layout) for name in plans.examples() for layout in plans.LAYOUTS])
