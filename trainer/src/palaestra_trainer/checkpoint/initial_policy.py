@@ -109,8 +109,8 @@ def _take_statistics(path: Path, model: BaseAlgorithm, known: Mapping[str, Any])
     own = {} if normalizer is None else normalizer.scales
     if own.keys() - {"rewards"} != known.keys() - {"rewards", "epsilon"}:
         log.warning(
-            "the initial policy and this run normalize different observations, so it sees others than it "
-            "learned from; set algorithm.normalize as it was",
+            "the initial policy and this run normalize different observations, so the policy gets other "
+            "values than in its training; set algorithm.normalize as in its run",
             file=str(path),
         )
     if normalizer is None:

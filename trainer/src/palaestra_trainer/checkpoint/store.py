@@ -135,7 +135,7 @@ def newest(folder: Path) -> SavedCheckpoint | None:
         )
         rest = rest or found
     if rest:
-        log.warning("no checkpoint is whole: going on without the lost experience", path=str(rest.path))
+        log.warning("all checkpoints are damaged: resuming without the lost experience", path=str(rest.path))
     elif damage:
         raise ConfigurationError(
             f"{folder}: no checkpoint in it can be read ({damage}); restore one from a copy, or move the run "

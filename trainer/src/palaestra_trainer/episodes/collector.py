@@ -207,7 +207,7 @@ class Collector:
         for word in said[OURS].get(HIDDEN, {}).keys() - self._hidden:
             self._hidden.add(word)
             log.warning(
-                "word of the environment moved: it has a meaning of its own",
+                "info key of the environment moved: Stable-Baselines3 or Palaestra uses it",
                 word=word,
                 now=f'info["{OURS}"]["{HIDDEN}"]["{word}"]',
             )

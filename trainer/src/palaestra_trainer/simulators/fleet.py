@@ -43,7 +43,7 @@ class Fleet:
         by_name = {member.name: member for member in members}
         missing = [wanted.name for wanted in configuration.simulators if wanted.name not in by_name]
         if missing:
-            raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
+            raise ConfigurationError(f"simulators: {', '.join(missing)} was not created; add it to members")
         groups = groups_of(configuration)
         keepers = {
             wanted.name: Restarter(

@@ -218,5 +218,5 @@ class Side:
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
-            log.error("standby left down until it is wanted", simulator=self.simulator.name, fact=str(spent))
+            log.error("standby stays down until it is needed", simulator=self.simulator.name, fact=str(spent))
             raise fault from spent

@@ -42,4 +42,6 @@ class EpisodeEnd:
             )
         if self._clock() >= self._say_at:
             self._say_at = self._clock() + SAY_EVERY_S
-            log.warning("an episode goes on", waits=self._waits, steps=steps, most=MOST_STEPS, remedy=REMEDY)
+            log.warning(
+                "an episode has not ended", waits=self._waits, steps=steps, most=MOST_STEPS, remedy=REMEDY
+            )

@@ -39,7 +39,7 @@ def leave_after(
     def end() -> None:
         others = [thread for thread in threading.enumerate() if not thread.daemon]
         names = [thread.name for thread in others if thread is not threading.main_thread()]
-        log.warning("ended although code of the job goes on", after_s=seconds, threads=names)
+        log.warning("process ended while code of the job was running", after_s=seconds, threads=names)
         faulthandler.dump_traceback(sys.__stderr__ or 2, all_threads=True)
         before()
         leave(code)
