@@ -32,7 +32,7 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
 
 
 def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> FaultTolerantEnv:
-    """Return a gymnasium.Env in a simulator of its own, for a training loop of any library.
+    """Return a gymnasium.Env in its own simulator, for a training loop of any library.
 
     A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
     `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, within its

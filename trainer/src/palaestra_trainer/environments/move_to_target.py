@@ -73,8 +73,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     | part      | index | meaning                                       | unit      | min  | max |
     |-----------|-------|-----------------------------------------------|-----------|------|-----|
-    | sensors   | 0-8   | nearness to what is 0.40 m away or closer     | 0.37 m    | 0    | 1   |
-    | sensors   | 9     | bumper touches something                      | 0 or 1    | 0    | 1   |
+    | sensors   | 0-8   | nearness of the nearest object within 0.40 m  | 0.37 m    | 0    | 1   |
+    | sensors   | 9     | the bumper touches something                  | 0 or 1    | 0    | 1   |
     | velocity  | 0     | forward, mean over the step                   | 0.5 m/s   | -1.5 | 1.5 |
     | velocity  | 1     | to the left, mean over the step               | 0.5 m/s   | -1.5 | 1.5 |
     | velocity  | 2     | turning, mean over the step                   | 1.0 rad/s | -1.5 | 1.5 |
@@ -96,8 +96,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | progress  | 1     |        | -0.1 | 0.1 | meters gained toward the target, by one movement    |
     | success   | 1     | 1      | 0    | 1   | 1 when the robot came to stand on it                |
     | collision | -1    | -1     | 0    | 1   | 1 when it ran into something                        |
-    | proximity | -0.1  |        | 0    | 1   | grows in a line as things come from 0.18 to 0.03 m  |
-    | time_up   |       | -0.5   | 0    | 1   | 1 when the last step was taken without that         |
+    | proximity | -0.1  |        | 0    | 1   | rises linearly as objects come from 0.18 to 0.03 m  |
+    | time_up   |       | -0.5   | 0    | 1   | 1 when time is up without success or collision      |
     | duration  | -0.01 |        | 1    | 1   | 1 for every step                                    |
 
     ## Start

@@ -54,7 +54,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     | reward | min | max | is                                                            |
     |--------|-----|-----|---------------------------------------------------------------|
     | Sparse | 0   | 1   | 1 within 0.20 m of the desired goal                           |
-    | Dense  | 0   | 1   | 1 at the desired goal, falling in a line to 0 at 5.66 m        |
+    | Dense  | 0   | 1   | 1 at the desired goal, falling linearly to 0 at 5.66 m         |
 
     Rewards are never negative, unlike in gymnasium-robotics: a collision ends the episode, and an early end
     must not be worth more than further steps.

@@ -71,7 +71,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     | index | meaning                                         | unit     | min  | max |
     |-------|-------------------------------------------------|----------|------|-----|
-    | 0-23  | nearness of the nearest thing in a sector       | 0.8 m    | 0    | 1   |
+    | 0-23  | nearness of the nearest object in a sector      | 0.8 m    | 0    | 1   |
     | 24    | velocity forward, mean over the step            | greatest | -1.5 | 1.5 |
     | 25    | turning, mean over the step                     | greatest | -1.5 | 1.5 |
     | 26    | distance to the target                          | 2 m      | 0    | 3   |

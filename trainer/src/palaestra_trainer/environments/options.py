@@ -13,8 +13,8 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has none and truncates them:
-# see docs/environments.md.
+# `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has no such reward, so its
+# episodes are truncated: see docs/environments.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 

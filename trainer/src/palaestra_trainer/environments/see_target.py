@@ -70,8 +70,8 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     | progress  | 1     |        | -0.1 | 0.1 | meters gained toward the pole, by one movement      |
     | success   | 1     | 1      | 0    | 1   | 1 when the robot came within 0.45 m                 |
     | collision | -1    | -1     | 0    | 1   | 1 when it ran into something                        |
-    | proximity | -0.1  |        | 0    | 1   | grows in a line as things come from 0.18 to 0.03 m  |
-    | time_up   |       | -0.5   | 0    | 1   | 1 when the last step was taken without that         |
+    | proximity | -0.1  |        | 0    | 1   | rises linearly as objects come from 0.18 to 0.03 m  |
+    | time_up   |       | -0.5   | 0    | 1   | 1 when time is up without success or collision      |
     | duration  | -0.01 |        | 1    | 1   | 1 for every step                                    |
 
     ## Start

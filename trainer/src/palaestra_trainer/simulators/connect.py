@@ -40,8 +40,8 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
 
     Raises:
         ConfigurationError: the configuration cannot be read, or its environment or robot is unknown.
-        MasterLost: no ROS master answers.
-        SimulatorDead, SimulatorHung: a sidecar does not answer.
+        MasterLost: no ROS master responds.
+        SimulatorDead, SimulatorHung: a sidecar does not respond.
     """
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
@@ -157,7 +157,7 @@ def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: Simulato
 
     Raises:
         ConfigurationError: the environment is unknown, or it does not accept its options or this robot.
-        SimulatorDead, SimulatorHung: the sidecar does not answer.
+        SimulatorDead, SimulatorHung: the sidecar does not respond.
     """
     make = partial(make_environment, configuration.environment)
     robot = robot_class(configuration.robot or DEFAULT_ROBOT)

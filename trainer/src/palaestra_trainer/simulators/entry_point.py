@@ -47,9 +47,9 @@ def make(
         simulator: called for robot and scene if they are not given, once for each environment of
             `make_vec`. `palaestra_trainer.testing.fake_arena` needs no simulator.
         role: without `robot` and `simulator`, the environment takes the newest `Webots` facade of this
-            process. If there is none, it takes the first simulator of PALAESTRA_CONFIG with this role that
-            no environment of any process uses. Without PALAESTRA_CONFIG it starts a stub, which ends with
-            `close()` or with this process.
+            process, else the first simulator of PALAESTRA_CONFIG with this role that no environment of any
+            process uses. Without PALAESTRA_CONFIG it starts a stub, which ends with `close()` or with this
+            process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:

@@ -73,9 +73,9 @@ class ReportsLeftOut(Protocol):
     """A member whose simulator reports what it leaves out of its world."""
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what the simulator left out at its last start, in lines for people. Never blocks.
+        """Return the parts of its world that the simulator left out at its last start, in lines for people.
 
-        It is empty before the first start.
+        It is empty before the first start. Never blocks.
         """
         ...
 

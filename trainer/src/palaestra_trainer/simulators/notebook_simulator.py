@@ -47,7 +47,7 @@ class NotebookSimulator:
 
 
 def offered_simulator(world: str) -> NotebookSimulator | None:
-    """Return the newest facade that no environment uses; None: this process has none.
+    """Return the simulator of the newest facade that no environment uses; None if there is no such facade.
 
     Its robot has the class in PALAESTRA_CONFIG. If that is not set, it is the robot of `world`, which ships.
     """

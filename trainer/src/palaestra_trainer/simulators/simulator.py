@@ -91,7 +91,7 @@ class Simulator:
         return self.robot.simulation.simulated_s
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what the simulator left out of its world at its last start, in lines for people."""
+        """Return the parts of its world that the simulator left out at its last start, as text lines."""
         return self.sidecar.left_out
 
     def due(self, episodes: int = 1) -> str | None:

@@ -175,7 +175,7 @@ class Side:
         simulator.wear.begin()
 
     def abandon(self) -> None:
-        """Make a start that is under way fail soon, and begin no other."""
+        """Make a running start fail soon, and begin no other."""
         self.wanted = False
         self.simulator.abandon()
 

@@ -103,7 +103,7 @@ class Progress:
         success_interval: the interval around `success_rate`; None if that is None.
         checkpoint: the newest checkpoint; None before the first.
         attempt: this attempt's number in the run directory; None before it is recorded.
-        figures: counts of this attempt only.
+        figures: values of this attempt only, for /metrics.
     """
 
     def __init__(
