@@ -8,7 +8,7 @@ one of Palaestra:
 - `sim_fault`: in the row that a fault truncated: kind, simulator, fact, episode and step
 - `recovering`: in the rows after it, until the simulator is up again; False once it was given up
 - `extra_steps`: simulation steps that a late message made necessary
-- `hidden`: values of the environment under keys that Stable-Baselines3 uses for itself
+- `hidden`: values of the environment under keys that Stable-Baselines3 or Palaestra uses
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def extra_steps(info: Mapping[str, Any]) -> int:
 
 
 def of_environment(info: Mapping[str, Any], **words: Any) -> dict[str, Any]:
-    """Return an environment's info with our `words`; its keys for Stable-Baselines3 are moved to `hidden`."""
+    """Return an environment's info with our `words`; its keys that we or others use are moved to `hidden`."""
     taken = {name: info[name] for name in OF_STABLE_BASELINES3 if name in info}
     if OURS in info and ours(info).keys() != {"extra_steps"}:
         taken[OURS] = info[OURS]

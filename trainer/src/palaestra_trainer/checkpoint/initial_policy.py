@@ -1,7 +1,7 @@
 """Begin a run with the policy of another run: its tensors, and the statistics of its normalizer.
 
 The file is the zip of any model of Stable-Baselines3. Nothing in it is unpickled, so it need not be trusted.
-Optimizers and all counts of the run start from zero.
+The optimizers are new, and all counts of the run start at 0.
 """
 
 from __future__ import annotations

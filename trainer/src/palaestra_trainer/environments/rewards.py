@@ -13,7 +13,7 @@ from enum import Enum
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
-MARGIN_M = 0.18  # the space that should stay free around the robot; it drives half of that in a step
+MARGIN_M = 0.18  # the space that should stay free around the robot, which drives half of it in a step
 
 
 class EpisodeOutcome(Enum):

@@ -39,7 +39,7 @@ from palaestra_trainer.telemetry.progress_sources import follow
 
 
 def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:
-    """Return a group of one environment in several simulators, which are up.
+    """Return a group of environments of one class, each in its own simulator, which is up.
 
     The simulator is that of the newest `Webots` facade of this process that no environment uses. Without such
     a facade, or for more than one simulator, those of PALAESTRA_CONFIG are used. If that is not set, new ones

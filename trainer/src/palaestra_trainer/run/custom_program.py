@@ -1,6 +1,6 @@
 """Reports of a user's own training program (`trainer.command`), for /status, /metrics and the operator.
 
-The built-in loop reports without them. Without reports the operator does not know a program's steps. It then
+The built-in loop reports by itself. Without reports the operator does not know a program's steps. It then
 cannot detect progress between preempted attempts, and ends the replica as `NoProgress`.
 """
 

@@ -1,6 +1,6 @@
 """Simulators for environments that were created without one; each environment gets its own.
 
-The simulator is that of a `Webots` facade of the program, one of PALAESTRA_CONFIG, or a new stub.
+The simulator is that of a `Webots` facade of the program, one of PALAESTRA_CONFIG, or a new one.
 """
 
 from __future__ import annotations

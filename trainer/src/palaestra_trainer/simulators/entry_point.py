@@ -182,7 +182,7 @@ _Made = TypeVar("_Made")
 
 
 def _made(kind: Callable[..., _Made], place: _Place, options: object) -> _Made:
-    """Return an environment in a place; release the place if the robot does not fit."""
+    """Return an environment with the robot and scene of a place; release the place if that fails."""
     try:
         return kind(place.robot, place.scene, options, place.release)
     except BaseException:

@@ -1,8 +1,8 @@
 """Handle SIGTERM and SIGINT.
 
 The first signal is recorded, and the run ends at its next check for signals.
-During training that is a boundary with a checkpoint. While simulators start,
-the run ends at once without a checkpoint, because there is nothing to save. The
+During training it then saves a checkpoint of the last rollout boundary. While
+simulators start, it saves no checkpoint, because there is nothing to save. The
 handler itself raises nothing, because it may run while a lock is released.
 Waits may continue for `shutdown_deadline.LEFT_S` seconds. A second signal ends
 the process at once, and so does a signal that arrives before the run listens.

@@ -119,7 +119,7 @@ class Webots:
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = launcher
-        # The probe has its own connection with a shorter deadline, to detect a simulator that hangs soon.
+        # The probe has its own connection with a shorter deadline, because it must report a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
