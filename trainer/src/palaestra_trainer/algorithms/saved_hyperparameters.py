@@ -1,6 +1,6 @@
-"""The hyperparameters that a run began with; it keeps them even if the defaults change later.
+"""The hyperparameters that a run began with; the run keeps them even if the defaults change later.
 
-All of them are in the run directory.
+All of them are in a file of the run directory.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ def begin_with(
     """Return the algorithm of an attempt with all its hyperparameters.
 
     Args:
-        configuration: of the run.
-        directory: of the run; the run may not have begun.
-        before: the run whose checkpoint it resumes from, its own or another; None: there is no checkpoint.
+        configuration: the configuration of the run.
+        directory: the directory of the run, which may not have begun.
+        before: the run whose checkpoint it resumes from, itself or another; None: it begins without one.
 
     Raises:
         ConfigurationError: the file in the run directory cannot be read.
@@ -42,7 +42,7 @@ def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
     """Write the algorithm with which a run begins into its directory, unless the run has begun.
 
     Raises:
-        OSError: it could not be written.
+        OSError: the file could not be written.
     """
     if directory.hyperparameters.exists() or directory.attempts.exists():
         return

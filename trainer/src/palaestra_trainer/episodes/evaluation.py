@@ -1,6 +1,6 @@
 """Evaluate a policy: play whole episodes with given seeds and return their results.
 
-If a fault cuts an episode, a free simulator plays it again with the same seed.
+If a fault truncates an episode, a free simulator plays it again with the same seed.
 So an evaluation always has all of its episodes, and two policies are compared
 on the same ones.
 """
@@ -30,7 +30,7 @@ from palaestra_trainer.waiting.signals import Check, go_on
 
 
 class ActingPolicy(Protocol):
-    """Anything that chooses an action for an observation; every Stable-Baselines3 model does."""
+    """An object that chooses an action for an observation, such as every Stable-Baselines3 model."""
 
     def predict(
         self,
@@ -52,7 +52,7 @@ class Episode:
         total_reward: undiscounted sum of its rewards.
         length: number of environment steps.
         success: the last step's `info["is_success"]`; None: the environment did not report it.
-        outcome: the last step's `info["outcome"]`, a word of the environment; None: it did not report one.
+        outcome: the last step's `info["outcome"]`, a text; None: the environment did not report it.
     """
 
     seed: int
@@ -75,7 +75,7 @@ class EvaluationResult:
 
     Attributes:
         episodes: in the order of their seeds.
-        faults: episodes that a fault cut and that were played again.
+        faults: number of episodes that a fault truncated and that were played again.
         seconds: wall time of the whole evaluation.
     """
 
@@ -95,7 +95,10 @@ class EvaluationResult:
         return wilson(sum(map(bool, successes)), len(successes)) if successes else None
 
     def _successes(self) -> list[bool | None]:
-        """Return the success of each episode; an environment may report success and never failure."""
+        """Return the success of each episode, or [] if no episode reported it.
+
+        An environment may report success and never failure, so None then counts as failure.
+        """
         successes = [episode.success for episode in self.episodes]
         return [] if all(success is None for success in successes) else successes
 
@@ -138,13 +141,13 @@ class EvaluationResult:
 def evaluate(
     policy: ActingPolicy, member: Member | Restarter, seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Return the evaluation of `policy`, deterministic, in one episode for each of `seeds`.
+    """Evaluate `policy`, with deterministic actions, in one episode for each of `seeds`.
 
     Args:
         policy: chooses the actions.
-        member: the simulator for the episodes, or the keeper of one.
-        seeds: at least one; an episode that a fault cut is played again with its seed.
-        check: called before each step and during waits for a simulator; raises to cancel the evaluation.
+        member: the simulator for the episodes, or its restarter.
+        seeds: at least one; an episode that a fault truncated is played again with its seed.
+        check: called before each step and during waits for a simulator; it raises to cancel the evaluation.
 
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
@@ -156,9 +159,9 @@ def evaluate(
 def evaluate_on_all(
     policy: ActingPolicy, keepers: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Return the same as `evaluate`, with the episodes distributed over several simulators at once.
+    """Evaluate as `evaluate` does, with the episodes distributed over several simulators at once.
 
-    If a simulator breaks, another one plays its episode, during the repair and if the simulator is given up.
+    If a simulator breaks, another one plays its episode. The broken one is restarted or given up meanwhile.
     """
     started = time.monotonic()
     games = _Games(policy, seeds)
@@ -180,11 +183,11 @@ def evaluate_on_all(
 class _Games:
     """The episodes of one evaluation: those still to play, and those that are complete.
 
-    One thread plays an episode at a time and puts it back if a fault cuts it. So an idle thread stays until
-    the last episode is complete, because it may have to play that one again.
+    Each thread plays one episode at a time and puts it back if a fault truncates it. So an idle thread stays
+    until the last episode is complete, because it may have to play that one again.
 
     Attributes:
-        faults: number of episodes that were cut.
+        faults: number of episodes that a fault truncated.
     """
 
     def __init__(self, policy: ActingPolicy, seeds: Iterable[int]) -> None:
@@ -257,9 +260,9 @@ def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> 
 def _play(
     policy: ActingPolicy, keeper: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
 ) -> Episode:
-    """Play an episode, number and seed, to its end.
+    """Play one episode to its end; `game` is its number and seed.
 
-    If an error cuts it, `rewards` holds the reward of each step until then.
+    If an error ends it, `rewards` holds the reward of each step before the error.
     """
     number, seed = game
     observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)

@@ -1,10 +1,10 @@
 """Many simulators as one Stable-Baselines3 VecEnv that tolerates faults.
 
 All members step at the same time, in turns of the caller's thread: each sends
-its simulator the step before the first answer is awaited. A broken member is
-restarted in the background. Its rows are invalid until it is up again, see
-`palaestra_trainer.episodes.collector`, and the other members continue. Only
-if no member can step does the thread wait for one.
+the step to its simulator before the thread waits for the first response. A
+broken member is restarted in the background. Its rows are invalid until it is
+up again, see `palaestra_trainer.episodes.collector`, and the other members
+continue. The thread waits for a restart only if no member can step.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ class SimulatorsVecEnv(MembersVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:
-        keepers: one for each member; rows are in their order.
+        keepers: the restarter of each member; rows are in their order.
         run_seed: the replica's seed; each episode's seed is derived from it.
-        check: called every tenth of a second during waits for members; raises to stop the wait.
-        judge: an environment without a simulator that computes rewards of goals; None: members do it.
+        check: called every tenth of a second during waits for members; it raises to end the wait.
+        judge: an environment without a simulator that computes rewards of goals; None: members compute them.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         self._gives_masks = all(gives_masks(keeper.member.env) for keeper in keepers)
 
     def pause(self) -> None:
-        """Pause all members until `run`."""
+        """Pause all members until `unpause`."""
         for keeper in self._keepers:
             keeper.pause()
 
@@ -89,19 +89,19 @@ class SimulatorsVecEnv(MembersVecEnv):
         return self._stack(observations)
 
     def set_training_progress(self, training_progress: float) -> None:
-        """Set the share of training, 0 to 1, with which the next episodes begin."""
+        """Set the share of training, 0 to 1, that is complete when the next episodes begin."""
         for collector in self._collectors:
             collector.training_progress = training_progress
 
     def snapshot(self) -> list[EpisodeState]:
-        """Return the position of each member in its episodes; cheap, and not changed by later steps."""
+        """Return the position of each member in its episodes; cheap. Later steps do not change the result."""
         return [collector.state for collector in self._collectors]
 
     def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
         """Bring all members back to their states, at once; return their observations.
 
-        The steps for it are not counted; returns and lengths of the episodes continue as they were. If
-        `masked`, no member takes an action that its mask forbids now.
+        The steps for it are not counted; returns and lengths of the episodes continue from their old values.
+        If `masked`, no member takes an action that its mask forbids now.
         """
         observations = take_turns(
             partial(collector.resume, state, masked=masked)
@@ -148,10 +148,10 @@ class SimulatorsVecEnv(MembersVecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Return what a method of the chosen environments returns.
+        """Return the result of a method of each chosen environment.
 
-        `compute_reward` is called on the judge, because members may be restarting, with copies: the goals
-        are learned from afterwards. `action_masks` is called on no member that is being mended or lost.
+        `compute_reward` is called on the judge, because members may be restarting. It gets copies, because
+        the goals are learned from later. `action_masks` is not called on a member that restarts or is lost.
         """
         if method_name == ACTION_MASKS and self._gives_masks:
             return self._action_masks(indices)
@@ -160,7 +160,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         return [self._judge.get_wrapper_attr(method_name)(*copied(method_args), **copied(method_kwargs))]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments; of `action_masks`, what `env_method` calls."""
+        """Return an attribute of the chosen environments; for `action_masks`, the method of the collector."""
         if attr_name == ACTION_MASKS and self._gives_masks:
             return [self._collectors[index].action_mask for index in self._get_indices(indices)]
         return super().get_attr(attr_name, indices)
@@ -170,7 +170,7 @@ class SimulatorsVecEnv(MembersVecEnv):
             return take_turns(self._collectors[index].action_mask for index in self._get_indices(indices))
 
     def _await_somebody(self) -> None:
-        """Return when a member can step or has become ready; a vector of only invalid rows is useless."""
+        """If no member can step, wait for the end of a restart; a vector of only invalid rows is useless."""
         if all(keeper.busy or keeper.lost for keeper in self._keepers):
             with self._watcher.spending(Cause.RECOVERING):
                 await_one(self._keepers, self._check)

@@ -1,4 +1,4 @@
-"""Players that begin and step together, and the simulators that they have until they are closed."""
+"""A group of environments that begin and step together, each in its own simulator."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ def _nothing(rows: Sequence[StepResult]) -> None:
 
 
 class EnvGroup:
-    """One player for each member.
+    """One `EpisodeRunner` for each member.
 
-    They release their simulators by `close`, or at the end of the process.
+    `close` releases the simulators; otherwise they are released at the end of the process.
 
     Args:
-        keepers: one for each member, which is up or is being started.
-        release: stops the simulators and gives them back.
-        deadline_s: the longest wait for a simulator that is being mended.
-        mend_at_once: whether a step waits for the mending itself, and not only the next reset.
+        keepers: the restarter of each member; the members are up or being started.
+        release: stops and releases the simulators.
+        deadline_s: the longest wait for a simulator that restarts.
+        mend_at_once: whether the step with the fault waits for the restart; False: the next reset waits.
         played: called with the rows of each step.
 
     Attributes:
-        all: in the order of `keepers`.
+        all: the runners, in the order of `keepers`.
     """
 
     def __init__(
@@ -58,22 +58,23 @@ class EnvGroup:
         """Begin an episode in each member at once; wait until all are up.
 
         Raises:
-            FaultBudgetSpent: the restart budget of a member is used up.
-            SimulatorHung: a member was not mended within the deadline.
-            ConfigurationError: a world lacks what the environment needs, or an option is wrong.
-            MasterLost: no ROS master answers.
+            FaultBudgetSpent: the restart budget of a member is spent.
+            SimulatorHung: a member was not restarted within the deadline.
+            ConfigurationError: a world lacks a device or node that the environment needs, or an option is
+                wrong.
+            MasterLost: no ROS master responds.
         """
         for player, seed, own in zip(self.all, seeds, options, strict=True):
             player.prepare(seed, own)
         self._begin_prepared()
 
     def step(self, action: Any) -> StepResult:
-        """Return the row of a step of the only player; where its episode ended, none is under way.
+        """Step the only member and return its row; if its episode ended, no new one begins.
 
         Raises:
-            ResetNeeded: no episode is under way.
+            ResetNeeded: no episode is running.
             Diverged: observation or reward is not finite.
-            FaultBudgetSpent: as `begin`, if it mends at once.
+            FaultBudgetSpent: as `begin`, if `mend_at_once`.
         """
         [player] = self.all
         row = player.step(action)
@@ -83,10 +84,10 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Return the rows of a step of all players at once; where an episode ended, the next one has begun.
+        """Step all members at once and return their rows; if an episode ended, the next one has begun.
 
         Raises:
-            ResetNeeded: an episode is not under way.
+            ResetNeeded: a member has no running episode.
             Diverged: observation or reward is not finite.
             As `begin`.
         """

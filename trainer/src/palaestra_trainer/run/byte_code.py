@@ -1,9 +1,9 @@
-"""Values of a model.zip that hold byte code, which another Python than the one that wrote it cannot run.
+"""Values of a model.zip that hold byte code, which only the version of Python that wrote it can run.
 
-Stable-Baselines3 pickles each value that JSON cannot write. A function or class without a name that can be
-imported is stored as byte code. Executed by another Python, it raises SystemError or ends the process.
-The trainer's own values are names and numbers, but a class of a job's author may be one that nobody can
-import by its name.
+Stable-Baselines3 pickles each value that JSON cannot write. A function or class that cannot be imported by
+name is stored as byte code. If another Python executes it, it raises SystemError or ends the process.
+The trainer's own values are names and numbers, but a class of a job's author may be one that cannot be
+imported by name.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from palaestra_trainer.errors import ConfigurationError
 
 _SERIALIZED = ":serialized:"
-_PICKLER = "cloudpickle"  # its own functions are named in a pickle only to make functions and classes
+_PICKLER = "cloudpickle"  # a pickle names functions of cloudpickle only if it creates functions or classes
 
 
 def refuse_another_python(model: Path) -> None:
@@ -43,7 +43,7 @@ def _this_python() -> str:
 
 
 def _python(archive: zipfile.ZipFile) -> str:
-    """Return the version of Python that wrote a file, as Stable-Baselines3 noted it; "" if it did not."""
+    """Return the version of Python that wrote a file, as Stable-Baselines3 stored it; "" if it is missing."""
     name = "system_info.txt"
     text = archive.read(name).decode() if name in archive.namelist() else ""
     found = re.search(r"Python: (\d+\.\d+)", text)
@@ -60,6 +60,6 @@ def _with_code(archive: zipfile.ZipFile) -> list[str]:
 
 
 def _is_code(pickled: bytes) -> bool:
-    """Return whether a pickle makes a function or class; nothing is unpickled."""
+    """Return whether a pickle creates a function or class; nothing is unpickled."""
     texts = (argument for _, argument, _ in pickletools.genops(pickled) if isinstance(argument, str))
     return any(text.partition(".")[0] == _PICKLER for text in texts)
