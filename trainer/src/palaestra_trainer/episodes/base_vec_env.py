@@ -21,13 +21,13 @@ class MembersVecEnv(VecEnv):
     """A VecEnv of members; a subclass defines how they step.
 
     Args:
-        keepers: the restarter of each member; rows are in their order.
+        restarters: the restarter of each member; rows are in their order.
     """
 
-    def __init__(self, keepers: Sequence[Restarter]) -> None:
-        self._keepers = list(keepers)
-        env = keepers[0].member.env
-        super().__init__(len(keepers), env.observation_space, env.action_space)
+    def __init__(self, restarters: Sequence[Restarter]) -> None:
+        self._restarters = list(restarters)
+        env = restarters[0].member.env
+        super().__init__(len(restarters), env.observation_space, env.action_space)
         self._actions = np.empty(0)
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -45,7 +45,7 @@ class MembersVecEnv(VecEnv):
         A restarted simulator keeps it, and a standby gets it.
         """
         for index in self._get_indices(indices):
-            self._keepers[index].set_attribute(attr_name, value)
+            self._restarters[index].set_attribute(attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -69,7 +69,7 @@ class MembersVecEnv(VecEnv):
         return [cast("np.ndarray | None", env.render()) for env in self._targets(None)]
 
     def _targets(self, indices: VecEnvIndices) -> list[Environment]:
-        return [self._keepers[index].member.env for index in self._get_indices(indices)]
+        return [self._restarters[index].member.env for index in self._get_indices(indices)]
 
     def _stack(self, observations: list[Any]) -> VecEnvObs:
         if isinstance(self.observation_space, spaces.Dict):

@@ -55,7 +55,7 @@ class Collector:
     """Plays the episodes of one member; the seed of each follows from its number.
 
     Attributes:
-        keeper: the restarter of the member.
+        restarter: the restarter of the member.
         run_seed: the replica's seed.
         index: the member's position among the collecting ones.
         episode: number of the next episode.
@@ -63,8 +63,8 @@ class Collector:
         reset_info: the environment's info of the last reset; not `valid` if no episode began.
     """
 
-    def __init__(self, keeper: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
-        self.keeper = keeper
+    def __init__(self, restarter: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
+        self.restarter = restarter
         self.run_seed = run_seed
         self.index = index
         self.episode = 0
@@ -83,7 +83,7 @@ class Collector:
     @property
     def env(self) -> Environment:
         """The member's environment."""
-        return self.keeper.member.env
+        return self.restarter.member.env
 
     @property
     def state(self) -> EpisodeState:
@@ -105,7 +105,7 @@ class Collector:
         self._actions = self._found_broken = None
         self.reset_info = {OURS: {"valid": False}}
         self._return, self._length = 0.0, 0
-        if self.keeper.up():
+        if self.restarter.up():
             try:
                 self._reset(options)
             except SimulatorFault as fault:
@@ -120,7 +120,7 @@ class Collector:
         """
         if self._actions is not None and self._found_broken is None:
             try:
-                return self.keeper.action_mask()
+                return self.restarter.action_mask()
             except SimulatorFault as fault:
                 self._found_broken = fault
         return all_allowed(self.env.action_space)
@@ -141,7 +141,7 @@ class Collector:
         for action in () if state.actions is None or self._actions is None else state.actions:
             self._check()
             try:
-                if masked and not allows(self.keeper.action_mask(), self.env.action_space, action):
+                if masked and not allows(self.restarter.action_mask(), self.env.action_space, action):
                     return self.begin()
                 _, _, terminated, truncated, _ = self._advance(action)
             except SimulatorFault as fault:
@@ -180,7 +180,7 @@ class Collector:
         self._began_at = self.training_progress
         self.episode += 1
         try:
-            self._observation, self.reset_info = self.keeper.reset(
+            self._observation, self.reset_info = self.restarter.reset(
                 seed, position | (options or {}), self._check
             )
         except Diverged as error:
@@ -192,7 +192,7 @@ class Collector:
         if self._found_broken is not None:
             raise self._found_broken
         try:
-            step = self.keeper.step(action)
+            step = self.restarter.step(action)
         except Diverged as error:
             raise Diverged(f"episode {self.episode - 1}, step {self._length + 1}: {error}") from error
         self._observation = step[0]
@@ -217,20 +217,20 @@ class Collector:
         self._news = {
             "sim_fault": {
                 "kind": fault.kind,
-                "simulator": self.keeper.name,
+                "simulator": self.restarter.name,
                 "fact": str(fault),
                 "episode": self.episode - 1,
                 "step": self._length,
             }
         }
         self._actions = self._found_broken = None
-        self.keeper.begin_mending(fault, self._length)
+        self.restarter.begin_mending(fault, self._length)
 
     def _recover(self) -> CollectedRow:
         """Return the row of a step without a running episode."""
         seen = self._observation
         self.begin()
-        return self._invalid(seen, done=self._actions is not None, recovering=not self.keeper.lost)
+        return self._invalid(seen, done=self._actions is not None, recovering=not self.restarter.lost)
 
     def _invalid(self, seen: Any, *, done: bool, **words: Any) -> CollectedRow:
         """Return a row that must not be learned from; the first one after a fault has its `sim_fault`."""

@@ -152,12 +152,12 @@ def evaluate(
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
     """
-    keeper = member if isinstance(member, Restarter) else Restarter(member)
-    return evaluate_on_all(policy, [keeper], seeds, check)
+    restarter = member if isinstance(member, Restarter) else Restarter(member)
+    return evaluate_on_all(policy, [restarter], seeds, check)
 
 
 def evaluate_on_all(
-    policy: ActingPolicy, keepers: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
+    policy: ActingPolicy, restarters: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
     """Evaluate as `evaluate` does, with the episodes distributed over several simulators at once.
 
@@ -166,7 +166,10 @@ def evaluate_on_all(
     started = time.monotonic()
     games = _Games(policy, seeds)
     while games.missing:
-        left = sorted((keeper for keeper in keepers if not keeper.lost), key=lambda keeper: keeper.busy)
+        left = sorted(
+            (restarter for restarter in restarters if not restarter.lost),
+            key=lambda restarter: restarter.busy,
+        )
         if not left:
             raise FaultBudgetSpent("every evaluating simulator was given up; read the simulators' logs")
         if len(left) == 1:
@@ -207,16 +210,16 @@ class _Games:
         """Return the episodes in the order of their seeds."""
         return tuple(self._played[place] for place in sorted(self._played))
 
-    def play_on(self, keeper: Restarter, check: Check) -> None:
+    def play_on(self, restarter: Restarter, check: Check) -> None:
         """Play until all episodes are complete, or the simulator is given up."""
-        while self.missing and not keeper.lost:
+        while self.missing and not restarter.lost:
             check()
-            if work := keeper.under_way:
+            if work := restarter.under_way:
                 wait([work], LOOK_EVERY_S)
-            elif keeper.up():
-                self._play_next(keeper, check)
+            elif restarter.up():
+                self._play_next(restarter, check)
 
-    def _play_next(self, keeper: Restarter, check: Check) -> None:
+    def _play_next(self, restarter: Restarter, check: Check) -> None:
         with self._changed:
             if not self._waiting:
                 self._changed.wait(LOOK_EVERY_S)
@@ -224,9 +227,9 @@ class _Games:
             place, seed = self._waiting.popleft()
         rewards: list[float] = []
         try:
-            episode = _play(self._policy, keeper, (place, seed), check, rewards)
+            episode = _play(self._policy, restarter, (place, seed), check, rewards)
         except SimulatorFault as fault:
-            keeper.begin_mending(fault, len(rewards))
+            restarter.begin_mending(fault, len(rewards))
             with self._changed:
                 self.faults += 1
                 self._waiting.appendleft((place, seed))
@@ -237,15 +240,15 @@ class _Games:
                 self._changed.notify_all()
 
 
-def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> None:
+def _play_at_once(games: _Games, restarters: Sequence[Restarter], check: Check) -> None:
     over = threading.Event()
 
     def check_all() -> None:
         if over.is_set():
             raise CancelledError
 
-    with ThreadPoolExecutor(len(keepers), "evaluate") as pool:
-        playing = [pool.submit(games.play_on, keeper, check_all) for keeper in keepers]
+    with ThreadPoolExecutor(len(restarters), "evaluate") as pool:
+        playing = [pool.submit(games.play_on, restarter, check_all) for restarter in restarters]
         try:
             while playing:
                 done, left = wait(playing, LOOK_EVERY_S, FIRST_EXCEPTION)
@@ -258,14 +261,14 @@ def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> 
 
 
 def _play(
-    policy: ActingPolicy, keeper: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
+    policy: ActingPolicy, restarter: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
 ) -> Episode:
     """Play one episode to its end; `game` is its number and seed.
 
     If an error ends it, `rewards` holds the reward of each step before the error.
     """
     number, seed = game
-    observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)
+    observation, _ = restarter.reset(seed, reset_options(EVALUATING, number), check)
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
     over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
@@ -274,11 +277,11 @@ def _play(
         end.not_after(len(rewards))
         seen = (observation, memory, np.array([not rewards]))
         if masked:
-            action, memory = predict_allowed(policy, keeper.action_mask(), *seen)
+            action, memory = predict_allowed(policy, restarter.action_mask(), *seen)
         else:
             action, memory = policy.predict(*seen, deterministic=True)
-        observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
-        keeper.watcher.stepped(1)
+        observation, reward, terminated, truncated, info = restarter.step(np.asarray(action)[()])
+        restarter.watcher.stepped(1)
         rewards.append(float(reward))
         over = terminated or truncated
     return Episode(

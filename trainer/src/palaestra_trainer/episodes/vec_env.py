@@ -39,7 +39,7 @@ class SimulatorsVecEnv(MembersVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:
-        keepers: the restarter of each member; rows are in their order.
+        restarters: the restarter of each member; rows are in their order.
         run_seed: the replica's seed; each episode's seed is derived from it.
         check: called every tenth of a second during waits for members; it raises to end the wait.
         judge: an environment without a simulator that computes rewards of goals; None: members compute them.
@@ -47,29 +47,31 @@ class SimulatorsVecEnv(MembersVecEnv):
 
     def __init__(
         self,
-        keepers: Sequence[Restarter],
+        restarters: Sequence[Restarter],
         run_seed: int,
         *,
         check: Check = go_on,
         judge: Environment | None = None,
     ) -> None:
-        super().__init__(keepers)
+        super().__init__(restarters)
         self._check = check
         self._judge = judge
-        self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
-        self._watcher = keepers[0].watcher
+        self._collectors = [
+            Collector(restarter, run_seed, index, check) for index, restarter in enumerate(restarters)
+        ]
+        self._watcher = restarters[0].watcher
         self._seeds = [None] * self.num_envs
-        self._gives_masks = all(gives_masks(keeper.member.env) for keeper in keepers)
+        self._gives_masks = all(gives_masks(restarter.member.env) for restarter in restarters)
 
     def pause(self) -> None:
         """Pause all members until `unpause`."""
-        for keeper in self._keepers:
-            keeper.pause()
+        for restarter in self._restarters:
+            restarter.pause()
 
     def unpause(self) -> None:
         """End the pause of all members."""
-        for keeper in self._keepers:
-            keeper.unpause()
+        for restarter in self._restarters:
+            restarter.unpause()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Set the run's seed, if one is given; return the seeds of the next episodes."""
@@ -140,10 +142,10 @@ class SimulatorsVecEnv(MembersVecEnv):
 
         An environment that raises an error is logged, and the others are closed too.
         """
-        settle(self._keepers)
-        for keeper in self._keepers:
-            if not keeper.busy:
-                _close(keeper)
+        settle(self._restarters)
+        for restarter in self._restarters:
+            if not restarter.busy:
+                _close(restarter)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -171,16 +173,16 @@ class SimulatorsVecEnv(MembersVecEnv):
 
     def _await_somebody(self) -> None:
         """If no member can step, wait for the end of a restart; a vector of only invalid rows is useless."""
-        if all(keeper.busy or keeper.lost for keeper in self._keepers):
+        if all(restarter.busy or restarter.lost for restarter in self._restarters):
             with self._watcher.spending(Cause.RECOVERING):
-                await_one(self._keepers, self._check)
+                await_one(self._restarters, self._check)
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]
 
 
-def _close(keeper: Restarter) -> None:
+def _close(restarter: Restarter) -> None:
     try:
-        keeper.member.env.close()
+        restarter.member.env.close()
     except (Exception, SystemExit) as error:  # code of the job's author may raise anything
-        log.warning("environment not closed", simulator=keeper.name, fact=fact_of(error), exc_info=error)
+        log.warning("environment not closed", simulator=restarter.name, fact=fact_of(error), exc_info=error)

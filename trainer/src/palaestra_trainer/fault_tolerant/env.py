@@ -49,7 +49,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         """
         if hasattr(self, name) or not self.env.has_wrapper_attr(name):
             return super().set_wrapper_attr(name, value, force=force)
-        self._player.keeper.set_attribute(name, value)
+        self._player.restarter.set_attribute(name, value)
         return True
 
     def reset(

@@ -27,26 +27,26 @@ class EnvGroup:
     `close` releases the simulators; otherwise they are released at the end of the process.
 
     Args:
-        keepers: the restarter of each member; the members are up or being started.
+        restarters: the restarter of each member; the members are up or being started.
         release: stops and releases the simulators.
         deadline_s: the longest wait for a simulator that restarts.
         mend_at_once: whether the step with the fault waits for the restart; False: the next reset waits.
         played: called with the rows of each step.
 
     Attributes:
-        all: the runners, in the order of `keepers`.
+        all: the runners, in the order of `restarters`.
     """
 
     def __init__(
         self,
-        keepers: Sequence[Restarter],
+        restarters: Sequence[Restarter],
         release: Callable[[], None],
         deadline_s: float = 600.0,
         *,
         mend_at_once: bool = False,
         played: Callable[[Sequence[StepResult]], None] = _nothing,
     ) -> None:
-        self.all = [EpisodeRunner(keeper) for keeper in keepers]
+        self.all = [EpisodeRunner(restarter) for restarter in restarters]
         self._release = release
         self._deadline_s = deadline_s
         self._mend_at_once = mend_at_once
@@ -109,20 +109,20 @@ class EnvGroup:
         give_up = time.monotonic() + self._deadline_s
         while waiting := [player for player in self.all if not player.playing]:
             take_turns(player.begin for player in waiting)
-            self._await_one([player.keeper for player in waiting if not player.playing], give_up)
+            self._await_one([player.restarter for player in waiting if not player.playing], give_up)
 
     def _await_up(self) -> None:
         give_up = time.monotonic() + self._deadline_s
-        while waiting := [player.keeper for player in self.all if not player.keeper.up()]:
+        while waiting := [player.restarter for player in self.all if not player.restarter.up()]:
             self._await_one(waiting, give_up)
 
-    def _await_one(self, keepers: Sequence[Restarter], give_up: float) -> None:
-        await_one(keepers, partial(self._check, keepers, give_up))
+    def _await_one(self, restarters: Sequence[Restarter], give_up: float) -> None:
+        await_one(restarters, partial(self._check, restarters, give_up))
 
-    def _check(self, keepers: Sequence[Restarter], give_up: float) -> None:
+    def _check(self, restarters: Sequence[Restarter], give_up: float) -> None:
         if time.monotonic() > give_up:
             fact = f"not mended within {self._deadline_s:g} s; read the simulator's log"
-            raise SimulatorHung(", ".join(keeper.name for keeper in keepers), fact)
+            raise SimulatorHung(", ".join(restarter.name for restarter in restarters), fact)
 
 
 def _step(player: EpisodeRunner, action: Any) -> StepResult:

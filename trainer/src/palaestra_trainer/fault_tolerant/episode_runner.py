@@ -53,14 +53,14 @@ class EpisodeRunner:
     """Plays the episodes of one member.
 
     Attributes:
-        keeper: the restarter of the member.
+        restarter: the restarter of the member.
         playing: whether an episode is running.
         observation: the last observation of the member.
         reset_info: info of the last reset.
     """
 
-    def __init__(self, keeper: Restarter) -> None:
-        self.keeper = keeper
+    def __init__(self, restarter: Restarter) -> None:
+        self.restarter = restarter
         self.playing = False
         self.observation: Any = None
         self._last: Any = None  # a copy, because the training loop may write into the original
@@ -72,7 +72,7 @@ class EpisodeRunner:
     @property
     def env(self) -> Environment:
         """The member's environment; another object after a standby took over."""
-        return self.keeper.member.env
+        return self.restarter.member.env
 
     def prepare(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """Choose the next episode. Without `seed`, its seed is the next one in the sequence of the last seed.
@@ -94,13 +94,13 @@ class EpisodeRunner:
             MasterLost: no ROS master responds.
             Diverged: the observation is not finite.
         """
-        if not self.keeper.up():
+        if not self.restarter.up():
             return
         seed, options = self._next
         try:
-            self.observation, self.reset_info = self.keeper.reset(seed, options)
+            self.observation, self.reset_info = self.restarter.reset(seed, options)
         except SimulatorFault as fault:
-            self.keeper.begin_mending(fault)
+            self.restarter.begin_mending(fault)
             return
         self._last = copied(self.observation)
         self._return, self._length, self._began = 0.0, 0, time.monotonic()
@@ -114,10 +114,10 @@ class EpisodeRunner:
             Diverged: observation or reward is not finite.
         """
         if not self.playing:
-            raise ResetNeeded(f"{self.keeper.name}: no episode is under way; call reset() first")
+            raise ResetNeeded(f"{self.restarter.name}: no episode is under way; call reset() first")
         self.playing = False  # stays False if an interrupt ends the step
         try:
-            step = self.keeper.step(action)
+            step = self.restarter.step(action)
         except SimulatorFault as fault:
             return self._cut(fault)
         self.observation, reward, terminated, truncated, _ = step
@@ -128,8 +128,13 @@ class EpisodeRunner:
         return StepResult(step, None if self.playing else self._summary())
 
     def _cut(self, fault: SimulatorFault) -> StepResult:
-        self.keeper.begin_mending(fault, self._length)
-        report = {"kind": fault.kind, "simulator": self.keeper.name, "fact": str(fault), "step": self._length}
+        self.restarter.begin_mending(fault, self._length)
+        report = {
+            "kind": fault.kind,
+            "simulator": self.restarter.name,
+            "fact": str(fault),
+            "step": self._length,
+        }
         return StepResult((self._last, 0.0, False, True, {OURS: {"sim_fault": report}}))
 
     def _summary(self) -> dict[str, float]:

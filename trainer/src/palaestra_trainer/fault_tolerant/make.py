@@ -76,12 +76,12 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
 
 def _in_facade(place: NotebookSimulator, environment: Environment) -> EnvGroup:
     try:
-        keeper = Restarter(NotebookMember(place, environment))
+        restarter = Restarter(NotebookMember(place, environment))
     except BaseException:
         place.release()
         raise
     # The program may pause the simulator after any step, so `step` must not return during a restart.
-    return EnvGroup([keeper], keeper.stop, mend_at_once=True)
+    return EnvGroup([restarter], restarter.stop, mend_at_once=True)
 
 
 def _in_job(configuration: Configuration, number: int | None, role: Role) -> EnvGroup:
@@ -93,10 +93,10 @@ def _in_job(configuration: Configuration, number: int | None, role: Role) -> Env
         for entry in entries:
             progress.add(entry.name, role)
         follow(progress, members)
-        keepers = _started(stack, chosen, members, progress)
-        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in keepers}}
+        restarters = _started(stack, chosen, members, progress)
+        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in restarters}}
         return EnvGroup(
-            keepers,
+            restarters,
             stack.pop_all().close,
             configuration.stall_deadline_seconds,
             played=partial(_count, progress, role),

@@ -32,7 +32,7 @@ class FaultTolerantVecEnv(MembersVecEnv):
         self._players = players
         task = players.all[0].env
         refuse_flaws(task.observation_space, task.action_space)
-        super().__init__([player.keeper for player in players.all])
+        super().__init__([player.restarter for player in players.all])
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in each member at once; return the first observations.

@@ -95,7 +95,7 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         if len(each) != self.num_envs:
             raise ValueError(f"values: {len(each)} for {self.num_envs} environments; give one for each")
         for player, value in zip(self._players.all, each, strict=True):
-            player.keeper.set_attribute(name, value)
+            player.restarter.set_attribute(name, value)
 
     def render(self) -> tuple[Any, ...]:
         """Return the result of each environment's `render`."""

@@ -105,9 +105,9 @@ class Selection:
 
         They restart while the others collect.
         """
-        keepers = [keeper for keeper in self._run.fleet.evaluating if not keeper.lost]
-        for keeper in keepers:
-            keeper.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(keepers)))
+        restarters = [restarter for restarter in self._run.fleet.evaluating if not restarter.lost]
+        for restarter in restarters:
+            restarter.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(restarters)))
 
     def finish(self, step: int) -> None:
         """Confirm the best policy at the end of training; without evaluations, save the last policy.

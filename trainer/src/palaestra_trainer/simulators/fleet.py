@@ -45,19 +45,19 @@ class Fleet:
         if missing:
             raise ConfigurationError(f"simulators: {', '.join(missing)} was not created; add it to members")
         groups = groups_of(configuration)
-        keepers = {
+        restarters = {
             wanted.name: Restarter(
                 by_name[wanted.name], limit_of(wanted), watcher, group=groups[wanted.group]
             )
             for wanted in configuration.simulators
         }
-        self.collecting = [keepers[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
-        self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
+        self.collecting = [restarters[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
+        self.evaluating = [restarters[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
         self._all = [*self.collecting, *self.evaluating]
 
     def meters(self) -> dict[str, SimulatorStats]:
         """Return the counts of each member, by its name."""
-        return {keeper.name: keeper.meter for keeper in self._all}
+        return {restarter.name: restarter.meter for restarter in self._all}
 
     def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
         """Start all members at once; return when each was tried once and enough of each group are up.
@@ -75,9 +75,9 @@ class Fleet:
                 environment needs.
         """
         check()
-        for keeper in self._all:
-            keeper.stepped = stepped
-            keeper.begin_start()
+        for restarter in self._all:
+            restarter.stepped = stepped
+            restarter.begin_start()
         began, report_at_s = time.monotonic(), LONG_S
         try:
             while not self._enough():
@@ -87,58 +87,60 @@ class Fleet:
                     log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
                 # Any finished work ends the wait: a group may be large enough after a start that failed, too.
                 wait(
-                    [work for keeper in self._all if (work := keeper.under_way)],
+                    [work for restarter in self._all if (work := restarter.under_way)],
                     LOOK_EVERY_S,
                     FIRST_COMPLETED,
                 )
         except BaseException:
-            for keeper in self._all:
-                keeper.abandon()
+            for restarter in self._all:
+                restarter.abandon()
             raise
-        for keeper in self._all:
-            keeper.stepped = True  # other members may step from now on, even while this one still starts
+        for restarter in self._all:
+            restarter.stepped = True  # other members may step from now on, even while this one still starts
 
     def stop(self) -> None:
         """Stop all members at once, in any state, also during a restart."""
-        stops = [in_background(keeper.stop, f"stop-{keeper.name}") for keeper in self._all]
+        stops = [in_background(restarter.stop, f"stop-{restarter.name}") for restarter in self._all]
         wait(stops)
         for stop in stops:
             stop.result()
 
     def _down(self) -> list[str]:
-        return [keeper.name for keeper in self._all if not keeper.up()]
+        return [restarter.name for restarter in self._all if not restarter.up()]
 
     def _enough(self) -> bool:
-        up = Counter(keeper.group for keeper in self._all if keeper.up())
-        return all(keeper.tried and up[keeper.group] >= keeper.group.least for keeper in self._all)
+        up = Counter(restarter.group for restarter in self._all if restarter.up())
+        return all(
+            restarter.tried and up[restarter.group] >= restarter.group.least for restarter in self._all
+        )
 
 
 @contextmanager
-def running(keepers: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
+def running(restarters: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
     """Unpause the members inside the context, after any recycling; pause them again at its end."""
-    for keeper in keepers:
-        keeper.unpause(check)
+    for restarter in restarters:
+        restarter.unpause(check)
     try:
         yield
     finally:
-        rest(keepers)
+        rest(restarters)
 
 
 @contextmanager
-def resting(keepers: Sequence[Restarter]) -> Iterator[None]:
+def resting(restarters: Sequence[Restarter]) -> Iterator[None]:
     """Pause the members inside the context; unpause them at its end."""
-    rest(keepers)
+    rest(restarters)
     try:
         yield
     finally:
-        for keeper in keepers:
-            keeper.unpause()
+        for restarter in restarters:
+            restarter.unpause()
 
 
-def rest(keepers: Sequence[Restarter]) -> None:
+def rest(restarters: Sequence[Restarter]) -> None:
     """Pause the members."""
-    for keeper in keepers:
-        keeper.pause()
+    for restarter in restarters:
+        restarter.pause()
 
 
 def groups_of(configuration: Configuration) -> dict[str, Group]:

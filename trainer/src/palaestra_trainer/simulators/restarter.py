@@ -223,7 +223,7 @@ class Restarter:
 
     def _begin(self, work: Callable[[], None]) -> None:
         self._abandoned = False
-        self._work = in_background(work, f"keeper-{self.name}")
+        self._work = in_background(work, f"restarter-{self.name}")
 
     def _start(self) -> None:
         try:
@@ -327,32 +327,32 @@ class Restarter:
         self.member.pause()
 
 
-def await_one(keepers: Sequence[Restarter], check: Check = go_on) -> None:
+def await_one(restarters: Sequence[Restarter], check: Check = go_on) -> None:
     """Wait until one of the busy restarters is no longer busy; return at once if none is busy.
 
     Args:
-        keepers: some of them may be ready or lost.
+        restarters: some of them may be ready or lost.
         check: called every tenth of a second; it raises to end the wait.
     """
-    works = _under_way(keepers)
+    works = _under_way(restarters)
     while works and not wait(works, LOOK_EVERY_S, FIRST_COMPLETED).done:
         check()
 
 
-def settle(keepers: Sequence[Restarter]) -> None:
+def settle(restarters: Sequence[Restarter]) -> None:
     """End the work in the restarters' threads: running starts fail, and no others begin.
 
     Waits at most `SETTLE_S` seconds, plus the timeout of one request to a program that does not respond.
     """
-    for keeper in keepers:
-        keeper.abandon()
+    for restarter in restarters:
+        restarter.abandon()
     give_up = time.monotonic() + SETTLE_S
-    while (busy := [keeper for keeper in keepers if keeper.busy]) and time.monotonic() < give_up:
-        for keeper in busy:
+    while (busy := [restarter for restarter in restarters if restarter.busy]) and time.monotonic() < give_up:
+        for restarter in busy:
             if time.monotonic() < give_up:
-                keeper.member.abandon()
+                restarter.member.abandon()
         wait(_under_way(busy), LOOK_EVERY_S)
 
 
-def _under_way(keepers: Sequence[Restarter]) -> list[Future[None]]:
-    return [work for keeper in keepers if (work := keeper.under_way) is not None]
+def _under_way(restarters: Sequence[Restarter]) -> list[Future[None]]:
+    return [work for restarter in restarters if (work := restarter.under_way) is not None]

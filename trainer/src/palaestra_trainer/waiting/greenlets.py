@@ -75,7 +75,7 @@ class _Turn(greenlet):
         while self.work is not None and self.parent is not None:
             try:
                 self.result = self.work()
-            except Exception as error:  # noqa: BLE001 - `take_turns` raises it after all works have ended
+            except Exception as error:  # noqa: BLE001 - take_turns raises it after all works have ended
                 self.failure = error
             self.done = True
             self.parent.switch()
