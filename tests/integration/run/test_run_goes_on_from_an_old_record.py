@@ -6,6 +6,7 @@ from pathlib import Path
 import yaml
 
 from palaestra.local import run_directory
+from palaestra.local.outcome import RunOutcome
 from tests.local_run import LocalRun
 
 OLD = Path(__file__).parents[2] / "fixtures" / "0.1.0" / "interrupted"
@@ -15,6 +16,7 @@ PATIENCE_S = 240.0  # it takes 20 s on a machine of its own
 def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_0_1_0(tmp_path):
     """The machine was upgraded between Ctrl-C and the same command again."""
     record = yaml.safe_load((OLD / run_directory.RECORD).read_text())
+    saved = RunOutcome.of(OLD).saved
     run = LocalRun(tmp_path, {**record, "metadata": {"name": record["metadata"]["name"]}})
     shutil.copytree(OLD, run.directory)
     # A job's uid on a laptop follows from where its runs lie, and this one lay elsewhere.
@@ -25,6 +27,6 @@ def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_0_1_0(tmp_path):
         code, output = run.end(PATIENCE_S)
 
     assert code == 0, output
-    assert run.attempts() == ["new run", "resumed at step 200"]
+    assert run.attempts() == ["new run", f"resumed at step {saved}"]
     assert "do not repeat" not in run.log()
     assert run.summary()["steps"] == 400
