@@ -1,10 +1,10 @@
-"""A job that an earlier release accepted goes on, whatever a new rule says about its spec."""
+"""A job that an earlier release accepted continues, whatever new rule its spec breaks."""
 
 import pytest
 
 from palaestra.api.status import Phase
 
-# What this release no longer accepts in a new job.
+# A spec that this release refuses in a new job.
 ANTI_AFFINITY = {
     "requiredDuringSchedulingIgnoredDuringExecution": [
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
@@ -33,7 +33,7 @@ def upgraded(request, make_scene):
 
 
 def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
-    """The control: without it, the tests below would show nothing."""
+    """This is the control: without it, the tests below would prove nothing."""
     scene = make_scene(**upgraded.raw["spec"])
 
     decision = scene.settle()
@@ -43,7 +43,7 @@ def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
 
 
 def test_it_runs_on(upgraded):
-    """The operator that comes with the upgrade changes nothing about it."""
+    """The upgraded operator changes nothing about it."""
     upgraded.restart()
 
     decision = upgraded.settle()
@@ -53,7 +53,7 @@ def test_it_runs_on(upgraded):
 
 
 def test_it_is_suspended_and_resumed(upgraded):
-    """Each is a change of the spec, and of a field that may change."""
+    """Both change a field of the spec that may change."""
     for generation, suspend in enumerate((True, False), 2):
         upgraded.raw["spec"]["suspend"] = suspend
         upgraded.raw["metadata"]["generation"] = generation
@@ -64,7 +64,7 @@ def test_it_is_suspended_and_resumed(upgraded):
 
 
 def test_its_replica_is_planned_again(upgraded):
-    """Its Job was deleted by somebody, and its spec is as it was at acceptance."""
+    """Somebody deleted its Job, and its spec is the same as at acceptance."""
     upgraded.objects["pods"].clear()
     upgraded.objects["jobs"].clear()
 
