@@ -1,4 +1,4 @@
-"""The interface of a Stable-Baselines3 vector, beside the library's own vectors of the same environments."""
+"""The vectors for Stable-Baselines3 have the interface of the library's own, with the same environments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PICTURE = np.full((4, 6, 3), 7, np.uint8)
 
 
 class Slope(gymnasium.Env):
-    """Reports its level, which a curriculum raises."""
+    """An environment that reports its level, which a curriculum raises."""
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as in every environment
     observation_space = spaces.Box(-1, 1, (1,), np.float32)
@@ -33,18 +33,18 @@ class Slope(gymnasium.Env):
         self.options = None
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         super().reset(seed=seed)
         self.options = options
         return np.zeros(1, np.float32), {"level": self.level}
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         del action
         return np.zeros(1, np.float32), 0.0, False, False, {"level": self.level}
 
     def render(self):
-        """Draw."""
+        """Return the picture."""
         return PICTURE
 
     def twice(self, number):
@@ -59,7 +59,7 @@ def wrapped(render_mode=None):
 
 @pytest.fixture
 def keepers(make_member):
-    """Make keepers of members with the environment."""
+    """Make restarters of members with the environment."""
 
     def make(render_mode=None):
         members = [make_member(f"collect-{index}") for index in range(MEMBERS)]
@@ -92,7 +92,7 @@ def reference(request):
     if request.param == "in this process":
         env = DummyVecEnv([wrapped] * MEMBERS)
     else:
-        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # another would import PyTorch thrice
+        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # others import PyTorch in each
     yield env
     env.close()
 
@@ -100,7 +100,7 @@ def reference(request):
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_a_vector_answers_as_those_of_stable_baselines3(keepers, make, call, reference):
-    """Callbacks of others are written for them."""
+    """Other projects' callbacks are written for those."""
     assert call(make(keepers())) == call(reference)
 
 
@@ -108,7 +108,7 @@ def test_a_vector_answers_as_those_of_stable_baselines3(keepers, make, call, ref
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_a_vector_draws_as_that_of_stable_baselines3(keepers, make, render_mode):
-    """One picture of all, or none."""
+    """It draws one picture of all environments, or none."""
     env, reference = make(keepers(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())
@@ -117,7 +117,7 @@ def test_a_vector_draws_as_that_of_stable_baselines3(keepers, make, render_mode)
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_the_options_of_the_next_reset_reach_the_environments_once(keepers, make):
-    """Beside those that a run gives."""
+    """They are added to the options of the run."""
     env = make(keepers())
     env.set_options([{"start": index} for index in range(MEMBERS)])
 
@@ -131,7 +131,7 @@ def test_the_options_of_the_next_reset_reach_the_environments_once(keepers, make
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(keepers, make):
-    """Curricula set attributes. A new attribute is set in the environment, and not in a wrapper."""
+    """Curricula set attributes. A new attribute is set in the environment and not in a wrapper."""
     env = make(keepers())
     env.reset()
 
@@ -146,7 +146,7 @@ def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(keepers,
 
 
 def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(keepers):
-    """The environment of a standby is another object."""
+    """A standby has another environment object."""
     [keeper, *_] = keepers()
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
@@ -161,7 +161,7 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(keepers):
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     keepers, monkeypatch
 ):
-    """The keeper's own thread uses the simulator meanwhile."""
+    """Meanwhile the restarter's own thread uses the simulator."""
     [keeper, *_] = keepers()
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
