@@ -1,4 +1,4 @@
-"""The permissions for jobs in the tests' installation; the default, in manifests/install.yaml, is none."""
+"""The permissions for jobs in the tests' installation; by default, manifests/install.yaml allows nothing."""
 
 from tests.e2e.cluster import Cluster
 from tests.e2e.namespace import OPERATOR, SYSTEM

@@ -39,7 +39,7 @@ class Beside(Generic[T]):
     def _tell(self, act: Callable[[], T]) -> None:
         try:
             self._result.set_result(act())
-        except BaseException as error:  # noqa: BLE001 - whoever asks for the result gets it
+        except BaseException as error:  # noqa: BLE001 - the caller of `result` gets it
             self._result.set_exception(error)
 
 

@@ -316,7 +316,7 @@ def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
 
 
 def test_a_job_of_another_controller_is_not_planned(train, planned, shared):
-    """Nobody gains anything by naming another controller."""
+    """A user gains nothing by naming another controller."""
     train(authors("spoofed", ("spec.managedBy", "example.com/other")))
     nothing_is_left_to_see(planned)
 

@@ -158,7 +158,7 @@ def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespac
 @pytest.mark.parametrize("name", REFUSALS)
 @pytest.mark.usefixtures("refused")
 def test_a_job_that_was_refused_goes_on_by_itself(name, places):
-    """Nobody has to change it, and nothing counts as a failure."""
+    """The job needs no change, and nothing counts as a failure."""
     place = places[name]
 
     assert place.wait_for_end("waits", LONG_S) == "Succeeded"
