@@ -133,7 +133,7 @@ class Rig:
 
 
 def _played(place: Stage, workload: str) -> list[str]:
-    """Run a workload's script, and return what it waited for in vain."""
+    """Run a workload's script, and return the condition for which it waited in vain."""
     try:
         WORKLOADS[workload](place)
     except TooLate as late:
