@@ -27,7 +27,7 @@ PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_ep
 def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
     write_job, play, fakes, tmp_path, normalize
 ):
-    """With the options of its environment; plain Stable-Baselines3 would see them unnormalized."""
+    """It uses the options of its environment, and normalizes them as plain Stable-Baselines3 would not."""
     algorithm = PPO if normalize is None else PPO | {"normalize": normalize}
     job = write_job(algorithm=algorithm, steps=128)
     assert play(job)[0] == 0
@@ -49,7 +49,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
 
 
 def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
-    """From a job with images to actions, with the small network."""
+    """The test goes from a job with images to actions, with the small network."""
     environment = {"id": "SeeTarget-v0", "options": {"frames": 3, "max_steps": 20}}
     job = write_job(environment=environment, algorithm=PPO | {"cnn": "small"}, steps=128)
     assert play(job)[0] == 0
@@ -65,9 +65,10 @@ def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
 
 @pytest.fixture
 def stored_before(write_job, play, tmp_path):
-    """Train with the small network and a schedule, stored as byte code like the releases before did.
+    """Return a function that trains and stores the model as byte code, as earlier releases did.
 
-    The file says that Python `version` wrote it; None leaves it as it is.
+    The model has the small network and a schedule. The file names Python `version` as its writer; None keeps
+    the true one.
     """
     cloudpickle.register_pickle_by_value(small_cnn)
 
@@ -96,7 +97,7 @@ def stored_before(write_job, play, tmp_path):
 
 
 def test_a_file_of_before_is_read_by_the_python_that_wrote_it(stored_before):
-    """Its byte code runs there."""
+    """This Python can run its byte code."""
     model = load_policy(stored_before()).model
 
     assert type(model.policy.features_extractor).__name__ == "SmallCnn"
@@ -104,7 +105,7 @@ def test_a_file_of_before_is_read_by_the_python_that_wrote_it(stored_before):
 
 
 def test_a_schedule_of_another_python_is_the_run_s_own(stored_before):
-    """To unpickle this one raises; byte code of another Python would end the process."""
+    """Unpickling this schedule raises an error; byte code of another Python would end the process."""
     bomb = b"ccloudpickle.cloudpickle\n_no_such_function\n."
 
     model = load_policy(stored_before("3.99", None, bomb)).model
@@ -113,7 +114,7 @@ def test_a_schedule_of_another_python_is_the_run_s_own(stored_before):
 
 
 def test_a_network_of_another_python_is_refused_with_the_remedy(stored_before):
-    """The file lacks its name, so nothing else could take its place."""
+    """The file does not have its name, so nothing else could replace it."""
     fact = (
         r"model\.zip: policy_kwargs has byte code of Python 3\.99, and this .*; use Python 3\.99, or export"
     )
@@ -123,7 +124,7 @@ def test_a_network_of_another_python_is_refused_with_the_remedy(stored_before):
 
 
 def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, tmp_path):
-    """Without them it would be given observations that it has never seen, or none that fit."""
+    """Without the wrappers it would receive observations that it has never seen, or that do not fit."""
     wrapper = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 0.5}}
     environment = {"id": "MoveToTargetEnv-v0", "wrappers": [wrapper], "frameStack": 2}
     assert play(write_job(environment=environment, algorithm=PPO, steps=128))[0] == 0
@@ -137,6 +138,6 @@ def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, 
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path):
-    """With the remedy."""
+    """The error gives the remedy."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         load_policy(tmp_path)
