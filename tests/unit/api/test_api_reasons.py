@@ -57,6 +57,6 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
 
 
 def test_a_page_without_its_marks_raises_an_error() -> None:
-    """Nobody would notice that the table is missing."""
+    """Without this error, the missing table would stay unnoticed."""
     with pytest.raises(ValueError, match=r"lacks <!-- generated from the reasons.*; add both"):
         reasons_page("# Operations")

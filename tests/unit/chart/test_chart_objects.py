@@ -1,4 +1,4 @@
-"""What the chart installs, in every mode."""
+"""The objects that the chart installs, in every mode."""
 
 import argparse
 import json

@@ -33,7 +33,7 @@ def contents(path):
 
 
 def blob(files, descriptor):
-    """Return what a descriptor points to."""
+    """Return the target of a descriptor."""
     return files["blobs/sha256/" + descriptor["digest"].removeprefix("sha256:")]
 
 

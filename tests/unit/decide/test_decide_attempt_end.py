@@ -263,7 +263,7 @@ def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
 
 
 def test_a_suspended_attempt_ended_by_suspension(training):
-    """The pod was deleted because somebody suspended the job."""
+    """The pod was deleted because a user suspended the job."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()

@@ -162,7 +162,7 @@ def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next
 
 
 def test_a_job_starts_when_its_world_appears(make_scene):
-    """Nobody has to change the job."""
+    """The job needs no change."""
     scene = make_scene(simulators=WORLD)
     scene.settle()
 

@@ -29,7 +29,7 @@ def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word
 
 
 def test_the_exit_code_is_read_from_the_jobs_words_when_the_pod_is_gone(training):
-    """Somebody may have deleted the pod."""
+    """A user may have deleted the pod."""
     scene, _ = training()
     scene.objects["pods"].clear()
     words = (

@@ -56,7 +56,7 @@ def test_a_replica_that_waits_for_an_old_pod_says_so(make_scene):
 
 
 def test_the_replica_starts_when_the_old_pod_has_ended(make_scene):
-    """Nobody has to do anything else."""
+    """No other action is needed."""
     scene, pod = made_again(make_scene, **SHARED)
     scene.settle()
     pod["status"]["phase"] = "Failed"

@@ -261,7 +261,7 @@ def test_the_start_is_that_of_the_first_pod_and_stays(training):
 
 
 def test_an_ephemeral_run_is_named_in_a_condition(accepted):
-    """Somebody may have chosen it by mistake."""
+    """A user may have chosen it by mistake."""
     scene = accepted(storage={"ephemeral": True})
 
     assert scene.status.conditions[0].message.endswith("; the run is ephemeral and goes with its pod")

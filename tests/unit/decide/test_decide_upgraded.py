@@ -64,7 +64,7 @@ def test_it_is_suspended_and_resumed(upgraded):
 
 
 def test_its_replica_is_planned_again(upgraded):
-    """Somebody deleted its Job, and its spec is the same as at acceptance."""
+    """A user deleted its Job, and its spec is the same as at acceptance."""
     upgraded.objects["pods"].clear()
     upgraded.objects["jobs"].clear()
 

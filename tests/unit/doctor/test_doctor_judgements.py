@@ -70,7 +70,7 @@ def operator(**images):
 
 
 def test_images_that_are_named_by_digest_are_right():
-    """Nobody can change the image of a digest."""
+    """The image of a digest cannot change."""
     assert judged_images(operator()).verdict is CheckStatus.RIGHT
 
 

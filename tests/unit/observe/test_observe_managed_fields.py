@@ -6,7 +6,7 @@ from palaestra.observe.managed_fields import suspends
 
 
 def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
-    """Return what one field manager has written."""
+    """Return the fields that one field manager has written."""
     return {"manager": manager, "operation": "Update", "time": time, "fieldsV1": {"f:spec": {field: {}}}}
 
 

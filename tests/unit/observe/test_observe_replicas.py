@@ -190,7 +190,7 @@ def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
 
 
 def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(make_job, raw_pod):
-    """Somebody deleted the Job, but its pod still saves a checkpoint."""
+    """A user deleted the Job, but its pod still saves a checkpoint."""
     named = {"name": "job-0-x", "uid": "pod-1", "created": NOW}
     job = make_job()
     status = job.status.model_copy(

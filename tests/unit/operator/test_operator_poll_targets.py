@@ -64,7 +64,7 @@ def test_a_pod_whose_trainer_runs_is_asked(trainers):
     ],
 )
 def test_any_other_pod_is_not_asked(trainers, other):
-    """Anybody can set a label, and an address that is a name would have to be resolved."""
+    """Any user can set a label, and an address that is a name would have to be resolved."""
     trainers.pod(pod(), exists=True)
     trainers.pod(other, exists=True)
 

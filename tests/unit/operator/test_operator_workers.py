@@ -186,5 +186,5 @@ def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_
         assert all(tries.acquire(timeout=WAIT_S) for _ in range(10))
 
     repeated = [line for line in lines if line["event"] == "conflict repeats"]
-    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]  # it goes on
+    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]  # it continues
     assert MODIFIED in repeated[0]["error"]

@@ -7,7 +7,7 @@ from palaestra_protocol.shadowing import shadows
 
 @pytest.fixture
 def put(tmp_path):
-    """Return a function that adds a file to a user's folder, and returns what the folder shadows."""
+    """Return a function that adds a file to a user's folder, and returns the shadowed modules."""
 
     def shadowed_with(name):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

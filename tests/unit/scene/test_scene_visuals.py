@@ -87,12 +87,12 @@ def test_each_appearance_is_one_color(things, appearance, color):
     ],
 )
 def test_what_has_no_surface_is_not_drawn(things, shape):
-    """A shape that cannot be drawn is no reason to refuse a world."""
+    """A shape that cannot be drawn is not a reason to refuse a world."""
     assert things(shape) == ()
 
 
 def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
-    """A Pose has its own frame, but a Group has none."""
+    """A Pose has its own frame, but a Group does not."""
     (thing,) = things(
         f"Solid {{ translation 1 2 3 children [ Pose {{ translation 0 0 1 children [ "
         f"Group {{ children [ Shape {{ {RED} geometry Box {{ }} }} ] }} ] }} ] }}"

@@ -111,7 +111,7 @@ def test_a_brake_slows_a_driven_wheel(load):
 
 
 def test_an_led_keeps_its_state(robot_with):
-    """Nobody sees the LED, but a program reads its state."""
+    """The LED is invisible, but a program reads its state."""
     robot = robot_with('LED { name "lamp" color [ 1 0 0, 0 1 0 ] }')
 
     assert robot.get("lamp/get_led") == 0

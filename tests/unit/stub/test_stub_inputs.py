@@ -6,7 +6,7 @@ BATTERY = "battery [ 1 10 0 ] cpuConsumption 10"
 
 
 def stepped(robot, *topics):
-    """Enable the devices of these topics, step once, and return what each has sent."""
+    """Enable the devices of these topics, step once, and return the messages of each."""
     inboxes = [robot.inbox(topic) for topic in topics]
     for device in {topic.partition("/")[0] for topic in topics}:
         assert robot.get(f"{device}/enable", value=32) is True

@@ -53,7 +53,7 @@ def test_a_step_in_pause_is_not_answered(ros, start):
 
 
 def test_every_other_service_waits_behind_a_pending_step(ros, start):
-    """A client that steps while paused and then tells the same controller to run is deadlocked."""
+    """A client that steps while paused and then requests the same controller's run mode is deadlocked."""
     start(mode=Mode.PAUSE)
     robot = ros.node("robotino")
     robot.ask("robot/time_step", value=32)

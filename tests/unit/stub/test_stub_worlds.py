@@ -170,7 +170,7 @@ def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
 
 
 def test_what_could_be_simulated_is_never_left_out():
-    """`--leave-out WoodenBox` is no way to remove crates."""
+    """`--leave-out WoodenBox` is not a way to remove crates."""
     simulation = load_world("WoodenBox { }", leave_out=LeaveOut(everything=True))
 
     assert len(simulation.scene.solids) == 1

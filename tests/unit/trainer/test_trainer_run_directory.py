@@ -76,7 +76,7 @@ def test_the_summary_of_a_run_of_an_earlier_release_is_of_its_best_line(director
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):
-    """This holds until somebody prolongs it."""
+    """This holds until a user prolongs it."""
     before = finished(directory, make_configuration(steps=100))
     write_summary(directory, summarise(directory, Progress(100, [])))
 

@@ -173,7 +173,7 @@ def test_what_is_refused_is_refused_before_a_model_is_made(play):
 @pytest.mark.parametrize("name", ["PPO", "SAC", "RecurrentPPO"])
 @pytest.mark.parametrize("seen", ["Dict", "Dict with image"])
 def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
-    """Each Box of numbers has its own statistics; images and discrete values have none."""
+    """Each Box of numbers has its own statistics; images and discrete values do not."""
     cell, normalize = (name, seen, "Box"), {"normalize": {}}
     whole, reference = play("whole", cell, **normalize)
     interrupted, directory = play("cut", cell, signal_at=SIGNAL_AT, **normalize)

@@ -225,7 +225,7 @@ def test_chunks_are_copied_where_the_volume_has_no_links(trained, monkeypatch):
 
 
 def test_a_chunk_whose_file_is_gone_is_written_again(trained):
-    """Somebody may have deleted it."""
+    """A user may have deleted it."""
     model = trained(steps=100)
     model.save()
     model.experience(100)["00000.npy"].unlink()

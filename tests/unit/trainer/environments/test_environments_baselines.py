@@ -45,7 +45,7 @@ def test_a_baseline_is_measured_the_same_twice(make_env, policy):
 
 
 def test_straight_means_straight_also_in_a_continuous_space(make_env):
-    """Every direction can be driven in, so the route is no zigzag."""
+    """Every direction can be driven in, so the route is not a zigzag."""
     env = make_env(actions="continuous")
     env.reset(options={"start": (0.0, 0.0, 0.3), "target": (1.5, 0.2)})
 

@@ -23,7 +23,7 @@ PAIR = spaces.Dict({"a": spaces.Discrete(2), "image": spaces.Box(0, 255, (36, 36
 
 
 class Hall(gymnasium.Env):
-    """A hall that stores its arguments, and returns what its class attributes say."""
+    """A hall that stores its arguments, and returns the values of its class attributes."""
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)

@@ -41,7 +41,7 @@ def test_the_target_is_seen_from_the_robot():
 
 @given(pose=poses, target=st.tuples(meters, meters))
 def test_the_distance_to_the_target_does_not_depend_on_where_the_robot_looks(pose, target):
-    """A turn on the spot is no progress."""
+    """A turn on the spot is not progress."""
     seen = replace(SITUATION, pose=pose, target=target)
 
     assert seen.target_distance_m == pytest.approx(math.dist((pose.x_m, pose.y_m), target), abs=1e-9)

@@ -52,7 +52,7 @@ def test_tasks_are_spread_over_the_whole_floor():
     [((0.0, 0.0), math.hypot(0.8, 0.8) - 0.25), ((1.9, 0.0), 0.1), ((0.8, 0.8), -0.25), ((3, 0), -1.0)],
 )
 def test_the_gap_is_to_the_nearest_wall_or_cylinder(place, expected_m):
-    """It is negative inside one, so one comparison tells whether a point is free."""
+    """It is negative inside one, so one comparison shows whether a point is free."""
     assert ARENA.gap(*place) == pytest.approx(expected_m)
 
 

@@ -392,7 +392,7 @@ def test_a_spent_budget_ends_the_run(make_env, make_member):
 
 
 def test_a_budget_is_spent_within_its_window_only(make_member):
-    """One fault an hour for a week is no reason to give up."""
+    """One fault an hour for a week is not a reason to give up."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
     keeper = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))

@@ -112,7 +112,7 @@ def test_memory_is_asked_for_once_a_second_at_most(clock):
 
 
 def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
-    """Nobody needs the response."""
+    """No program needs the response."""
     memory = Memory(0)
     wear = RecyclePolicy(Recycle(after_resets=1), memory, clock)
     clock.now_s += 60.0
