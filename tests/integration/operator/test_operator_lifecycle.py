@@ -30,7 +30,7 @@ def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
     assert place.condition("Succeeded")["status"] == "True"
     assert status["successRate"] == 0.9
     assert status["step"] == 20
-    assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # told once the status is written
+    assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # emitted after the status
 
 
 @pytest.mark.parametrize("prefix", ["1team"])

@@ -110,7 +110,7 @@ def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> N
 def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
     two, family, left, eventually_true
 ) -> None:
-    """Its simulator's processes become orphans of the sidecar. The other reaper is its child, not an orphan."""
+    """The sidecar inherits the simulator's processes. The other reaper is its child, but not an orphan."""
     it = two(family)
     sidecar = it.it.process.pid
     it.start(FIRST)
