@@ -1,4 +1,4 @@
-"""A run directory that another release left is gone on from, by `palaestra run` as a person types it."""
+"""`palaestra run` continues in a run directory from another release, as a user types it."""
 
 import shutil
 from pathlib import Path
@@ -19,7 +19,7 @@ def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_0_1_0(tmp_path):
     saved = RunOutcome.of(OLD).saved
     run = LocalRun(tmp_path, {**record, "metadata": {"name": record["metadata"]["name"]}})
     shutil.copytree(OLD, run.directory)
-    # A job's uid on a laptop follows from where its runs lie, and this one lay elsewhere.
+    # On a laptop, a job's uid depends on the folder of its runs, and this run was in another folder.
     record["metadata"]["uid"] = run_directory.uid_of(run.directory.parent)
     (run.directory / run_directory.RECORD).write_text(yaml.safe_dump(record))
 

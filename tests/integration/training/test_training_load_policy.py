@@ -25,7 +25,7 @@ PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_ep
 def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
     write_job, play, fakes, tmp_path, normalize
 ):
-    """With the options of its environment; plain Stable-Baselines3 would see them unnormalized."""
+    """It uses the options of its environment, and normalizes them as plain Stable-Baselines3 would not."""
     algorithm = PPO if normalize is None else PPO | {"normalize": normalize}
     job = write_job(algorithm=algorithm, steps=128)
     assert play(job)[0] == 0
@@ -47,7 +47,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
 
 
 def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
-    """From a job with images to actions, with the small network."""
+    """The test goes from a job with images to actions, with the small network."""
     environment = {"id": "SeeTarget-v0", "options": {"frames": 3, "max_steps": 20}}
     job = write_job(environment=environment, algorithm=PPO | {"cnn": "small"}, steps=128)
     assert play(job)[0] == 0
@@ -65,7 +65,8 @@ def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
 def stored_by_value(write_job, play, tmp_path):
     """Train with a network that the file holds as byte code, as one that nobody can import by its name.
 
-    The file says that Python `version` wrote it; None leaves it as it is.
+    The model has the small network and a schedule. The file names Python `version` as its writer; None keeps
+    the true one.
     """
     cloudpickle.register_pickle_by_value(small_cnn)
 
@@ -105,7 +106,7 @@ def test_a_network_of_another_python_is_refused_with_the_remedy(stored_by_value)
 
 
 def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, tmp_path):
-    """Without them it would be given observations that it has never seen, or none that fit."""
+    """Without the wrappers it would receive observations that it has never seen, or that do not fit."""
     wrapper = {"name": "gymnasium.wrappers:ClipReward", "options": {"max_reward": 0.5}}
     environment = {"id": "MoveToTargetEnv-v0", "wrappers": [wrapper], "frameStack": 2}
     assert play(write_job(environment=environment, algorithm=PPO, steps=128))[0] == 0
@@ -119,6 +120,6 @@ def test_a_policy_of_a_wrapped_environment_brings_the_wrappers(write_job, play, 
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path):
-    """With the remedy."""
+    """The error gives the remedy."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         load_policy(tmp_path)

@@ -1,4 +1,4 @@
-"""The files of a run directory: each is the old or the new one, never half of one."""
+"""The files of a run directory: each is either the old or the new one, never a half."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def directory(tmp_path):
 
 
 def test_attempts_are_counted(directory):
-    """The count of lines is the number of the attempt."""
+    """The number of lines is the number of the attempt."""
     numbers = [directory.begin_attempt("pod-1", "new run"), directory.begin_attempt("pod-2", "resumed")]
 
     assert numbers == [1, 2]
@@ -28,7 +28,7 @@ def test_attempts_are_counted(directory):
 
 
 def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
-    """The lines before and after it are whole."""
+    """The lines before and after it are complete."""
     path = tmp_path / "lines.jsonl"
     append_line(path, {"step": 1})
     with path.open("a") as file:
@@ -44,7 +44,7 @@ def test_a_file_that_is_not_there_has_no_lines(tmp_path):
 
 
 def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
-    """A full disk must not cost the best model."""
+    """A full disk must not destroy the best model."""
     path = tmp_path / "model.zip"
     replace_file(path, lambda name: name.write_text("old"))
 
@@ -59,7 +59,7 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):
-    """Until somebody prolongs it."""
+    """This holds until a user prolongs it."""
     before = finished(directory, make_configuration(steps=100))
     write_summary(directory, summarise(directory, Progress(100, [])))
 
@@ -70,7 +70,7 @@ def test_a_summary_makes_a_run_finished(directory, make_configuration):
 
 @pytest.mark.parametrize("text", ["", "[]", json.dumps({"steps": 3})])
 def test_a_summary_that_says_nothing_finishes_nothing(directory, make_configuration, text):
-    """It was written by something else."""
+    """Another program has written it."""
     directory.summary.write_text(text)
 
     assert finished(directory, make_configuration()) is None

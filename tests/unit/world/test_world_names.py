@@ -1,4 +1,4 @@
-"""The ROS names of robots: legal, short, readable, and never two alike."""
+"""The ROS names of robots are valid, short, readable and unique."""
 
 import re
 from dataclasses import replace
@@ -31,7 +31,7 @@ def test_a_name_says_whose_it_is(identity: RunIdentity) -> None:
 
 
 def test_the_robots_of_a_simulator_share_a_prefix(identity: RunIdentity) -> None:
-    """It is what a person looks for when several simulators talk at once."""
+    """A person searches for it when several simulators write messages at once."""
     assert name_prefix(identity) == "move_to_target_r0_collect_1a"
     assert ros_name(identity, "supervisor").startswith("move_to_target_r0_collect_1a_supervisor_")
 
@@ -42,12 +42,12 @@ def test_a_name_never_changes(identity: RunIdentity) -> None:
 
 
 def test_a_job_that_begins_with_a_digit_gets_a_letter_in_front(identity: RunIdentity) -> None:
-    """Kubernetes allows such names, ROS doesn't."""
+    """Kubernetes allows such names, but ROS does not."""
     assert name_prefix(replace(identity, job="3d")).startswith("j3d_r0_")
 
 
 def test_a_long_job_gives_way_to_what_tells_simulators_apart(identity: RunIdentity) -> None:
-    """Jobs may have 63 characters, and so may all the rest."""
+    """A job's name may have 63 characters, and so may all the rest together."""
     name = ros_name(replace(identity, job="x" * 63, replica=12), "robotino")
 
     assert len(name) <= 63
@@ -55,7 +55,7 @@ def test_a_long_job_gives_way_to_what_tells_simulators_apart(identity: RunIdenti
 
 
 def test_two_names_that_look_alike_differ_in_their_hash(identity: RunIdentity) -> None:
-    """Replaced or cut characters make the readable part equal, never the name."""
+    """Replaced or cut characters may make the readable parts equal, but not the names."""
     dotted, dashed = ros_name(identity, "arm.left"), ros_name(identity, "arm-left")
 
     assert dotted[:-6] == dashed[:-6]
@@ -63,7 +63,7 @@ def test_two_names_that_look_alike_differ_in_their_hash(identity: RunIdentity) -
 
 
 def test_a_standby_beside_a_simulator_has_a_name_of_its_own(identity: RunIdentity) -> None:
-    """Both are alive at once, on one ROS master."""
+    """Both run at the same time, on one ROS master."""
     assert name_prefix(replace(identity, slot="b")) == "move_to_target_r0_collect_1b"
 
 
@@ -73,7 +73,7 @@ def test_the_same_job_created_again_has_other_names(identity: RunIdentity) -> No
 
 
 def test_the_border_between_two_parts_of_the_hash_cannot_be_shifted() -> None:
-    """No text of one part can look like the end of it."""
+    """Otherwise the end of one part could look like the beginning of the next."""
     one = RunIdentity(job="j", namespace='a", "b', uid="c", replica=0, group="g", index=0)
     other = RunIdentity(job="j", namespace="a", uid='b", "c', replica=0, group="g", index=0)
 
@@ -82,7 +82,7 @@ def test_the_border_between_two_parts_of_the_hash_cannot_be_shifted() -> None:
 
 @given(identity=identities, robot=st.text())
 def test_every_name_is_legal_and_fits(identity: RunIdentity, robot: str) -> None:
-    """Whatever people call their jobs, groups and robots."""
+    """Jobs, groups and robots may have any name."""
     name = ros_name(identity, robot)
 
     assert LEGAL.fullmatch(name)
@@ -100,7 +100,7 @@ def test_every_name_is_legal_and_fits(identity: RunIdentity, robot: str) -> None
 def test_no_two_robots_of_a_job_share_a_name(
     job: str, groups: set[str], robots: set[str], replicas: set[int], indices: set[int]
 ) -> None:
-    """Over replicas, groups, indices, slots and robots at once."""
+    """This holds over replicas, groups, indices, slots and robots together."""
     names = [
         ros_name(RunIdentity(job=job, replica=r, group=g, index=i, slot=s), robot)
         for r, g, i, s, robot in product(replicas, groups, indices, "ab", robots)
