@@ -29,7 +29,9 @@ def axis_angle(rotation):
     if angle_rad < 1e-9:
         return np.array([0.0, 0.0, 1.0, 0.0])
     skew = rotation - rotation.T
-    return np.array([*(np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (2.0 * np.sin(angle_rad))), angle_rad])
+    return np.array(
+        [*(np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (2.0 * np.sin(angle_rad))), angle_rad]
+    )
 
 
 def quaternion(rotation):

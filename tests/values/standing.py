@@ -97,7 +97,12 @@ ROWS = (
         lambda sensor, setting: [(sensor.position + REFERENCE) @ setting.up],
         read=lambda device: [device.value],
     ),
-    Row("compass", ("Compass",), "Compass {{ {place} }}", lambda sensor, setting: sensor.rotation.T @ setting.north),
+    Row(
+        "compass",
+        ("Compass",),
+        "Compass {{ {place} }}",
+        lambda sensor, setting: sensor.rotation.T @ setting.north,
+    ),
     Row(
         "compass axes",
         ("Compass",),
@@ -105,8 +110,13 @@ ROWS = (
         lambda sensor, setting: (sensor.rotation.T @ setting.north) * [1.0, np.nan, 1.0],
     ),
     Row("gps", ("GPS",), "GPS {{ {place} }}", lambda sensor, _: sensor.position + REFERENCE),
-    Row("gps at rest", ("GPS",), "GPS {{ {place} }}", lambda *_: np.zeros(4),
-        read=lambda device: [device.speed.value, *device.speed_vector.value]),
+    Row(
+        "gps at rest",
+        ("GPS",),
+        "GPS {{ {place} }}",
+        lambda *_: np.zeros(4),
+        read=lambda device: [device.speed.value, *device.speed_vector.value],
+    ),
     Row("gyro", ("Gyro",), "Gyro {{ {place} }}", lambda *_: np.zeros(3)),
     Row(
         "inertial unit",
@@ -130,4 +140,4 @@ ROWS = (
         lambda *_: [0.25],
         read=lambda device: [device.value],
     ),
-)  # fmt: skip
+)

@@ -24,12 +24,12 @@ CONNECTOR = 'Connector {{ name "{}" {} distanceTolerance 0.05 axisTolerance 0.2 
 RADAR = """Radar {{ name "radar" {} minRange 1 maxRange 20 horizontalFieldOfView 1.5 verticalFieldOfView 1.2
   minRadialSpeed 0 maxRadialSpeed 0 antennaGain 15 frequency 20 transmittedPower 2 }}"""
 TARGETS = [(3.0, 0.5, 0.4), (7.0, -4.0, -1.0), (19.0, 0.0, 6.0)]  # in the frame of the radar, in meters
-HIDDEN = [(3.0, 4.0, 0.0), (-3.0, 0.0, 0.0), (3.0, 0.0, 2.5), (25.0, 0.0, 0.0)]  # beyond its field of view
+HIDDEN = [(3.0, 4.0, 0.0), (-3.0, 0.0, 0.0), (3.0, 0.0, 2.5), (25.0, 0.0, 0.0)]  # which it cannot see
 
 
 @cached
 def simulation_of(setting):
-    """Return a simulation of two robots with a connector each, of a radar, and of one target without a size."""
+    """Return a simulation of two robots with a connector each, a radar, and a target without a size."""
     first = robot(CONNECTOR.format("mine", MOUNT.fields) + RADAR.format(MOUNT.fields))
     second = robot(CONNECTOR.format("theirs", ""), name="other")
     target = 'DEF TARGET Solid { name "target" radarCrossSection 2.5 }'

@@ -1,11 +1,8 @@
-"""Sensors of place, direction and surroundings read what formulas give, in every simulator and system of axes."""
-
-import math
+"""Sensors of place, direction and surroundings read what formulas give, in each simulator and system."""
 
 import numpy as np
 import pytest
 
-from tests.values.frames import frame
 from tests.values.standing import BEACON, GRAVITY, MOUNT, POSES, REFERENCE, ROWS, SAID
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
 

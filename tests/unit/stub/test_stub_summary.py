@@ -174,6 +174,6 @@ def test_values_that_differ_from_webots_are_named(check):
     assert lines[1:] == [
         "differs from Webots: 1 infra-red DistanceSensor: textures do not count, rays pass the robot itself",
         "differs from Webots: 1 Lidar: rays pass the robot itself",
-        "differs from Webots: 1 IndexedFaceSet as boundingObject: the box around its points",
+        "differs from Webots: 1 IndexedFaceSet as boundingObject: its convex hull is touched",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
     ]

@@ -25,6 +25,7 @@ from palaestra_sim.mujoco.geoms import (
     Marks,
     Touch,
     add_geom,
+    fill,
     own_bit,
     put,
 )
@@ -292,7 +293,7 @@ def _add_obstacle(
             bottom, top = body.build.heights
             if low < top + height and bottom + height < high:
                 bits |= own_bit(index)
-        marks.note(add_geom(added, shape, shape.local, Touch(bits, 0)), shape)
+        marks.note(add_geom(spec, added, shape, shape.local, Touch(bits, 0)), shape)
     return added
 
 
@@ -301,9 +302,9 @@ def _add_loose(spec: Any, thing: Loose, marks: Marks) -> Any:
     added.add_freejoint()
     frame = thing.place.ground_pose.inverse
     touch = Touch(LOOSE, STANDING | LOOSE)
-    geoms = [add_geom(added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
+    geoms = [add_geom(spec, added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
     for geom, shape, density in zip(geoms, thing.shapes, thing.densities, strict=True):
-        geom.density = density
+        fill(geom, shape, density)
         marks.note(geom, shape)
     return added
 
@@ -339,5 +340,5 @@ def _add_robot(
         actuator.set_to_velocity(kv=gain)
     touch = Touch(ROBOTS, own_bit(index) | ROBOTS | LOOSE)
     for number, (shape, pose) in enumerate(zip(body.build.outline, body.poses, strict=True)):
-        marks.note(add_geom(added, shape, pose, touch), shape, body, 1 << number)
+        marks.note(add_geom(spec, added, shape, pose, touch), shape, body, 1 << number)
     return added

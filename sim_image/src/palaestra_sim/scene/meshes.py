@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import Vector, cross, dot, minus
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _SIDES: Final = 20  # of a cone
 _CORNERS: Final = 3  # of a triangle
 _FEW: Final = 4  # a face with so many corners is taken as convex; most have three or four
 _LARGEST_M: Final = 1e5
+_PARALLEL: Final = 1e-12
+_THIN_M: Final = 1e-4  # a mesh that is thinner is flat
+_SHEET_M: Final = 1e-3
 
 Triangle = tuple[int, int, int]
 
@@ -82,6 +85,83 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
         del left[ear]
     found += _fan(left)
     return [(face[a], face[b], face[c]) for a, b, c in found]
+
+
+def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector) -> float:
+    """Return the meters along a ray to the nearest triangle, from either side; infinite if it misses."""
+    points = mesh.points
+    return min(
+        (_to_triangle(origin, direction, points[a], points[b], points[c]) for a, b, c in mesh.triangles),
+        default=math.inf,
+    )
+
+
+def _to_triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
+    """Return the meters to a triangle, as in Möller and Trumbore (1997)."""
+    first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
+    across = cross(direction, second)
+    volume = dot(first, across)
+    if abs(volume) < _PARALLEL:
+        return math.inf
+    u = dot(apart, across) / volume
+    turned = cross(apart, first)
+    v = dot(direction, turned) / volume
+    if u < 0.0 or v < 0.0 or u + v > 1.0:
+        return math.inf
+    distance = dot(second, turned) / volume
+    return distance if distance >= 0.0 else math.inf
+
+
+def placed(mesh: Mesh, scale: Vector) -> Mesh:
+    """Return a mesh of a size, without points that are on no triangle; a flat one becomes 1 mm thick."""
+    used = sorted({index for triangle in mesh.triangles for index in triangle})
+    at = {index: place for place, index in enumerate(used)}
+    x, y, z = scale
+    points = [(px * x, py * y, pz * z) for px, py, pz in (mesh.points[index] for index in used)]
+    triangles = [(at[a], at[b], at[c]) for a, b, c in mesh.triangles]
+    normal = _normal(points, triangles)
+    if normal is None:
+        return Mesh(tuple(points), tuple(triangles))
+    half = _SHEET_M / 2.0
+    sides = [
+        [(px + side * normal[0], py + side * normal[1], pz + side * normal[2]) for px, py, pz in points]
+        for side in (half, -half)
+    ]
+    count = len(points)
+    backs = [(a + count, c + count, b + count) for a, b, c in triangles]
+    return Mesh((*sides[0], *sides[1]), (*triangles, *backs))
+
+
+def _normal(points: Sequence[Vector], triangles: Sequence[Triangle]) -> Vector | None:
+    """Return the normal of a plane that has all points; None if no plane has."""
+    largest = max((_area(points, triangle) for triangle in triangles), key=lambda it: math.hypot(*it))
+    length = math.hypot(*largest)
+    if length < _PARALLEL:
+        return 0.0, 0.0, 1.0
+    normal = largest[0] / length, largest[1] / length, largest[2] / length
+    heights = [dot(normal, point) for point in points]
+    return normal if max(heights) - min(heights) < _THIN_M else None
+
+
+def _area(points: Sequence[Vector], triangle: Triangle) -> Vector:
+    """Return a normal as long as twice the area of a triangle."""
+    a, b, c = (points[index] for index in triangle)
+    return cross(minus(b, a), minus(c, a))
+
+
+def box_of(points: Sequence[Vector]) -> tuple[Vector, Vector]:
+    """Return the middle and the size of the box around points."""
+    low = [min(point[axis] for point in points) for axis in range(3)]
+    high = [max(point[axis] for point in points) for axis in range(3)]
+    x, y, z = ((below + above) / 2.0 for below, above in zip(low, high, strict=True))
+    across, along, up = (above - below for below, above in zip(low, high, strict=True))
+    return (x, y, z), (across, along, up)
+
+
+def volume_m3(mesh: Mesh) -> float:
+    """Return the volume that the triangles enclose; wrong if they have gaps."""
+    points = mesh.points
+    return abs(sum(dot(points[a], cross(points[b], points[c])) for a, b, c in mesh.triangles)) / 6.0
 
 
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:

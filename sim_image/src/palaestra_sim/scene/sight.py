@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.drawn import Drawn, View
-from palaestra_sim.scene.geometry import Pose, Vector, turn
-from palaestra_sim.scene.meshes import Mesh
+from palaestra_sim.scene.geometry import Pose, Vector, dot, minus, turn
+from palaestra_sim.scene.meshes import Mesh, nearest_triangle
 from palaestra_sim.scene.places import Place
 
 _PARALLEL: Final = 1e-12
@@ -123,8 +123,8 @@ def _bundle(
     farthest = max(reach_m for _, reach_m in rays)
     near = []
     for target in targets:
-        offset = _minus(target.center, start)
-        beyond = _dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
+        offset = minus(target.center, start)
+        beyond = dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
         if beyond < 0.0 or math.hypot(*offset) - target.radius_m < farthest:
             near.append((target, *offset, target.radius_m, beyond, target.inward.carry(start)))
     near.sort(key=itemgetter(5))  # the nearest hides most
@@ -240,37 +240,5 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
     """Return the surface of triangles, of which both sides are seen."""
-    corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
-
-    def nearest(origin: Vector, direction: Vector) -> float:
-        return min((_triangle(origin, direction, *three) for three in corners), default=math.inf)
-
-    return nearest
-
-
-def _triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997)."""
-    first, second, apart = _minus(b, a), _minus(c, a), _minus(origin, a)
-    across = _cross(direction, second)
-    volume = _dot(first, across)
-    if abs(volume) < _PARALLEL:
-        return math.inf
-    u = _dot(apart, across) / volume
-    turned = _cross(apart, first)
-    v = _dot(direction, turned) / volume
-    if u < 0.0 or v < 0.0 or u + v > 1.0:
-        return math.inf
-    distance = _dot(second, turned) / volume
-    return distance if distance >= 0.0 else math.inf
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    scaled = Mesh(tuple(points), mesh.triangles)
+    return lambda origin, direction: nearest_triangle(scaled, origin, direction)

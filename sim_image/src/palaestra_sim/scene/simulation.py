@@ -334,14 +334,20 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Place) -> None:
-        """Update the places of the solids, if `place` is part of one of them."""
+        """Arrange the world anew, if `place` is part of a solid or floor, or a robot has another height."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
-        if any(place in moving.chain() for moving in places):
+        lifted = self._heights != self._heights_now()
+        if lifted or any(place in moving.chain() for moving in places):
             self._solids_moved = True
             self._arrange()
 
+    def _heights_now(self) -> list[float]:
+        """Return how high the robots that nothing but a client lifts are, in meters."""
+        return [robot.place.height_m for robot in self.robots if robot.body is not None]
+
     def _arrange(self) -> None:
+        self._heights = self._heights_now()
         self.scene.physics.arrange(self.robots, self.scene.solids, self.scene.loose, self.scene.doors)
 
     def _basic_step(self) -> None:

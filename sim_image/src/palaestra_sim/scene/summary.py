@@ -108,7 +108,7 @@ def differences(simulation: Described) -> Iterator[str]:
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
     if meshes:
-        yield f"{meshes} IndexedFaceSet as boundingObject: the box around its points"
+        yield f"{meshes} IndexedFaceSet as boundingObject: its convex hull is touched"
     rays = (
         beam
         for _, it in devices

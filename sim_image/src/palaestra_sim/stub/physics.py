@@ -23,15 +23,29 @@ from palaestra_sim.scene.surroundings import Surroundings
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
-from palaestra_sim.stub.outline import covering, obstacle
-from palaestra_sim.stub.rays import Fan, SlopedBeams, Upright
+from palaestra_sim.stub.outline import covering, obstacle, prismatic
+from palaestra_sim.stub.rays import Fan, Rounded, SlopedBeams, Upright
 
 
 class _Level(NamedTuple):
-    """The level beams of one robot, and the heights between which they are, in the robot's frame."""
+    """The level beams of one robot.
+
+    Attributes:
+        fan: meets what reaches from the lowest to the highest of them.
+        heights: between which they are, in the robot's frame.
+        rest: the same beams, for what some of them pass.
+    """
 
     fan: Fan
     heights: tuple[float, float]
+    rest: SlopedBeams
+
+    def cast(self, frame: tuple[float, float, float, float], height_m: float) -> Sequence[float]:
+        """Return how far each beam travels in meters."""
+        distances = self.fan.cast(frame)
+        if self.rest.free:
+            return distances
+        return list(map(min, distances, self.rest.cast(frame, height_m)))
 
 
 class StubPhysics:
@@ -72,13 +86,15 @@ class StubPhysics:
         self._sloped = {it: beams for it, beams in self._sloped.items() if it in figures}
         for figure in figures:
             others = [(it, body) for it, body in self._moving if it is not figure and body.radius > 0.0]
-            self._face(figure, [body for _, body in others])
+            self._face(figure, others)
             if not self._sloped.get(figure):
                 continue
-            uprights = [_upright(shape) for shape in solids if not _is_on(figure, shape)]
+            around = [shape for shape in solids if not _is_on(figure, shape)]
+            uprights = [_upright(shape) for shape in around if prismatic(shape)]
+            rounded = [_rounded(shape) for shape in around if not prismatic(shape)]
             for sloped in self._sloped[figure]:
                 others_now = [_of_robot(it, body) for it, body in others]
-                sloped.face(uprights, others_now, self._surroundings.heights_m())
+                sloped.face(uprights, others_now, self._surroundings.heights_m(), rounded)
 
     def advance(self, step_s: float) -> None:
         """Move the bodies on by one basic step."""
@@ -100,9 +116,9 @@ class StubPhysics:
             return lambda: sloped.cast_from(place.ground_pose)
         fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
         heights = [beam.height_m for beam in beams]
-        self._level.setdefault(figure, []).append(_Level(fan, (min(heights), max(heights))))
-        cast = fan.cast
-        return lambda: cast((body.x, body.y, body.c, body.s))
+        level = _Level(fan, (min(heights), max(heights)), SlopedBeams(beams))
+        self._level.setdefault(figure, []).append(level)
+        return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return the same for beams that meet what is visible, and pass the robot itself."""
@@ -128,14 +144,36 @@ class StubPhysics:
         """Return where robots touch obstacles and each other now."""
         return contact_points(self._moving, self._solids)
 
-    def _face(self, figure: Figure, others: Sequence[StubBody]) -> None:
+    def _face(self, figure: Figure, others: Sequence[tuple[Figure, StubBody]]) -> None:
         height = figure.place.height_m
         body = figure.body
         if isinstance(body, StubBody) and body.radius > 0.0:
             in_the_way = _between(self._solids, body.heights, height)
-            body.face(_neighborhood(in_the_way, body.radius), others)
-        for fan, heights in self._level.get(figure, ()):
-            fan.face(_neighborhood(_between(self._solids, heights, height), fan.reach_m), others)
+            body.face(_neighborhood(in_the_way, body.radius), [it for _, it in others])
+        for level in self._level.get(figure, ()):
+            self._face_level(level, height, others)
+
+    def _face_level(self, level: _Level, height: float, others: Sequence[tuple[Figure, StubBody]]) -> None:
+        """Set the obstacles of level beams: for all at once what all of them meet, for each the others."""
+        low, high = level.heights[0] + height, level.heights[1] + height
+        fan, rest = level.fan, level.rest
+        in_reach = _between(self._solids, level.heights, height)
+        whole = [shape for shape in in_reach if prismatic(shape) and _covers(shape.heights(), low, high)]
+        partly = [shape for shape in in_reach if shape not in whole]
+        robots = [(_of_robot(it, body), body) for it, body in others]
+        robots = [
+            (upright, body) for upright, body in robots if upright.low_m < high and low < upright.high_m
+        ]
+        fan.face(
+            _neighborhood(whole, fan.reach_m),
+            [body for upright, body in robots if _covers((upright.low_m, upright.high_m), low, high)],
+        )
+        rest.face(
+            [_upright(shape) for shape in partly if prismatic(shape)],
+            [upright for upright, _ in robots if not _covers((upright.low_m, upright.high_m), low, high)],
+            (),
+            [_rounded(shape) for shape in partly if not prismatic(shape)],
+        )
 
 
 def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
@@ -157,6 +195,15 @@ def _of_robot(figure: Figure, body: StubBody) -> Upright:
 def _is_on(figure: Figure, shape: Shape) -> bool:
     """Return whether a shape is a part of a robot, whose own rays pass it."""
     return figure.place in shape.place.chain()
+
+
+def _covers(heights: tuple[float, float], low: float, high: float) -> bool:
+    """Return whether a range of heights has all of another one; touching its end is not enough."""
+    return heights[0] < low and high < heights[1]
+
+
+def _rounded(shape: Shape) -> Rounded:
+    return Rounded(shape, shape.pose.inverse)
 
 
 def _upright(shape: Shape) -> Upright:
