@@ -51,8 +51,8 @@ COMMANDS = {  # speeds of the wheels in rad/s
 def twist(wheels, speeds):
     """Return vx, vy in m/s and omega in rad/s, in the frame of the robot.
 
-    The hub of a wheel moves along the direction in which it rolls by its radius times its speed. Two wheels on
-    one axle do not slide along it.
+    The hub of a wheel moves, along the direction in which it rolls, at its radius times its speed. Two wheels
+    on one axle do not slide along it.
     """
     rows, values = [], []
     for ((x, y), azimuth), speed in zip(wheels, speeds, strict=True):
@@ -155,3 +155,33 @@ def test_sensors_of_motion_read_what_the_circle_gives(base, setting):
         assert device(simulation, "gyro").value == pytest.approx(turning, abs=2e-3), speeds
         felt = sensor.rotation.T @ gained
         assert device(simulation, "accelerometer").value == pytest.approx(felt, abs=0.01), speeds
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_battery_loses_the_power_of_the_robot_times_the_time(setting):
+    """In joules; motors take nothing, and an empty battery stays empty."""
+    body = "battery [ 50 60 10 ] cpuConsumption 7"
+    simulation = setting.load(robot("", body))
+    for steps in (10, 100, 1000):
+        before = simulation.robots[0].battery.value
+        simulation.step(steps * STEP_MS)
+        expected = max(0.0, before - 7.0 * steps * STEP_S)
+        assert simulation.robots[0].battery.value == pytest.approx(expected, abs=1e-9)
+
+
+BUMPER = """TouchSensor { name "bumper" type "bumper" translation 0.1 0 0.2
+  boundingObject Cylinder { radius 0.2 height 0.1 } }"""
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_bumper_touches_a_wall_where_its_rim_reaches_it(setting):
+    """0.3 m before the middle of the robot, in each heading: the wall is a millimeter nearer, or farther."""
+    wheels = " ".join(wheel(f"wheel {index}", *it) for index, it in enumerate(TWO))
+    wall = 'DEF WALL Solid { name "wall" boundingObject Box { size 0.2 2 1 } }'
+    simulation = setting.load(robot(wheels + BUMPER, setting.put(frame()).fields) + wall)
+    for start in STARTS:
+        for gap, touches in ((0.001, False), (-0.001, True)):
+            move(simulation, "R", setting.put(start))
+            move(simulation, "WALL", setting.put(start @ frame((0.4 + gap, 0.0, 0.2))))
+            simulation.step(STEP_MS)
+            assert device(simulation, "bumper").value is touches, (start, gap)

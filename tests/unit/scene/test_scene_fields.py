@@ -45,7 +45,7 @@ FOR_PEOPLE = {
 # Where it would matter, it is looked at: for a light, a bumper of another type, a radar, a fluid and so on.
 ELSEWHERE = {
     "LightSensor.colorFilter", "LightSensor.occlusion",  # the stub refuses lights
-    "TouchSensor.resolution", "DistanceSensor.redColorSensitivity", "GPS.noiseCorrelation",
+    "TouchSensor.resolution", "GPS.noiseCorrelation",
     "radarCrossSection", "recognitionColors", "contactMaterial", "immersionProperties", "physics",
 }  # fmt: skip
 

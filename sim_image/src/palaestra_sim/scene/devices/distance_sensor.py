@@ -20,7 +20,7 @@ from typing import Final
 
 from palaestra_sim.scene.beams import Beam, beam_along
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import table_rows, table_service
+from palaestra_sim.scene.devices.response import discrete, table_rows, table_service
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.lookup import LookupTable, lookup_table
 from palaestra_sim.scene.sight import Glance
@@ -71,6 +71,10 @@ class DistanceSensor:
     """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
 
     A sonar has five beams for each ray: the ray itself, and two pairs beside it.
+
+    Attributes:
+        sensitivity: how much the color counts for an infra-red sensor; 0: not at all.
+        resolution: of the value; -1: as fine as can be.
     """
 
     name: str
@@ -80,6 +84,8 @@ class DistanceSensor:
     table: LookupTable
     type: DistanceSensorType
     aperture_rad: float
+    sensitivity: float = 1.0
+    resolution: float = -1.0
     value: float = math.nan
 
 
@@ -87,8 +93,6 @@ def _read(part: Part) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
-    if part.number("resolution", -1.0) != -1.0:
-        part.lack("a distance sensor with a resolution")
     table = lookup_table(*table_rows(part, _TABLE, "distances"))
     aperture_rad = part.number("aperture", 1.5708)
     rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))  # as in Webots, which warns
@@ -104,6 +108,8 @@ def _read(part: Part) -> DistanceSensor:
         table=table,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
         aperture_rad=aperture_rad,
+        sensitivity=part.number("redColorSensitivity", 1.0),
+        resolution=part.number("resolution", -1.0),
     )
 
 
@@ -169,6 +175,21 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
+    sample = _fine(sensors, robot)
+    coarse = [sensor for sensor in sensors if sensor.resolution > 0.0]
+    if not coarse:
+        return sample
+
+    def sample_coarse() -> None:
+        sample()
+        for sensor in coarse:
+            sensor.value = discrete(sensor.value, sensor.resolution)
+
+    return sample_coarse
+
+
+def _fine(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
+    """Return the sample of sensors without their resolutions."""
     if any(sensor.type is DistanceSensorType.INFRA_RED for sensor in sensors):
         return _with_infrared(sensors, robot)
     cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
@@ -234,9 +255,10 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, divided by the average share of the light that comes back."""
+    """Return the average distance, and how much farther it seems by the share of light that returns."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
-    return _measured(sensor, [it.distance_m for it in glances]) / light
+    distance_m = _measured(sensor, [it.distance_m for it in glances])
+    return distance_m + (distance_m / light - distance_m) * sensor.sensitivity
 
 
 def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
