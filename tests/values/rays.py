@@ -81,6 +81,11 @@ def plane(origin, direction):
     return _first([-origin[2] / direction[2]] if direction[2] else [], lambda t: t > 0.0)
 
 
+def front_of_plane(origin, direction):
+    """Return the distance to the upper side of the plane z = 0; from below nothing is seen."""
+    return plane(origin, direction) if origin[2] > 0.0 else np.inf
+
+
 def triangles(origin, direction, corners):
     """Return the distance to triangles, each three points: (n, 3, 3)."""
     nearest = np.inf

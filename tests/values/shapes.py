@@ -50,6 +50,7 @@ class Shape:
         aims: the rays.
         tolerance: absolute, in meters.
         bounding: whether a boundingObject may have it.
+        seen: the formula of the visible shape, if it is another one.
     """
 
     type: str
@@ -58,6 +59,7 @@ class Shape:
     aims: Points
     tolerance: float = 1e-5
     bounding: bool = True
+    seen: Callable | None = None
 
 
 SHAPES = (
@@ -123,7 +125,9 @@ SHAPES = (
             ((0.0, 0.0, 0.3), (0.0, 0.0, 0.0)),
             ((-3.0, 2.0, 1.0), (2.0, -1.0, 0.0)),
             ((0.0, 0.0, 0.5), (1.0, 0.0, 0.5)),
+            ((0.5, 0.3, -1.0), (0.6, 0.2, 0.0)),
         ),
+        seen=rays.front_of_plane,
     ),
     Shape(
         "IndexedFaceSet",

@@ -168,11 +168,17 @@ def test_values_that_differ_from_webots_are_named(check):
         DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 }"""
     robot = f'Robot {{ controller "ros" controllerArgs ["--name=a" "--synchronize"] children [ {devices} ] }}'
 
-    code, lines = check(f"Solid {{ boundingObject {mesh} }} {robot}")
+    look = 'PBRAppearance { baseColorMap ImageTexture { url "https://example.com/line.png" } }'
+    shapes = (
+        f"Shape {{ appearance {look} geometry Plane {{ }} }} Shape {{ appearance {look} geometry {mesh} }}"
+    )
+
+    code, lines = check(f"Solid {{ children [ {shapes} ] boundingObject {mesh} }} {robot}")
 
     assert code == 0
     assert lines[1:] == [
-        "differs from Webots: 1 infra-red DistanceSensor: textures do not count, rays pass the robot itself",
+        "differs from Webots: 1 infra-red DistanceSensor: rays pass the robot itself",
+        "differs from Webots: 1 Shape with a texture that infra-red DistanceSensors do not see",
         "differs from Webots: 1 Lidar: rays pass the robot itself",
         "differs from Webots: 1 IndexedFaceSet as boundingObject: its convex hull is touched",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",

@@ -60,6 +60,7 @@ class Built:
         fixed: where the obstacles are that do not move.
         of_robots: whether a geom is a part of a robot, by number.
         changed: the loose things that clients moved since the physics looked.
+        floors_m: the heights of the Planes of the world.
     """
 
     model: Any
@@ -73,6 +74,7 @@ class Built:
     fixed: dict[Place, Pose]
     of_robots: Any
     changed: dict[LoosePlace, None]
+    floors_m: tuple[float, ...]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it has none."""
@@ -187,6 +189,7 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
         fixed=fixed,
         of_robots=_of_robots(model.ngeom, marks),
         changed={},
+        floors_m=tuple(floor.height_m for floor in surroundings.floors),
         links=bodies(links, model, data),
         own_geoms={
             whose: [geom.id for it in some for geom in it.body.geoms] for whose, some in links.items()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Final
 
 import numpy as np
@@ -42,7 +43,8 @@ class LidarBeams:
         passed = [self._own_geoms(visible)]
         visible.model.geom_group[passed[0]] = PASSED
         for first, end in self._bundles:
-            distances[first:end] = _cast(visible, origins[first], directions[first:end], passed)
+            with _without(visible, _seen_from_below(visible, origins[first])):
+                distances[first:end] = _cast(visible, origins[first], directions[first:end], passed)
         visible.model.geom_group[np.concatenate(passed)] = 0
         missed = (distances < 0.0) | (distances > self._reach)
         travelled: list[float] = np.where(missed, self._reach, distances).tolist()
@@ -56,6 +58,23 @@ class LidarBeams:
             own = [at for at, place in enumerate(places) if place is not None and carrier in place.chain()]
             self._own = (visible, np.array(own, dtype=int))
         return self._own[1]
+
+
+def _seen_from_below(visible: Visible, origin: Any) -> Any:
+    """Return the numbers of the Planes below whose upper side a point is: only that one is drawn."""
+    planes = visible.planes
+    offsets = origin - visible.data.geom_xpos[planes]
+    heights = np.sum(offsets * visible.data.geom_xmat[planes][:, 2::3], axis=1)
+    return planes[heights < visible.model.geom_size[planes, 2]]
+
+
+@contextmanager
+def _without(visible: Visible, geoms: Any) -> Iterator[None]:
+    """Hide some geoms, which were seen before."""
+    shown = geoms[visible.model.geom_group[geoms] == 0]
+    visible.model.geom_group[shown] = PASSED
+    yield
+    visible.model.geom_group[shown] = 0
 
 
 def _cast(visible: Visible, origin: Any, directions: Any, passed: list[Any]) -> Any:

@@ -1,6 +1,6 @@
 """From the nodes of a world to what cameras see: shapes, each with a color and the place that carries it.
 
-Pure. Textures, lights and mesh files are not read: a shape has one color. A stand-in has the shapes of its
+Lights and mesh files are not read, and no texture: a shape has one color. A stand-in has the shapes of its
 outline, in the color of its first appearance. What a scale distorts keeps its angles.
 """
 
@@ -16,6 +16,7 @@ from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.textures import Textures
 
 Kind = Literal["box", "ball", "cylinder", "capsule", "mesh"]
 Color = tuple[float, float, float, float]  # red, green, blue, alpha, from 0 to 1
@@ -42,12 +43,14 @@ _LOOKS: Final = frozenset(
         "Coordinate",
         "Cylinder",
         "ElevationGrid",
+        "ImageTexture",
         "IndexedFaceSet",
         "Material",
         "PBRAppearance",
         "Plane",
         "Shape",
         "Sphere",
+        "TextureTransform",
     )
 )
 _HOLDING: Final = ("children", "endPoint")
@@ -66,6 +69,8 @@ class Drawn:
         node: the Shape, or the stand-in.
         mesh: of kind "mesh".
         roughness: of a PBRAppearance, 0 to 1.
+        geometry: the type of its geometry, such as "Plane".
+        look: its appearance, if it has one.
     """
 
     kind: Kind
@@ -76,6 +81,8 @@ class Drawn:
     node: SceneNode
     mesh: Mesh | None = None
     roughness: float = 0.0
+    geometry: str = ""
+    look: SceneNode | None = None
 
 
 def drawn(root: SceneNode) -> Iterator[Drawn]:
@@ -88,12 +95,14 @@ class View:
 
     Attributes:
         root: of the world.
+        textures: the images of its textures.
         changes: how often something has come, gone, or got another look.
         moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
     """
 
     def __init__(self, root: SceneNode) -> None:
         self.root = root
+        self.textures = Textures()
         self.changes = 0
         self.moves = 0
 
@@ -174,6 +183,7 @@ def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 class _Look(NamedTuple):
     color: Color
     roughness: float = 0.0
+    node: SceneNode | None = None
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
@@ -194,6 +204,8 @@ def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> 
             node=owner,
             mesh=solid.mesh,
             roughness=look.roughness,
+            geometry=node.type_name,
+            look=look.node,
         )
 
 
@@ -250,12 +262,12 @@ def _look(look: SceneNode) -> _Look:
     if look.type_name == "Appearance":
         material = next(iter(look.nodes("material")), None)
         if material is None:
-            return _Look((*(_PATTERN if look.nodes("texture") else _WHITE), 1.0))
-        return _Look(_mixed(material, "diffuseColor", _MATERIAL))
+            return _Look((*(_PATTERN if look.nodes("texture") else _WHITE), 1.0), node=look)
+        return _Look(_mixed(material, "diffuseColor", _MATERIAL), node=look)
     if look.type_name == "PBRAppearance":
         color = _mixed(look, "baseColor", _PATTERN if look.nodes("baseColorMap") else _WHITE)
-        return _Look(color, min(1.0, max(0.0, _number(look, "roughness", 0.0))))
-    return _Look(_mixed(look, "colorOverride", _PATTERN))
+        return _Look(color, min(1.0, max(0.0, _number(look, "roughness", 0.0))), look)
+    return _Look(_mixed(look, "colorOverride", _PATTERN), node=look)
 
 
 def _mixed(node: SceneNode, field: str, default: tuple[float, float, float]) -> Color:

@@ -56,9 +56,13 @@ def load(path: str) -> Raster | None:
     Raises:
         UnsimulatedError: Pillow is missing.
     """
+    return _opened(path)
+
+
+def _opened(file: str | BytesIO) -> Raster | None:
     images = pillow("Image")
     try:
-        with images.open(path, formats=("PNG", "JPEG")) as image:
+        with images.open(file, formats=("PNG", "JPEG")) as image:
             width, height = image.size
             if width * height > _MOST_PIXELS:
                 return None
@@ -66,6 +70,15 @@ def load(path: str) -> Raster | None:
     except (OSError, SyntaxError, ValueError, images.DecompressionBombError):
         return None
     return Raster(width=width, height=height, pixels=pixels)
+
+
+def decode(data: bytes) -> Raster | None:
+    """Return the picture of the bytes of a PNG or JPEG file; None if they are of none.
+
+    Raises:
+        UnsimulatedError: Pillow is missing.
+    """
+    return _opened(BytesIO(data))
 
 
 def pillow(module: str) -> Any:

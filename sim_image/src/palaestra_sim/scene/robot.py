@@ -97,7 +97,7 @@ class Robot:
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
         """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
-        return Sight(self._view, self.place, beams).cast
+        return Sight(self._view, self.place, beams, textures=True).cast
 
     def eye(self, place: Place, lens: Lens) -> Eye | None:
         """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""

@@ -17,6 +17,7 @@ from palaestra_sim.scene.drawn import Drawn, View
 from palaestra_sim.scene.geometry import Pose, Vector, dot, minus, turn
 from palaestra_sim.scene.meshes import Mesh, nearest_triangle
 from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.textures import Paint, Textures
 
 _PARALLEL: Final = 1e-12
 
@@ -40,10 +41,12 @@ class Sight:
         view: what of the world is visible.
         carrier: the place of the robot.
         beams: in the frame of the robot.
+        textures: whether they count for the light that returns.
     """
 
-    def __init__(self, view: View, carrier: Place, beams: Sequence[Beam]) -> None:
+    def __init__(self, view: View, carrier: Place, beams: Sequence[Beam], *, textures: bool = False) -> None:
         self._view = view
+        self._textures = textures
         self._carrier = carrier
         self._bundles = [
             (origin, [(direction, reach_m) for _, direction, reach_m in rays])
@@ -74,16 +77,19 @@ class Sight:
             if self._carrier in chain:
                 continue
             of_its_kind = self._moving if any(place.moves for place in chain) else self._standing
-            of_its_kind.append(_Target(thing))
+            of_its_kind.append(_Target(thing, self._view.textures if self._textures else None))
 
 
 class _Target:
     """A visible shape, where it was when it was placed last."""
 
-    __slots__ = ("_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
+    __slots__ = ("_paint", "_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
 
-    def __init__(self, thing: Drawn) -> None:
+    def __init__(self, thing: Drawn, textures: Textures | None) -> None:
         self._thing = thing
+        self._paint: Paint | None = None
+        if textures is not None and thing.look is not None:
+            self._paint = textures.paint(thing.look, thing.geometry, thing.color[3])
         self.hit = _surface(thing)
         self.radius_m = _radius(thing)
         self.reflection = reflection(thing)
@@ -99,6 +105,16 @@ class _Target:
         up = pose.rotation[6:]
         box_m = sum(abs(share) * length / 2.0 for share, length in zip(up, thing.size, strict=True))
         self.half_height_m = self.radius_m if thing.mesh else box_m
+
+    def light(self, origin: Vector, direction: Vector, distance_m: float) -> float:
+        """Return the share of light that returns from where a ray meets the shape; all in its frame."""
+        if self._paint is None:
+            return self.reflection
+        x, y, z = (
+            2.0 * (at + distance_m * way) / length
+            for at, way, length in zip(origin, direction, self._thing.size, strict=True)
+        )
+        return self._paint.reflection((x, y, z))
 
 
 def reflection(thing: Drawn) -> float:
@@ -131,15 +147,16 @@ def _bundle(
     level = [row for row in near if abs(row[3]) <= row[0].half_height_m]
     for direction, reach_m in rays:
         dx, dy, dz = towards = turn(pose.rotation, direction)
-        nearest, light = reach_m, 1.0
+        nearest, met = reach_m, None
         for target, x, y, z, radius_m, beyond, inside in near if dz else level:
             along = x * dx + y * dy + z * dz
             if along - radius_m > nearest or (beyond > 0.0 and (along < 0.0 or beyond > along * along)):
                 continue
-            distance_m = target.hit(inside, turn(target.inward.rotation, towards))
+            inward = turn(target.inward.rotation, towards)
+            distance_m = target.hit(inside, inward)
             if distance_m < nearest:
-                nearest, light = distance_m, target.reflection
-        yield Glance(nearest, light)
+                nearest, met = distance_m, (target, inside, inward)
+        yield Glance(nearest, 1.0 if met is None else met[0].light(met[1], met[2], nearest))
 
 
 def _radius(thing: Drawn) -> float:
@@ -164,6 +181,8 @@ def _surface(thing: Drawn) -> Surface:
             return lambda origin, direction: _cylinder(origin, direction, half)
         case "capsule":
             return lambda origin, direction: _capsule(origin, direction, half)
+    if thing.geometry == "Plane":
+        return lambda origin, direction: _sheet(origin, direction, half)
     return lambda origin, direction: _box(origin, direction, half)
 
 
@@ -185,6 +204,16 @@ def _box(origin: Vector, direction: Vector, half: Vector) -> float:
         if enter > leave:
             return math.inf
     return math.inf if inside else enter
+
+
+def _sheet(origin: Vector, direction: Vector, half: Vector) -> float:
+    """Return the meters to the upper side of a box, the only one that a Plane has."""
+    above = origin[2] - half[2]
+    if above < 0.0 or direction[2] > -_PARALLEL:
+        return math.inf
+    distance = -above / direction[2]
+    x, y = origin[0] + distance * direction[0], origin[1] + distance * direction[1]
+    return distance if abs(x) <= half[0] and abs(y) <= half[1] else math.inf
 
 
 def _ball(origin: Vector, direction: Vector, half: Vector) -> float:

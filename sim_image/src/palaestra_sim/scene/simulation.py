@@ -35,6 +35,7 @@ from palaestra_sim.scene.reading import LeaveOut, Reading
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.shapes import bounding_shapes
 from palaestra_sim.scene.states import States, require_joint
+from palaestra_sim.scene.textures import ReadFile, Textures
 from palaestra_sim.scene.tree.effects import require_removable, require_room
 from palaestra_sim.scene.tree.fields import Field
 from palaestra_sim.scene.tree.scene_tree import SceneTree
@@ -116,6 +117,15 @@ class Simulation:
         """
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, physics, leave_out), mode)
+
+    def read_textures(self, read: ReadFile) -> None:
+        """Let infra-red sensors see textures, whose files `read` returns."""
+        self._view.textures = Textures(read)
+
+    @property
+    def unread_textures(self) -> int:
+        """How many visible shapes have a texture that infra-red sensors do not see."""
+        return sum(self._view.textures.unread(thing.look, thing.geometry) for thing in self._view.things())
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:

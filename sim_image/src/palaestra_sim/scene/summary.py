@@ -37,6 +37,11 @@ class Described(Protocol):
         ...
 
     @property
+    def unread_textures(self) -> int:
+        """How many visible shapes have a texture that infra-red sensors do not see."""
+        ...
+
+    @property
     def left_out(self) -> Sequence[WorldError]:
         """Nodes that were left out, each with its place."""
         ...
@@ -104,7 +109,9 @@ def differences(simulation: Described) -> Iterator[str]:
     yield from _not_in_webots(devices)
     yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
-        yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
+        yield f"{infrared} infra-red DistanceSensor: rays pass the robot itself"
+        if unread := simulation.unread_textures:
+            yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
     if meshes:
