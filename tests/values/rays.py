@@ -96,3 +96,11 @@ def triangles(origin, direction, corners):
             if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and t > 0.0:
                 nearest = min(nearest, t)
     return nearest
+
+
+def front_of_triangles(origin, direction, corners):
+    """Return the distance to those triangles that are seen counter-clockwise: their outer sides."""
+    facing = [
+        (a, b, c) for a, b, c in np.asarray(corners, float) if np.cross(b - a, c - a) @ (origin - a) > 0.0
+    ]
+    return triangles(origin, direction, facing)

@@ -30,6 +30,9 @@ _TRIANGLES = [
 _POINTS = ", ".join("{:g} {:g} {:g}".format(*corner) for corner in _CORNERS)
 _INDICES = ", ".join(f"{' '.join(map(str, face))} -1" for face in _FACES)
 ELL = f"IndexedFaceSet {{ coord Coordinate {{ point [ {_POINTS} ] }} coordIndex [ {_INDICES} ] }}"
+SHEET = """IndexedFaceSet { coord Coordinate { point [ 0 -1 -1, 0 1 -1, 0 1 1, 0 -1 1 ] }
+  coordIndex [ 0 1 2 3 -1 ] }"""
+_SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # it faces +x
 _HEIGHTS = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.2, 0.5, 0.2]])  # by y, then x; 1 m apart
 _CELLS = [
     [[x + dx, y + dy, _HEIGHTS[y + dy, x + dx]] for dx, dy in corners]
@@ -51,6 +54,7 @@ class Shape:
         tolerance: absolute, in meters.
         bounding: whether a boundingObject may have it.
         seen: the formula of the visible shape, if it is another one.
+        name: of the row, if its type has several.
     """
 
     type: str
@@ -60,6 +64,11 @@ class Shape:
     tolerance: float = 1e-5
     bounding: bool = True
     seen: Callable | None = None
+    name: str = ""
+
+    def __str__(self):
+        """Return its name, else its type, for the name of a test."""
+        return self.name or self.type
 
 
 SHAPES = (
@@ -143,6 +152,20 @@ SHAPES = (
         ),
     ),
     Shape(
+        "IndexedFaceSet",
+        SHEET,
+        partial(rays.triangles, corners=_SHEET),
+        (
+            ((2.0, 0.3, 0.1), (0.0, 0.2, 0.4)),
+            ((-2.0, 0.3, 0.1), (0.0, 0.2, 0.4)),
+            ((1.0, 1.5, 0.0), (0.0, -0.5, 0.3)),
+            ((1.0, 0.0, 1.5), (0.0, 0.0, 1.2)),
+        ),
+        tolerance=2e-3,  # it is a millimeter thick
+        seen=partial(rays.front_of_triangles, corners=_SHEET),
+        name="sheet",
+    ),
+    Shape(
         "Cone",
         "Cone { bottomRadius 0.5 height 1 }",
         partial(rays.cone, radius=0.5, height=1.0),
@@ -163,7 +186,9 @@ SHAPES = (
             ((0.7, 0.6, 2.0), (0.8, 0.7, 0.0)),
             ((3.0, 1.5, 0.6), (0.5, 1.0, 0.1)),
             ((1.6, 1.7, 1.0), (1.5, 1.4, 0.0)),
+            ((0.7, 0.6, -2.0), (0.8, 0.7, 0.0)),
         ),
         bounding=False,
+        seen=partial(rays.front_of_triangles, corners=_CELLS),
     ),
 )

@@ -17,6 +17,9 @@ from palaestra_sim.scene.physics import Figure
 
 _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 
+_PAST_M: Final = 1e-6  # behind a triangle
+_MOST_TRIANGLES: Final = 100  # that one ray passes from behind
+
 
 class LidarBeams:
     """The beams of one robot; beams that begin at one point are cast together.
@@ -97,9 +100,28 @@ def _cast(visible: Visible, origin: Any, directions: Any, passed: list[Any]) -> 
             mujoco.mjMAXVAL,
         )
         from_inside = (distances >= 0.0) & (np.sum(normals * directions, axis=1) > 0.0)
-        around = np.unique(hits[from_inside])
-        around = around[visible.model.geom_type[around] != mujoco.mjtGeom.mjGEOM_MESH.value]
+        meshes = visible.model.geom_type[hits] == mujoco.mjtGeom.mjGEOM_MESH.value
+        around = np.unique(hits[from_inside & ~meshes])
         if not len(around):
+            for at in np.flatnonzero(from_inside):
+                distances[at] = _beyond(visible, origin, directions[at], distances[at])
             return distances
         visible.model.geom_group[around] = PASSED
         passed.append(around)
+
+
+def _beyond(visible: Visible, origin: Any, direction: Any, distance_m: float) -> float:
+    """Return how far a ray travels that met a triangle from behind, which is not drawn; -1 without end."""
+    normal = np.empty(3)
+    for _ in range(_MOST_TRIANGLES):
+        distance_m += _PAST_M
+        start = origin + distance_m * direction
+        further = mujoco.mj_ray(
+            visible.model, visible.data, start, direction, _GROUPS, True, -1, None, normal
+        )
+        if further < 0.0:
+            break
+        distance_m += further
+        if normal @ direction <= 0.0:
+            return distance_m
+    return -1.0

@@ -87,21 +87,25 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
     return [(face[a], face[b], face[c]) for a, b, c in found]
 
 
-def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector) -> float:
-    """Return the meters along a ray to the nearest triangle, from either side; infinite if it misses."""
-    points = mesh.points
-    return min(
-        (_to_triangle(origin, direction, points[a], points[b], points[c]) for a, b, c in mesh.triangles),
-        default=math.inf,
-    )
+def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bool = False) -> float:
+    """Return the meters along a ray to the nearest triangle; infinite if it misses all of them.
+
+    With `front`, a triangle is met from its outer side alone.
+    """
+    points, least = mesh.points, _PARALLEL if front else -math.inf
+    corners = ((points[a], points[b], points[c]) for a, b, c in mesh.triangles)
+    return min((_to_triangle(origin, direction, three, least) for three in corners), default=math.inf)
 
 
-def _to_triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997)."""
+def _to_triangle(
+    origin: Vector, direction: Vector, corners: tuple[Vector, Vector, Vector], least: float
+) -> float:
+    """Return the meters to a triangle, as in Möller and Trumbore (1997); from behind `volume` is below 0."""
+    a, b, c = corners
     first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
     across = cross(direction, second)
     volume = dot(first, across)
-    if abs(volume) < _PARALLEL:
+    if abs(volume) < _PARALLEL or volume < least:
         return math.inf
     u = dot(apart, across) / volume
     turned = cross(apart, first)

@@ -268,6 +268,6 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
-    """Return the surface of triangles, of which both sides are seen."""
+    """Return the surface of triangles, of which the outer sides are seen."""
     scaled = Mesh(tuple(points), mesh.triangles)
-    return lambda origin, direction: nearest_triangle(scaled, origin, direction)
+    return lambda origin, direction: nearest_triangle(scaled, origin, direction, front=True)
