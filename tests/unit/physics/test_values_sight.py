@@ -28,6 +28,7 @@ TYPES = {
     "sensitive": ("infra-red", f"redColorSensitivity {SENSITIVITY}"),
     "coarse": ("generic", "resolution 25"),
 }
+NOTHING = f'DistanceSensor {{ name "nothing" {MOUNT.fields} lookupTable [ ] }}'
 # Where sensors are, and at which points they look, in the frame of the wall.
 LOOKS = [
     looking((2.0, 0.3, -0.4), (0.2, 0.3, -0.4), 0.3),
@@ -50,7 +51,7 @@ def simulation_of(setting):
         DISTANCE.replace("NAME", name).replace("TYPE", kind).replace("FIELDS", fields)
         for name, (kind, fields) in TYPES.items()
     )
-    return setting.load(wall + robot(sensors))
+    return setting.load(wall + robot(sensors + NOTHING))
 
 
 def directions():
@@ -98,6 +99,55 @@ def test_a_distance_sensor_measures_by_its_type(name, setting):
         if name == "coarse":
             value = 25.0 * np.round(value / 25.0)
         assert device(simulation, name).value == pytest.approx(value, abs=0.01), sensor
+
+
+ROUND_RAD, HIGH_RAD = 1.2, 0.5
+LIDAR = f"""Lidar {{ name "lidar" {MOUNT.fields} horizontalResolution 5 numberOfLayers 4
+  fieldOfView {ROUND_RAD} verticalFieldOfView {HIGH_RAD} minRange 0.1 maxRange {REACH_M} }}"""
+
+
+@cached
+def scanned(setting):
+    """Return a simulation of the wall, and of a robot with a lidar of four layers."""
+    shape = f"Shape {{ geometry Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }} }}"
+    simulation = setting.load(f"Solid {{ {setting.put(WALL).fields} children [ {shape} ] }}" + robot(LIDAR))
+    enable(simulation)
+    return simulation
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting):
+    """Layers from the top down, their ends included; rays from the left, in the middle of their shares."""
+    simulation = scanned(setting)
+    for sensor in LOOKS:
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS)
+        lidar = device(simulation, "lidar")
+        for layer, up in enumerate(HIGH_RAD * np.array([0.5, 1 / 6, -1 / 6, -0.5])):
+            azimuths = ROUND_RAD * np.array([0.4, 0.2, 0.0, -0.2, -0.4])
+            ways = [
+                np.array([math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)])
+                for it in azimuths
+            ]
+            met, _ = distances(sensor, ways)
+            read = [min(each, REACH_M) for each in lidar.layers[layer]]
+            assert read == pytest.approx(list(met), rel=1e-5), (sensor, layer)
+            points = [
+                way * far if far < REACH_M else [math.inf] * 3 for way, far in zip(ways, met, strict=True)
+            ]
+            assert np.array(list(lidar.points(layer))) == pytest.approx(np.array(points), abs=1e-4)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_distance_sensor_without_a_lookup_table_measures_0(setting):
+    """Unlike other sensors, whose values stay as they are."""
+    simulation = simulation_of(setting)
+    kind, sensor = simulation.robots[0].parts.devices.rows["nothing"]
+    simulation.step(STEP_MS)
+
+    services = {path: handler for path, _, handler in kind.services(sensor)}
+    assert sensor.value == 0.0
+    assert services["get_lookup_table"](None) == {"value": []}
 
 
 WIDTH_PX, HEIGHT_PX, VIEW_RAD = 8, 6, 0.9

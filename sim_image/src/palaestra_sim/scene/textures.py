@@ -23,6 +23,7 @@ Coordinates = tuple[float, float]
 # A function of a point, whose box has the corners -1 and 1, to its place in a texture.
 Mapped = Callable[[Vector], Coordinates]
 _END: Final = 1.0 - 1e-7  # of half the height of a cylinder: beyond, a point is on an end
+_UP: Final = 2  # the axis
 _PIXEL: Final = 4  # blue, green, red, alpha
 _RED: Final = 2
 
@@ -42,7 +43,7 @@ class Image:
 
     def at(self, place: Coordinates) -> float:
         """Return the red at a place, 0 to 1; u is to the right and v is down."""
-        u, v = (_bounded(part, repeat) for part, repeat in zip(place, self.repeats, strict=True))
+        u, v = (_bounded(part, repeat=repeat) for part, repeat in zip(place, self.repeats, strict=True))
         row = min(int(v * self.height), self.height - 1)
         column = min(int(u * self.width), self.width - 1)
         return self.reds[row * self.width + column] / 255.0
@@ -150,7 +151,7 @@ def texture_of(look: SceneNode) -> SceneNode | None:
     return next((node for node in look.nodes(field) if node.type_name == "ImageTexture"), None)
 
 
-def _bounded(part: float, repeat: bool) -> float:  # noqa: FBT001 - a field of the node
+def _bounded(part: float, *, repeat: bool) -> float:
     if not math.isfinite(part):
         return 0.0
     return part % 1.0 if repeat else max(0.0, min(1.0, part))
@@ -165,7 +166,7 @@ def _on_box(point: Vector) -> Coordinates:
     """Return the place on the side that a point is on: each side has the whole texture."""
     x, y, z = point
     side = max(range(3), key=lambda axis: abs(point[axis]))
-    if side == 2:  # noqa: PLR2004 - the axis that points up
+    if side == _UP:
         return (1.0 + x) / 2.0, (1.0 - math.copysign(1.0, z) * y) / 2.0
     along = y if side == 0 else -x
     return (1.0 + math.copysign(1.0, point[side]) * along) / 2.0, (1.0 - z) / 2.0

@@ -23,6 +23,7 @@ from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.scene.devices.response import discrete, table_rows, table_service
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.scene.lookup import Row as TableRow
 from palaestra_sim.scene.sight import Glance
 from palaestra_sim.seam import Row
 
@@ -31,6 +32,7 @@ _BESIDE_M: Final = 1e-4  # how far the rays are beside that of a sonar
 _BEAMS_OF_SONAR: Final = 5  # of each ray
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # of a surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
+_EMPTY: Final = ((0.0, 0.0, 0.0),)  # of one without rows, which measures 0
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
 # aperture.
 _RINGS: Final = (
@@ -73,6 +75,7 @@ class DistanceSensor:
     A sonar has five beams for each ray: the ray itself, and two pairs beside it.
 
     Attributes:
+        rows: of its lookup table, as the world has them.
         sensitivity: how much the color counts for an infra-red sensor; 0: not at all.
         resolution: of the value; -1: as fine as can be.
     """
@@ -84,6 +87,7 @@ class DistanceSensor:
     table: LookupTable
     type: DistanceSensorType
     aperture_rad: float
+    rows: tuple[TableRow, ...] = ()
     sensitivity: float = 1.0
     resolution: float = -1.0
     value: float = math.nan
@@ -93,7 +97,8 @@ def _read(part: Part) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
-    table = lookup_table(*table_rows(part, _TABLE, "distances"))
+    rows = tuple(table_rows(part, _TABLE, "distances"))
+    table = lookup_table(*(rows or _EMPTY))
     aperture_rad = part.number("aperture", 1.5708)
     rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))  # as in Webots, which warns
     if rays > _MOST_RAYS:
@@ -106,6 +111,7 @@ def _read(part: Part) -> DistanceSensor:
         beams=tuple(_beams(part.place.world_pose, cone, table.reach_m, sonar=type_name == "sonar")),
         weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
         table=table,
+        rows=rows,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
         aperture_rad=aperture_rad,
         sensitivity=part.number("redColorSensitivity", 1.0),
@@ -267,7 +273,7 @@ def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
         ("get_min_value", "get_float", lambda _: {"value": low}),
         ("get_max_value", "get_float", lambda _: {"value": high}),
         ("get_aperture", "get_float", lambda _: {"value": sensor.aperture_rad}),
-        *table_service(sensor.table.rows),
+        *table_service(sensor.rows),
         ("get_type", "get_int", lambda _: {"value": int(sensor.type)}),
     )
 
