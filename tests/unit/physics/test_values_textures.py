@@ -239,3 +239,43 @@ def test_a_texture_transform_moves_turns_and_scales_the_texture(scale, rotation,
             )
             expected = way / (0.2 + 0.8 * red_at(bound(u), bound(v)))
             assert read(simulation, CENTER[0], target) == pytest.approx(expected, rel=1e-6), (target, fields)
+
+
+ARENA = """RectangleArena {{ floorSize 2 1 {order} wallThickness 0.1 wallHeight 0.3 }}"""
+FLOOR = f"floorTileSize 0.5 0.25 floorAppearance {LOOK}"
+WALL = "wallAppearance PBRAppearance { baseColor 0.3 1 1 roughness 0 }"
+
+
+@pytest.mark.parametrize("order", [f"{FLOOR} {WALL}", f"{WALL} {FLOOR}"], ids=["floor first", "walls first"])
+def test_the_floor_of_an_arena_has_its_texture_by_tiles(order, load):
+    """From its lower left corner; the walls have a look of their own. Line followers drive in such arenas."""
+    simulation = load(ARENA.format(order=order) + robot(INFRARED))
+    start = np.array([0.2, -0.1, 0.4])
+    for target in ((-0.9, 0.4, 0.0), (0.3, 0.2, 0.0), (0.33, -0.45, 0.0)):
+        move(simulation, "R", looking(start, target, 0.3) @ MOUNT.inverse)
+        simulation.step(STEP_MS)
+        u, up = (target[0] + 1.0) / 0.5 % 1.0, (target[1] + 0.5) / 0.25 % 1.0
+        expected = np.linalg.norm(start - target) / (0.2 + 0.8 * red_at(u, 1.0 - up))
+        assert device(simulation, "eye").value == pytest.approx(expected, rel=1e-6), target
+
+    target = np.array([1.0, 0.1, 0.2])  # on the wall
+    move(simulation, "R", looking(start, target, 0.3) @ MOUNT.inverse)
+    simulation.step(STEP_MS)
+    assert device(simulation, "eye").value == pytest.approx(
+        np.linalg.norm(start - target) / (0.2 + 0.8 * 0.3)
+    )
+    assert simulation.unread_textures == 0
+
+
+def test_a_texture_whose_place_is_not_known_counts_as_unread(load):
+    """The base color counts then, as before, and a line at the start says so."""
+    look = LOOK.replace("baseColorMap", "baseColor 0.5 1 1 baseColorMap")
+    nodes = [f"Shape {{ appearance {look} geometry {geometry} }}" for geometry in ("Cone { }", "Plane { }")]
+    nodes.append(f"CircleArena {{ translation 9 0 0 floorAppearance {look} }}")
+    nodes.append(f"Shape {{ appearance {look.replace('reds.png', 'missing.png')} geometry Box {{ }} }}")
+    simulation = load(" ".join(nodes) + robot(INFRARED))
+    move(simulation, "R", frame((9.2, 0.1, 1.0), (0, 1, 0), math.pi / 2) @ MOUNT.inverse)
+    simulation.step(STEP_MS)
+
+    assert simulation.unread_textures == 3
+    assert device(simulation, "eye").value == pytest.approx(1.0 / (0.2 + 0.8 * 0.5))

@@ -89,7 +89,7 @@ class _Target:
         self._thing = thing
         self._paint: Paint | None = None
         if textures is not None and thing.look is not None:
-            self._paint = textures.paint(thing.look, thing.geometry, thing.color[3])
+            self._paint = textures.paint(thing.look, thing.geometry, thing.color[3], thing.tiles)
         self.hit = _surface(thing)
         self.radius_m = _radius(thing)
         self.reflection = reflection(thing)

@@ -125,7 +125,7 @@ class Simulation:
     @property
     def unread_textures(self) -> int:
         """How many visible shapes have a texture that infra-red sensors do not see."""
-        return sum(self._view.textures.unread(thing.look, thing.geometry) for thing in self._view.things())
+        return self._view.unread_textures()
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:

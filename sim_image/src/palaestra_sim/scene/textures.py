@@ -87,13 +87,16 @@ class Textures:
         self._read = read
         self._images: dict[tuple[str, str], tuple[int, int, bytes] | None] = {}
 
-    def paint(self, look: SceneNode, geometry: str, opaque: float) -> Paint | None:
+    def paint(
+        self, look: SceneNode, geometry: str, opaque: float, tiles: Coordinates = (1.0, 1.0)
+    ) -> Paint | None:
         """Return the paint of a shape; None if no texture of it counts, or none can be read.
 
         Args:
             look: its Appearance or PBRAppearance.
             geometry: the type of its geometry.
             opaque: 1 minus its transparency.
+            tiles: how often its texture repeats along u and v, from the lower left.
         """
         mapped = MAPPINGS.get(geometry)
         node = texture_of(look)
@@ -110,12 +113,8 @@ class Textures:
             image=image,
             rough=self._of_field(look, "roughnessMap"),
             hollow=self._of_field(look, "occlusionMap"),
-            mapped=lambda point: transform(mapped(point)),
+            mapped=lambda point: transform(_tiled(mapped(point), tiles)),
         )
-
-    def unread(self, look: SceneNode | None, geometry: str) -> bool:
-        """Return whether a shape has a texture that does not count."""
-        return look is not None and texture_of(look) is not None and self.paint(look, geometry, 1.0) is None
 
     def _of_field(self, look: SceneNode, field: str) -> Image | None:
         return next((self._image(node) for node in look.nodes(field)), None)
@@ -155,6 +154,10 @@ def _bounded(part: float, *, repeat: bool) -> float:
     if not math.isfinite(part):
         return 0.0
     return part % 1.0 if repeat else max(0.0, min(1.0, part))
+
+
+def _tiled(place: Coordinates, tiles: Coordinates) -> Coordinates:
+    return place[0] * tiles[0], 1.0 - (1.0 - place[1]) * tiles[1]
 
 
 def _on_plane(point: Vector) -> Coordinates:
