@@ -50,10 +50,18 @@ AROUND = [
         partial(rays.cylinder, radius=0.5, height=0.8),
     ),
 ]
-# Another robot, which is low.
+# Robots: one that is low; one that is long, with a mast in its middle.
 OTHER = frame((2.0, 2.5, 0.0))
 OTHER_SHAPE = "Pose { translation 0 0 0.15 children [ Cylinder { radius 0.4 height 0.3 } ] }"
 OTHER_FORMULA = partial(rays.cylinder, radius=0.4, height=0.3)
+MAST = frame((-0.6, -1.6, 0.0), angle_rad=0.5)
+MAST_SHAPES = """Group { children [
+  Pose { translation 0 0 0.2 children [ Box { size 0.9 0.4 0.4 } ] }
+  Pose { translation 0.1 0 0.7 children [ Cylinder { radius 0.08 height 0.6 } ] } ] }"""
+MAST_FORMULAS = [
+    (frame((0.0, 0.0, 0.2)), partial(rays.box, size=(0.9, 0.4, 0.4))),
+    (frame((0.1, 0.0, 0.7)), partial(rays.cylinder, radius=0.08, height=0.6)),
+]
 PLACES = [
     (0.0, 0.0, 0.0),
     (0.5, 0.4, 0.9),
@@ -84,17 +92,19 @@ def simulation_of(setting):
     turned = setting.put(frame()).fields  # z of a robot points up in every system of axes
     other = f"""DEF OTHER Robot {{ {setting.put(OTHER).fields} name "o" controller "<none>"
       boundingObject {OTHER_SHAPE} }}"""
-    return setting.load(solids + robot(wheels + sensors, turned) + other)
+    mast = f"""Robot {{ {setting.put(MAST).fields} name "m" controller "<none>"
+      boundingObject {MAST_SHAPES} }}"""
+    return setting.load(solids + robot(wheels + sensors, turned) + other + mast)
 
 
 def expected(pose, height, azimuth, other):
     """Return the distance to the nearest of all shapes."""
     sensor = pose @ frame((0.05, -0.02, height), (0, 0, 1), azimuth)
     distances = [REACH_M]
-    for place, formula in [
-        *((place, formula) for place, _, formula in AROUND),
-        (other @ frame((0, 0, 0.15)), OTHER_FORMULA),
-    ]:
+    shapes = [(place, formula) for place, _, formula in AROUND]
+    shapes.append((other @ frame((0.0, 0.0, 0.15)), OTHER_FORMULA))
+    shapes += [(MAST @ place, formula) for place, formula in MAST_FORMULAS]
+    for place, formula in shapes:
         ray = place.inverse @ sensor
         distances.append(formula(ray.position, ray.rotation[:, 0]))
     return min(distances)

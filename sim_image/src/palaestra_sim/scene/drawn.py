@@ -1,7 +1,8 @@
 """From the nodes of a world to what cameras see: shapes, each with a color and the place that carries it.
 
 Lights and mesh files are not read, and no texture: a shape has one color. A stand-in has the shapes of its
-outline, in the color of its first appearance that is not of another part. What a scale distorts keeps its angles.
+outline, in the color of its first appearance that is not of another part. What a scale distorts keeps its
+angles.
 """
 
 from __future__ import annotations

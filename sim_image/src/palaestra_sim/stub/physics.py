@@ -12,6 +12,7 @@ from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.movies import Movie
@@ -23,8 +24,11 @@ from palaestra_sim.scene.surroundings import Surroundings
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
+from palaestra_sim.stub.others import OtherRobot
 from palaestra_sim.stub.outline import covering, obstacle, prismatic
-from palaestra_sim.stub.rays import Fan, Rounded, SlopedBeams, Upright
+from palaestra_sim.stub.rays import Fan, Met, Rounded, SlopedBeams, Upright
+
+_Tall = tuple[Shape, tuple[float, float]]  # with its lower and its upper end
 
 
 class _Level(NamedTuple):
@@ -57,6 +61,8 @@ class StubPhysics:
         self._moving: list[tuple[Figure, StubBody]] = []
         self._surroundings = Surroundings()
         self._solids: tuple[Shape, ...] = ()
+        self._tall: list[_Tall] = []
+        self._parts: dict[StubBody, list[tuple[Shape, Pose]]] = {}
         self._level: dict[Figure, list[_Level]] = {}
         self._sloped: dict[Figure, list[SlopedBeams]] = {}
         self._view: View
@@ -65,7 +71,10 @@ class StubPhysics:
         """Return the body of a robot: upright cylinders, between its heights."""
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
-        return StubBody(build.base, outline, rim, build.heights)
+        body = StubBody(build.base, outline, rim, build.heights)
+        # Read now, in the robot's frame; later the places are those in the world.
+        self._parts[body] = [(shape, shape.pose.inverse) for shape in build.outline]
+        return body
 
     def begin(self, surroundings: Surroundings) -> None:
         """Take the floors of the world; there are no forces."""
@@ -81,20 +90,22 @@ class StubPhysics:
         """Set the obstacles of each robot and of its rays."""
         del loose, doors  # refused, see `abilities`
         self._solids = tuple(solids)
+        self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
         self._level = {it: beams for it, beams in self._level.items() if it in figures}
         self._sloped = {it: beams for it, beams in self._sloped.items() if it in figures}
         for figure in figures:
             others = [(it, body) for it, body in self._moving if it is not figure and body.radius > 0.0]
-            self._face(figure, others)
+            robots = [(body, OtherRobot(body, it.place, self._parts[body])) for it, body in others]
+            self._face(figure, robots)
             if not self._sloped.get(figure):
                 continue
             around = [shape for shape in solids if not _is_on(figure, shape)]
             uprights = [_upright(shape) for shape in around if prismatic(shape)]
-            rounded = [_rounded(shape) for shape in around if not prismatic(shape)]
+            rounded: list[Met] = [_rounded(shape) for shape in around if not prismatic(shape)]
+            rounded += [robot for _, robot in robots]
             for sloped in self._sloped[figure]:
-                others_now = [_of_robot(it, body) for it, body in others]
-                sloped.face(uprights, others_now, self._surroundings.heights_m(), rounded)
+                sloped.face(uprights, self._surroundings.heights_m(), rounded)
 
     def advance(self, step_s: float) -> None:
         """Move the bodies on by one basic step."""
@@ -144,62 +155,43 @@ class StubPhysics:
         """Return where robots touch obstacles and each other now."""
         return contact_points(self._moving, self._solids)
 
-    def _face(self, figure: Figure, others: Sequence[tuple[Figure, StubBody]]) -> None:
+    def _face(self, figure: Figure, others: Sequence[tuple[StubBody, OtherRobot]]) -> None:
         height = figure.place.height_m
         body = figure.body
         if isinstance(body, StubBody) and body.radius > 0.0:
-            in_the_way = _between(self._solids, body.heights, height)
-            body.face(_neighborhood(in_the_way, body.radius), [it for _, it in others])
+            in_the_way = [shape for shape, _ in _between(self._tall, body.heights, height)]
+            body.face(_neighborhood(in_the_way, body.radius), [it for it, _ in others])
         for level in self._level.get(figure, ()):
             self._face_level(level, height, others)
 
-    def _face_level(self, level: _Level, height: float, others: Sequence[tuple[Figure, StubBody]]) -> None:
+    def _face_level(
+        self, level: _Level, height: float, others: Sequence[tuple[StubBody, OtherRobot]]
+    ) -> None:
         """Set the obstacles of level beams: for all at once what all of them meet, for each the others."""
         low, high = level.heights[0] + height, level.heights[1] + height
-        fan, rest = level.fan, level.rest
-        in_reach = _between(self._solids, level.heights, height)
-        whole = [shape for shape in in_reach if prismatic(shape) and _covers(shape.heights(), low, high)]
-        partly = [shape for shape in in_reach if shape not in whole]
-        robots = [(_of_robot(it, body), body) for it, body in others]
-        robots = [
-            (upright, body) for upright, body in robots if upright.low_m < high and low < upright.high_m
-        ]
-        fan.face(
-            _neighborhood(whole, fan.reach_m),
-            [body for upright, body in robots if _covers((upright.low_m, upright.high_m), low, high)],
-        )
-        rest.face(
-            [_upright(shape) for shape in partly if prismatic(shape)],
-            [upright for upright, _ in robots if not _covers((upright.low_m, upright.high_m), low, high)],
-            (),
-            [_rounded(shape) for shape in partly if not prismatic(shape)],
-        )
+        whole, partly = [], []
+        rounded: list[Met] = [robot for _, robot in others if not robot.stands_along(low, high)]
+        for shape, (bottom, top) in _between(self._tall, level.heights, height):
+            if not prismatic(shape):
+                rounded.append(_rounded(shape))
+            elif bottom < low and high < top:
+                whole.append(shape)
+            else:
+                partly.append(_upright(shape))
+        along = [body for body, robot in others if robot.stands_along(low, high)]
+        level.fan.face(_neighborhood(whole, level.fan.reach_m), along)
+        level.rest.face(partly, (), rounded)
 
 
-def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
+def _between(tall: Sequence[_Tall], heights: tuple[float, float], shift: float) -> list[_Tall]:
     """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
     low, high = heights[0] + shift, heights[1] + shift
-    found = []
-    for shape in solids:
-        bottom, top = shape.heights()
-        if bottom < high and top > low:
-            found.append(shape)
-    return found
-
-
-def _of_robot(figure: Figure, body: StubBody) -> Upright:
-    height = figure.place.height_m
-    return Upright(body, body.heights[0] + height, body.heights[1] + height)
+    return [(shape, ends) for shape, ends in tall if ends[0] < high and ends[1] > low]
 
 
 def _is_on(figure: Figure, shape: Shape) -> bool:
     """Return whether a shape is a part of a robot, whose own rays pass it."""
     return figure.place in shape.place.chain()
-
-
-def _covers(heights: tuple[float, float], low: float, high: float) -> bool:
-    """Return whether a range of heights has all of another one; touching its end is not enough."""
-    return heights[0] < low and high < heights[1]
 
 
 def _rounded(shape: Shape) -> Rounded:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 from palaestra_sim.scene.beams import Beam, Ray
 from palaestra_sim.scene.geometry import Pose, Vector
@@ -82,38 +82,43 @@ class Rounded(NamedTuple):
         return first_hit(self.shape, self.inward.carry(origin), self.inward.turned(direction))
 
 
+class Met(Protocol):
+    """What rays meet at its surface."""
+
+    def hit(self, origin: Vector, direction: Vector) -> float:
+        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        ...
+
+
 class SlopedBeams:
     """The beams of one robot that may climb or fall, cast one by one.
 
     Besides the obstacles there are floors, which have no end.
     """
 
-    __slots__ = ("_beams", "_floors", "_others", "_rounded", "_solids", "distances")
+    __slots__ = ("_beams", "_floors", "_rounded", "_solids", "distances")
 
     def __init__(self, beams: Sequence[Beam]) -> None:
         self._beams = tuple(beams)
         self._solids: tuple[Upright, ...] = ()
-        self._others: tuple[Upright, ...] = ()
-        self._rounded: tuple[Rounded, ...] = ()
+        self._rounded: tuple[Met, ...] = ()
         self._floors: tuple[float, ...] = ()
         self.distances = [beam.reach_m for beam in beams]
 
     @property
     def free(self) -> bool:
         """Whether there is no obstacle."""
-        return not (self._solids or self._others or self._rounded)
+        return not (self._solids or self._rounded)
 
     def face(
         self,
         solids: Sequence[Upright],
-        others: Sequence[Upright],
         floors_m: Sequence[float] = (0.0,),
-        rounded: Sequence[Rounded] = (),
+        rounded: Sequence[Met] = (),
     ) -> None:
-        """Set the obstacles of the beams: standing ones, robots, and all others; and heights of floors."""
+        """Set the obstacles of the beams: upright ones and others, and the heights of floors."""
         self._rounded = tuple(rounded)
         self._solids = tuple(solids)
-        self._others = tuple(others)
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
@@ -137,7 +142,7 @@ class SlopedBeams:
                 along = (floor - start) / beam.slope
                 if along >= 0.0:
                     nearest = min(nearest, along)
-        for outline, low, high in (*self._solids, *self._others):
+        for outline, low, high in self._solids:
             enter, leave = outline.crossing(frame, beam.ray)
             below, above = _between(low - start, high - start, beam.slope)
             enter = max(enter, below, 0.0)
