@@ -54,6 +54,7 @@ class Shape:
         tolerance: absolute, in meters.
         bounding: whether a boundingObject may have it.
         seen: the formula of the visible shape, if it is another one.
+        volume_m3: None if it encloses none.
         name: of the row, if its type has several.
     """
 
@@ -64,6 +65,7 @@ class Shape:
     tolerance: float = 1e-5
     bounding: bool = True
     seen: Callable | None = None
+    volume_m3: float | None = None
     name: str = ""
 
     def __str__(self):
@@ -84,6 +86,7 @@ SHAPES = (
             ((2.0, -1.0, 0.38), (-0.45, -0.1, 0.38)),
             ((2.0, 0.0, 0.5), (0.0, 0.0, 0.5)),
         ),
+        volume_m3=1.0 * 0.6 * 0.8,
     ),
     Shape(
         "Sphere",
@@ -97,6 +100,7 @@ SHAPES = (
             ((1.0, 0.0, 0.48), (-1.0, 0.0, 0.48)),
             ((1.0, 0.4, 0.4), (-1.0, 0.4, 0.4)),
         ),
+        volume_m3=4.0 / 3.0 * np.pi * 0.5**3,
     ),
     Shape(
         "Cylinder",
@@ -111,6 +115,7 @@ SHAPES = (
             ((2.0, 0.45, 0.39), (-2.0, 0.45, 0.39)),
             ((2.0, 0.45, 0.41), (-2.0, 0.45, 0.41)),
         ),
+        volume_m3=np.pi * 0.5**2 * 0.8,
     ),
     Shape(
         "Capsule",
@@ -124,6 +129,7 @@ SHAPES = (
             ((1.0, 1.0, 1.5), (0.0, 0.1, 0.5)),
             ((2.0, 0.25, 0.6), (-2.0, 0.25, 0.6)),
         ),
+        volume_m3=np.pi * 0.3**2 * 0.8 + 4.0 / 3.0 * np.pi * 0.3**3,
     ),
     Shape(
         "Plane",
@@ -150,6 +156,7 @@ SHAPES = (
             ((0.2, 1.0, 2.0), (0.3, 1.2, 0.0)),
             ((3.0, 2.5, 0.0), (1.0, 2.2, 0.0)),
         ),
+        volume_m3=2.0 * 0.5 + 1.5 * 0.5,
     ),
     Shape(
         "IndexedFaceSet",

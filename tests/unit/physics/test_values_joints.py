@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.values.frames import Frame, frame, quaternion, turn
+from tests.values.shapes import SHAPES
 from tests.values.standing import MOUNT, POSES
 from tests.values.worlds import SETTINGS, STEP_MS, Setting, cached, device, move, robot
 
@@ -127,6 +128,24 @@ def test_a_torque_and_a_force_speed_up_what_they_move(axis, away, inertia):
     assert device(simulation, "angle").value == pytest.approx(1.5 / inertia * time_s**2 / 2.0, rel=0.01)
     assert device(simulation, "way").value == pytest.approx(-2.0 / 3.0 * time_s**2 / 2.0, rel=0.01)
     assert device(simulation, "turn").speed_rad_s == pytest.approx(1.5 / inertia * time_s, rel=1e-3)
+
+
+SLEDGE = """SliderJoint {{
+  jointParameters JointParameters {{ axis 0.6 0.8 0 }}
+  device [ LinearMotor {{ name "push" maxForce 1000 maxVelocity 100 }} PositionSensor {{ name "way" }} ]
+  endPoint Solid {{ translation 0 0 5 boundingObject {} physics Physics {{ density 200 }} }} }}"""
+
+
+@pytest.mark.parametrize("shape", [it for it in SHAPES if it.volume_m3], ids=str)
+def test_a_shape_has_the_mass_of_its_volume(shape):
+    """MuJoCo: 200 kg/m3, by the acceleration that a force of 100 N gives it; a hull would be heavier."""
+    base = "translation 0 0 1 boundingObject Box { size 0.1 0.1 0.1 }"
+    simulation = Setting("mujoco").load(robot(SLEDGE.format(shape.node), base))
+    device(simulation, "push").set_effort(100.0)
+    simulation.step(50 * STEP_MS)
+
+    speed = 100.0 / (200.0 * shape.volume_m3) * 50 * STEP_S
+    assert device(simulation, "push").speed_rad_s == pytest.approx(speed, rel=1e-3)
 
 
 @pytest.mark.parametrize("damping", [0.5, 2.0, 8.0])

@@ -165,21 +165,21 @@ def test_values_that_differ_from_webots_are_named(check):
     """A policy that learns from them meets others in Webots."""
     mesh = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 1 ] } }"
     devices = """DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }
-        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 }"""
+        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 } Gyro { }
+        Solid { physics Physics { } children [ Accelerometer { } ] }"""
     robot = f'Robot {{ controller "ros" controllerArgs ["--name=a" "--synchronize"] children [ {devices} ] }}'
 
     look = 'PBRAppearance { baseColorMap ImageTexture { url "https://example.com/line.png" } }'
-    shapes = (
-        f"Shape {{ appearance {look} geometry Plane {{ }} }} Shape {{ appearance {look} geometry {mesh} }}"
-    )
+    shape = f"Shape {{ appearance {look} geometry Plane {{ }} }}"
 
-    code, lines = check(f"Solid {{ children [ {shapes} ] boundingObject {mesh} }} {robot}")
+    code, lines = check(f"Solid {{ children [ {shape} ] boundingObject {mesh} }} {robot}")
 
     assert code == 0
     assert lines[1:] == [
         "differs from Webots: 1 infra-red DistanceSensor: rays pass the robot itself",
         "differs from Webots: 1 Shape with a texture that infra-red DistanceSensors do not see",
         "differs from Webots: 1 Lidar: rays pass the robot itself",
+        "differs from Webots: 1 Gyro on what has no physics, where Webots measures nothing",
         "differs from Webots: 1 IndexedFaceSet as boundingObject: its convex hull is touched",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
     ]

@@ -14,11 +14,13 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.scene.tree.catalogue import without_effect
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 _ROLLS_AND_TURNS: Final = 2
 _MOST_NAMES: Final = 8  # of devices in one line
+_OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
 class Described(Protocol):
@@ -114,6 +116,7 @@ def differences(simulation: Described) -> Iterator[str]:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
+    yield from _without_physics(robots)
     if meshes:
         yield f"{meshes} IndexedFaceSet as boundingObject: its convex hull is touched"
     rays = (
@@ -125,6 +128,18 @@ def differences(simulation: Described) -> Iterator[str]:
     sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _without_physics(robots: Iterable[RobotParts]) -> Iterator[str]:
+    """Yield a line for each type of sensor that measures nothing in Webots where no Solid has physics."""
+    lacking = Counter(
+        node.type_name
+        for robot in robots
+        for node in robot.devices.nodes.values()
+        if node.type_name in _OF_BODIES and not any(it.nodes("physics") for it in (node, *node.ancestors()))
+    )
+    for type_name, count in sorted(lacking.items()):
+        yield f"{count} {type_name} on what has no physics, where Webots measures nothing"
 
 
 def _not_in_webots(devices: Iterable[tuple[Kind[Any], Any]]) -> Iterator[str]:

@@ -3,7 +3,7 @@
 - `cli`: `palaestra-stub`
 - `physics`: the robots and obstacles of a world
 - `body`, `contacts`: motion, and what a robot runs into
-- `rays`: how far the beams of sensors travel
+- `rays`, `others`: how far the beams of sensors travel, and robots as they meet them
 - `outline`, `obstacles`: shapes, seen from above
 
 `scene` has worlds and devices, `front` the interface of Webots' `ros` controller; all simulators share them.
