@@ -17,6 +17,7 @@ from palaestra_sim.scene.reading import Reading
 _ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
 _ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
+_LEAST_M: Final = 1e-3  # of a side of the box around points
 _ACROSS: Final = 1e-3  # of a unit vector: level, to within a milliradian
 
 Kind = Literal["box", "cylinder", "ball", "capsule", "mesh"]
@@ -172,12 +173,12 @@ def _mesh(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Ite
         reading.refuse(node, "an IndexedFaceSet without points", "give it a Coordinate with points")
         return
     written = face_set(node)
-    if written is None:  # no face: the box around the points
+    mesh = None if written is None else placed(written, grown.scale)
+    if mesh is None:  # no face
         middle, size = box_of(list(zip(points[0::3], points[1::3], points[2::3], strict=True)))
-        x, y, z = (length * factor for length, factor in zip(size, grown.scale, strict=True))
+        x, y, z = (max(it * factor, _LEAST_M) for it, factor in zip(size, grown.scale, strict=True))
         yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)
         return
-    mesh = placed(written, grown.scale)
     middle, size = box_of(mesh.points)
     centered = Mesh(tuple(minus(point, middle) for point in mesh.points), mesh.triangles)
     local = grown.frame.after(Pose(middle))
