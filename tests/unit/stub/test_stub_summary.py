@@ -179,7 +179,7 @@ def test_values_that_differ_from_webots_are_named(check):
         "differs from Webots: 1 infra-red DistanceSensor: rays pass the robot itself",
         "differs from Webots: 1 Shape with a texture that infra-red DistanceSensors do not see",
         "differs from Webots: 1 Lidar: rays pass the robot itself",
-        "differs from Webots: 1 Gyro on what has no physics, where Webots measures nothing",
-        "differs from Webots: 1 IndexedFaceSet as boundingObject: its convex hull is touched",
+        "differs from Webots: 1 Gyro on a robot without physics: Webots measures nothing there",
+        "differs from Webots: 1 IndexedFaceSet as boundingObject: robots touch its convex hull",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
     ]

@@ -118,7 +118,7 @@ def differences(simulation: Described) -> Iterator[str]:
         yield f"{lidars} Lidar: rays pass the robot itself"
     yield from _without_physics(robots)
     if meshes:
-        yield f"{meshes} IndexedFaceSet as boundingObject: its convex hull is touched"
+        yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"
     rays = (
         beam
         for _, it in devices
@@ -139,7 +139,7 @@ def _without_physics(robots: Iterable[RobotParts]) -> Iterator[str]:
         if node.type_name in _OF_BODIES and not any(it.nodes("physics") for it in (node, *node.ancestors()))
     )
     for type_name, count in sorted(lacking.items()):
-        yield f"{count} {type_name} on what has no physics, where Webots measures nothing"
+        yield f"{count} {type_name} on a robot without physics: Webots measures nothing there"
 
 
 def _not_in_webots(devices: Iterable[tuple[Kind[Any], Any]]) -> Iterator[str]:
