@@ -149,7 +149,7 @@ def _begun(sweep: Sweep, place: LocalBackend | ClusterBackend, folder: Path) -> 
         if optuna_search is None:
             yield InTurn(trials, trial_log.ended(folder))
         else:
-            yield optuna_search.Suggested(sweep, folder)
+            yield optuna_search.OptunaSearch(sweep, folder)
 
 
 def _extra(module: str, purpose: str) -> Any:

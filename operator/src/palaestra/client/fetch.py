@@ -111,7 +111,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
 
 def _copy(api: Api, source: RunSource, target: Path, deadline: float, most_bytes: int) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    program = files("palaestra.client").joinpath("packing.py").read_text(encoding="utf-8")
+    program = files("palaestra.client").joinpath("tar_stream.py").read_text(encoding="utf-8")
     command = ["python3", "-I", "-c", program, source.directory, *PARTS]
     chunks = api.execute(
         source.namespace, source.pod, source.container, command, within_s=deadline - time.monotonic()
