@@ -1,4 +1,4 @@
-"""Changes by others in the operator's objects: each is reported once, and none is undone."""
+"""Changes by other clients in the operator's objects: each is reported once, and none is reverted."""
 
 from collections.abc import Iterator
 
