@@ -1,6 +1,6 @@
-"""Whom the requests of a kubeconfig's user act for: `as` and its companions, as headers.
+"""Headers for impersonation, from `as` and its related fields of a kubeconfig's user.
 
-Source of the names and of the escapes: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
+Source of the names and the escape rules: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
 """
 
 import string
@@ -15,10 +15,10 @@ _LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").enc
 
 
 def impersonation(user: Mapping[str, Any]) -> Headers:
-    """Return the headers of a kubeconfig's user; none if it acts for itself.
+    """Return the headers of a kubeconfig's user; empty without impersonation.
 
     Raises:
-        NotConfigured: a value has another type, or `as` names no user.
+        NotConfigured: a value has a wrong type, or `as` does not name a user.
     """
     groups, extra = user.get(GROUPS) or [], user.get(EXTRA) or {}
     if not isinstance(groups, list):

@@ -1,4 +1,4 @@
-"""A program that gives credentials: `exec` of a kubeconfig's user.
+"""A credential plugin: the program in `exec` of a kubeconfig's user.
 
 Source: https://kubernetes.io/docs/reference/access-authn-authz/authentication/#client-go-credential-plugins
 """
@@ -25,13 +25,13 @@ MODES = (ALWAYS, NEVER, "IfAvailable")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """What a plugin gave.
+    """The credentials from a plugin.
 
     Attributes:
-        token: for the header `Authorization`; None without one.
-        certificate: of the client, as PEM; None without one.
+        token: for the header `Authorization`, or None.
+        certificate: of the client, as PEM, or None.
         key: of that certificate.
-        expires: from when on the plugin has to be asked again; None: never.
+        expires: time after which the plugin must run again; None: never.
     """
 
     token: str | None
@@ -41,15 +41,15 @@ class Credentials:
 
 
 class Plugin:
-    """The program of a kubeconfig's user, which is run whenever its credentials have expired."""
+    """The program of a kubeconfig's user; it runs again when its credentials have expired."""
 
     def __init__(self, entry: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any]) -> None:
         """Check the entry.
 
         Args:
             entry: `exec` of the user.
-            folder: of the kubeconfig, in which a command with a `/` begins.
-            cluster: what a plugin may ask to know of the cluster.
+            folder: folder of the kubeconfig; a command with a `/` is relative to it.
+            cluster: the information about the cluster for the plugin.
 
         Raises:
             NotConfigured: the entry is wrong.
@@ -75,7 +75,7 @@ class Plugin:
         """Run the program and return its credentials.
 
         Raises:
-            Unreachable: it gave none; the message says why.
+            Unreachable: it did not return credentials; the message has the reason.
         """
         interactive = self._mode != NEVER and sys.stdin is not None and sys.stdin.isatty()
         if self._mode == ALWAYS and not interactive:
