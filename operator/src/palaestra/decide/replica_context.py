@@ -20,7 +20,8 @@ class ReplicaContext:
     """One replica that has not ended.
 
     Attributes:
-        old: its status so far. seen: the observation.
+        old: its status so far.
+        seen: the observation.
         counted: its attempts and restarts, including this observation.
         times: the clocks; the wall clock in UTC and whole seconds.
         active_left_s: remaining seconds of the job's active time; None: it has no deadline, or its active
