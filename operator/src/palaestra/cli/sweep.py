@@ -78,9 +78,7 @@ def _sweep(options: argparse.Namespace) -> int:
     if options.cluster:
         return connected(_there)(options)
     if options.namespace or options.context or options.kubeconfig:
-        raise PalaestraError(
-            "--cluster: is missing; give it too, or remove the options that choose a cluster"
-        )
+        raise PalaestraError("--cluster: is missing; add it, or remove the options that choose a cluster")
     return _here(options)
 
 

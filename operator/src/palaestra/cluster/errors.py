@@ -150,7 +150,7 @@ class CommandFailed(PalaestraError):
     """
 
     def __init__(self, code: int, said: str) -> None:
-        super().__init__(f"exit code {code}: {said or 'it said nothing'}")
+        super().__init__(f"exit code {code}: {said or 'no output'}")
         self.code = code
         self.said = said
 

@@ -28,7 +28,9 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
     name, uid = user.get(USER) or "", user.get(UID) or ""
     if not name:
         if groups or extra or uid:
-            raise NotConfigured(f"{USER} is missing beside {GROUPS}, {UID} or {EXTRA}; name the user there")
+            raise NotConfigured(
+                f"{USER} is missing, but required with {GROUPS}, {UID} or {EXTRA}; name the user there"
+            )
         return ()
     found = [("Impersonate-User", _text(name, USER))]
     found += [("Impersonate-Uid", _text(uid, UID))] if uid else []

@@ -90,7 +90,7 @@ def namespace(files: str, context: str | None) -> str | None:
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     if chosen is None:
-        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` names them")
+        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` lists them")
     return str(found) if found else None
 
 
@@ -152,7 +152,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
             add_identity(found, certificate, key)
         except OSError as error:
             raise NotConfigured(
-                f"{CERTIFICATE} and {KEY} cannot be used together ({error}); copy both anew"
+                f"{CERTIFICATE} and {KEY} cannot be used together ({error}); copy both again"
             ) from error
     elif certificate or key:
         missing = KEY if certificate else CERTIFICATE

@@ -203,7 +203,7 @@ class Leadership:
         try:
             self._api.merge(LEASES, self._namespace, self._name, patch, resource_version=self._version)
         except ApiError as error:
-            log.warning("lease left to run out", lease=self._name, error=str(error))
+            log.warning("lease not released", lease=self._name, error=str(error))
 
 
 def _now() -> str:

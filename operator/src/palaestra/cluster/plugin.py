@@ -79,7 +79,7 @@ class Plugin:
         """
         interactive = self._mode != NEVER and sys.stdin is not None and sys.stdin.isatty()
         if self._mode == ALWAYS and not interactive:
-            raise self._failure("needs a terminal for its questions; run the command in one")
+            raise self._failure("needs a terminal for its prompts; run the command in a terminal")
         return self._read(self._run(interactive=interactive))
 
     def _run(self, *, interactive: bool) -> str:
@@ -103,7 +103,7 @@ class Plugin:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise self._failure(f"gave no answer in {WAIT_S:.0f} s; run it by hand") from error
+            raise self._failure(f"did not respond within {WAIT_S:.0f} s; run it by hand") from error
         except (OSError, ValueError) as error:
             raise self._failure(f"cannot be run ({error})") from error
         if ended.returncode:
@@ -127,7 +127,7 @@ class Plugin:
             raise self._failure("gave an answer that is no ExecCredential with a status")
         if answer.get("apiVersion") != self._version:
             given = answer.get("apiVersion")
-            raise self._failure(f"answers in apiVersion {given!r}; the kubeconfig asks for {self._version}")
+            raise self._failure(f"returned apiVersion {given!r}; the kubeconfig requires {self._version}")
         return self._given(status)
 
     def _given(self, status: Mapping[str, Any]) -> Credentials:
@@ -138,7 +138,7 @@ class Plugin:
         if bool(certificate) is not bool(key):
             raise self._failure("gave a certificate without its key, or a key without its certificate")
         if token and not (token.isascii() and token.isprintable()):
-            raise self._failure("gave a token that is no text of one line")
+            raise self._failure("returned a token that is not one line of text")
         return Credentials(
             token=token or None,
             certificate=str(certificate) if certificate else None,
@@ -152,7 +152,7 @@ class Plugin:
         try:
             found = datetime.fromisoformat(str(text))
         except ValueError as error:
-            raise self._failure(f"gave an expirationTimestamp that is no time: {text!r}") from error
+            raise self._failure(f"returned an expirationTimestamp that is not a time: {text!r}") from error
         return found if found.tzinfo else found.replace(tzinfo=UTC)
 
     def _failure(self, fact: str) -> Unreachable:

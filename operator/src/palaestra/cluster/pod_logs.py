@@ -25,7 +25,7 @@ def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
             *whole, pending = (pending + part).split(b"\n")
             yield from (line.decode(errors="replace") for line in whole)
             if time.monotonic() > deadline:
-                raise Unreachable(0, "Timeout", "the answer did not end in time")
+                raise Unreachable(0, "Timeout", "the response did not end in time")
         if pending:
             yield pending.decode(errors="replace")
     finally:

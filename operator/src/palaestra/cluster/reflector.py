@@ -117,7 +117,7 @@ class Reflector:
             self._follow(self._version)
         except Gone:
             self._version = None
-            log.info("lists anew", resource=self._resource.plural)
+            log.info("lists again", resource=self._resource.plural)
         except ApiError as error:
             return error
         return None

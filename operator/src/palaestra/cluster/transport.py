@@ -256,7 +256,7 @@ def read_some(response: BaseHTTPResponse) -> bytes:
     try:
         return response.read1(CHUNK)
     except (HTTPError, OSError, ValueError) as error:  # ValueError: another thread has shut down TLS
-        raise _unreachable(error, "reading the answer") from error
+        raise _unreachable(error, "reading the response") from error
 
 
 def _body(response: BaseHTTPResponse, deadline: float) -> bytes:
@@ -265,9 +265,9 @@ def _body(response: BaseHTTPResponse, deadline: float) -> bytes:
         size += len(part)
         parts.append(part)
         if size > MOST_BYTES:
-            raise Unreachable(response.status, "TooLarge", f"the answer has more than {MOST_BYTES} bytes")
+            raise Unreachable(response.status, "TooLarge", f"the response has more than {MOST_BYTES} bytes")
         if time.monotonic() > deadline:
-            raise Unreachable(0, "Timeout", "the answer did not end in time")
+            raise Unreachable(0, "Timeout", "the response did not end in time")
     return b"".join(parts)
 
 
@@ -275,9 +275,9 @@ def _decoded(body: bytes, what: str) -> dict[str, Any]:
     try:
         answer = json.loads(body)
     except ValueError as error:
-        raise Unreachable(0, "Unreadable", f"{what}: the answer is no JSON ({error})") from error
+        raise Unreachable(0, "Unreadable", f"{what}: the response is not JSON ({error})") from error
     if not isinstance(answer, dict):
-        raise Unreachable(0, "Unreadable", f"{what}: the answer is no JSON object")
+        raise Unreachable(0, "Unreadable", f"{what}: the response is not a JSON object")
     return answer
 
 

@@ -73,7 +73,7 @@ def _event(line: bytes) -> dict[str, Any]:
         event = json.loads(line)
         kind, found = str(event["type"]), dict(event["object"])
     except (ValueError, KeyError, TypeError) as error:
-        raise Unreachable(0, "Unreadable", f"the watch carries no event ({error})") from error
+        raise Unreachable(0, "Unreadable", f"the watch sent a line that is not an event ({error})") from error
     if kind == "ERROR":
         code = found.get("code")
         raise from_status(code if isinstance(code, int) else SERVER_ERROR, found)

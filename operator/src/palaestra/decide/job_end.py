@@ -90,7 +90,7 @@ def job_failed(situation: ReplicaContext) -> Finding | None:
     if job is None or job.end is None:
         return None
     words = ": ".join(word for word in (job.end_reason, job.end_message) if word)
-    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it does not say why"))
+    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it has no reason"))
 
 
 def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:

@@ -277,7 +277,7 @@ def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
     if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:
         line = _last_line(before) or before.exit.reason or "no word"
         return f"container {before.name}: exit code {before.exit.code}, {line}"
-    words = _last_line(trainer) or pod.message or pod.reason or "no word from the trainer"
+    words = _last_line(trainer) or pod.message or pod.reason or "no message from the trainer"
     return f"exit code {code}, {words}" if code is not None else words
 
 

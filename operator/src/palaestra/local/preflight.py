@@ -80,7 +80,7 @@ def no_module_is_shadowed(request: PreflightRequest) -> Iterator[str]:
 def nothing_is_put_off(request: PreflightRequest) -> Iterator[str]:
     """The job is not suspended, because a local run has no operator to resume it."""
     if request.job.spec.suspend:
-        yield "spec.suspend: is true, which puts the training off; set it to false to train now"
+        yield "spec.suspend: is true, so the job would not train; set it to false to train now"
 
 
 def programs_exist(request: PreflightRequest) -> Iterator[str]:

@@ -156,7 +156,7 @@ def _tell(outcome: RunOutcome, path: Path) -> None:
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
     elif outcome.reason == DEADLINE_EXCEEDED:
-        say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds is over; raise it to go on")
+        say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds has passed; raise it to continue")
     elif not outcome.finished:
         what = "interrupted, and failed" if outcome.interrupted else "failed"
         log = path / "logs" / "trainer.log"

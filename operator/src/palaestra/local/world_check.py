@@ -56,7 +56,7 @@ async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> WorldChec
     if code == NOT_RUNNABLE:
         text = f"{program} is not installed on this machine"
     elif code == _TIMED_OUT:
-        text = f"{program} did not answer within {_DEADLINE_S:.0f} s"
+        text = f"{program} did not respond within {_DEADLINE_S:.0f} s"
     return WorldCheckResult(driver=driver.value, starts=code == 0, text=text)
 
 

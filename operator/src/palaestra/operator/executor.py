@@ -120,7 +120,7 @@ class Executor:
         name = obj["metadata"]["name"]
         found = self._strangers.meet(key, uid, name)
         if found is None or not owners(found) & owners(obj):
-            words = f"Job {name} is there already, and is not this job's; delete it"
+            words = f"Job {name} already exists, and another object owns it; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _see_config_map(self, namespace: str, obj: Object) -> None:

@@ -78,7 +78,9 @@ class FencedClient:
     def _check(self) -> None:
         term = self._term()
         if term is None or term != getattr(self._look, "term", term):
-            raise NotLeading("the Lease may have passed on since this was decided; it is not written")
+            raise NotLeading(
+                "another operator may have taken the Lease since the decision; the write is refused"
+            )
 
 
 def difference(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:

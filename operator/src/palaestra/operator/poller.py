@@ -122,7 +122,7 @@ class Poller:
             entry.refused = True
         except Exception:  # the response of one pod must not end the polling of all others
             if not entry.refused:
-                log.exception("answer not read", job=target.key, pod=target.uid)
+                log.exception("response not read", job=target.key, pod=target.uid)
             entry.refused = True
         return None
 
@@ -141,7 +141,7 @@ async def _get_status(target: PollTarget) -> bytes:
         head = await reader.readuntil(b"\r\n\r\n")
         version, _, status = head.partition(b"\r\n")[0].partition(b" ")
         if not version.startswith(b"HTTP/1.") or not status.startswith(b"200"):
-            raise ProtocolError("head: the answer is not 200 of HTTP")
+            raise ProtocolError("head: the response is not HTTP 200")
         return await _read_all(reader)
     finally:
         writer.transport.abort()  # no need to wait until the pod closes

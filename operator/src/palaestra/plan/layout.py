@@ -226,7 +226,7 @@ class LocalLayout:
     def another_run(self, uid: str, replica: int) -> str:
         """Raise an error, because a laptop has no claims."""
         raise PlanError(
-            "spec.storage.resumeFrom: names a run on a claim of a cluster, which is not to be had here; "
+            "spec.storage.resumeFrom: names a run on a claim of a cluster, but this machine has no claims; "
             "remove it. A job that is run again resumes from its own run directory, and more "
             "spec.trainer.steps prolong it"
         )
