@@ -1,4 +1,4 @@
-"""What the pages show can be typed."""
+"""The examples on the pages work when they are typed."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ PAGES = sorted(
 
 
 def blocks(language, pages=PAGES):
-    """Return every block of a language, with the page it stands on."""
+    """Return every block of a language, with its page."""
     return [
         pytest.param(text, id=f"{page.stem}-{number}")
         for page in pages
@@ -26,20 +26,20 @@ def blocks(language, pages=PAGES):
 
 @pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page.name != "README.md"]))
 def test_python_runs(text):
-    """The README's own block is a file in examples/, with a test of its own."""
+    """The README's own block is a file in examples/, which has its own test."""
     exec(compile(text, "<page>", "exec"), {})
 
 
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_whole_jobs_are_right(text):
-    """Parts of a job are checked where they are explained; whole ones load."""
+    """Parts of a job are checked where they are explained; complete ones must load."""
     if "kind: TrainingJob" in text:
         palaestra.api.load(text, "page")
 
 
 @pytest.mark.parametrize("text", blocks("console"))
 def test_every_verb_that_is_typed_exists(text):
-    """`make help` and the pages tell the same."""
+    """`make help` and the pages must agree."""
     makefile = (ROOT / "Makefile").read_text()
 
     verbs = re.findall(r"^make (\w+)", text, re.MULTILINE)
@@ -49,7 +49,7 @@ def test_every_verb_that_is_typed_exists(text):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_link_and_picture_is_there(page):
-    """Relative to the page it stands on."""
+    """Paths are relative to the page."""
     targets = re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\"]+)", page.read_text())
 
     assert [target for target in targets if not (page.parent / target).exists()] == []

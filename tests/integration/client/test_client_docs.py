@@ -1,4 +1,4 @@
-"""What docs/tools.md shows can be typed."""
+"""The script and the commands in docs/tools.md work as written."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +16,10 @@ PAGE = (ROOT / "docs/tools.md").read_text()
 
 
 def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
-    """From apply to delete, in the namespace of the context; the operator's word is the test's."""
+    """The script goes from apply to delete, in the context's namespace.
+
+    The test writes the statuses of the operator.
+    """
     [script] = blocks(PAGE, "python with-a-cluster")
     kubeconfig = yaml.safe_load(control_plane.kubeconfig.read_text())
     kubeconfig["contexts"][0]["context"]["namespace"] = place.name
@@ -36,5 +39,5 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
 
 
 def test_every_command_of_the_page_exists_and_every_command_is_on_it():
-    """Each has a row."""
+    """Each command has a row in the table."""
     assert set(re.findall(r"^\| `palaestra (\w+)", PAGE, re.MULTILINE)) == set(COMMANDS)

@@ -52,8 +52,6 @@ def _mutable() -> Iterator[str]:
 
 
 MUTABLE = frozenset(_mutable())  # `STEPS` may be raised, which prolongs the run
-# In records up to a5276f3; since then the plan decides these.
-DEFAULTS_UNTIL_A5276F3 = {"spec.simulators.recycle.afterResets": 24}
 
 
 def job_directory(runs: Path, job: str) -> Path:
@@ -116,9 +114,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        RunRefused: they differ in fields that a run cannot change, and this is no correction; one line for
-        each
-            field.
+        RunRefused: they differ in fields that a run cannot change, and the job is not a correction; one line
+            for each field.
     """
     changes = _changes(directory, record)
     if changes and not _learned_nothing(directory):
@@ -179,8 +176,7 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
     old, new = dict(_flat(before)), dict(_flat(now))
     for field in sorted(old.keys() | new.keys()):
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
-        left_out = is_now is None and DEFAULTS_UNTIL_A5276F3.get(name) == was
-        allowed = name in MUTABLE or left_out or (name == STEPS and _raised(was, is_now))
+        allowed = name in MUTABLE or (name == STEPS and _raised(was, is_now))
         if was != is_now and not allowed:
             remedy = "; raise it to prolong the run, it cannot be lowered" if name == STEPS else ""
             yield f"{field}: was {_short(was)}, is {_short(is_now)}{remedy}"

@@ -245,8 +245,8 @@ class JobView:
     Attributes:
         version: its resourceVersion.
         suspended: `spec.suspend`.
-        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: an earlier
-            release created the Job, or the Job has a queue.
+        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: the Job has no
+            annotation, for example because the operator created it for a queue.
         suspension: the operator's mark of the pod that its last suspension ended, or None.
         paused: the time of its suspension by the Job controller's clock; None: it is not suspended.
         resumed: the time of its last resumption by the Job controller's clock; None: it was never suspended

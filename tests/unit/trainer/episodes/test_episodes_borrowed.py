@@ -1,6 +1,6 @@
-"""What an environment lends and borrows: it may keep and write into all that it gets or returns.
+"""An environment may keep and change every object that it gets or returns.
 
-Each test plays a hostile environment, and an honest one that returns new objects. The results must be equal.
+Each test uses a hostile environment, and an honest one that returns new objects. The results must be equal.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ ACTED = spaces.Box(-1, 1, (2,), np.float32)
 
 
 class Honest(gymnasium.Env):
-    """Episodes of three steps; everything that it returns is new."""
+    """Episodes of three steps; every returned object is new."""
 
     observation_space, action_space = OBSERVED, ACTED
 
     def reset(self, *, seed=None, options=None):
-        """Begin; what happened before does not matter."""
+        """Begin an episode that does not depend on earlier ones."""
         super().reset(seed=seed)
         self.step_number, self.sum = 0, np.zeros(2, np.float32)
         return self.seen(np.full(2, -50, np.float32)), {"begun": [seed is not None, dict(options or {})]}
@@ -52,7 +52,7 @@ class Honest(gymnasium.Env):
 
 
 class Hostile(Honest):
-    """Returns the same objects for its whole life, and writes into all that it gets."""
+    """An environment that always returns the same objects, and changes those that it gets."""
 
     def __init__(self):
         self.numbers = np.zeros(4, np.float32)[::2]  # a view that is not contiguous
@@ -61,7 +61,7 @@ class Hostile(Honest):
         self.info = {}
 
     def reset(self, *, seed=None, options=None):
-        """Begin, and empty the options."""
+        """Begin an episode, and empty the options."""
         seen, info = super().reset(seed=seed, options=options)
         (options or {}).clear()
         self.info.clear()
@@ -78,29 +78,29 @@ class Hostile(Honest):
         return seen, reward, terminated, truncated, self.info
 
     def seen(self, numbers):
-        """Return the only observation."""
+        """Return the only observation object."""
         self.numbers[:] = numbers
         self.observation["place"] = self.step_number
         return self.observation
 
 
 class Frozen(Hostile):
-    """Its infos cannot be written into."""
+    """An environment whose infos are read-only."""
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         seen, info = super().reset(seed=seed, options=options)
         return seen, MappingProxyType(info)
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         *others, info = super().step(action)
         return *others, MappingProxyType(info)
 
 
 @pytest.fixture
-def keeper(make_member):
-    """The keeper of a member with an environment."""
+def restarter(make_member):
+    """The restarter of a member with an environment."""
 
     def make(environment):
         member = make_member("collect-0")
@@ -115,29 +115,29 @@ def actions():
     return np.random.default_rng(1).uniform(-1, 1, (STEPS, 1, 2)).astype(np.float32)
 
 
-def collected(keeper):
+def collected(restarter):
     """Return the rows of the training loop, and the actions that an exact resume repeats."""
-    env = SimulatorsVecEnv([keeper], 1)
+    env = SimulatorsVecEnv([restarter], 1)
     rows = [env.reset(), *(env.step(action) for action in actions())]
     return rows, env.reset_infos, env.snapshot()[0].actions
 
 
-def tolerated(keeper):
+def tolerated(restarter):
     """Return the rows of Stable-Baselines3's interface."""
-    env = FaultTolerantVecEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantVecEnv(EnvGroup([restarter], lambda: None))
     env.seed(1)
     return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
 
 
-def vectorized(keeper):
+def vectorized(restarter):
     """Return the rows of gymnasium's vector interface."""
-    env = FaultTolerantVectorEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantVectorEnv(EnvGroup([restarter], lambda: None))
     return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
 
 
-def alone(keeper):
+def alone(restarter):
     """Return the rows of a single environment."""
-    env = FaultTolerantEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantEnv(EnvGroup([restarter], lambda: None))
     rows = []
     for number, [action] in enumerate(actions()):
         if number % LENGTH == 0:
@@ -146,23 +146,23 @@ def alone(keeper):
     return rows
 
 
-def evaluated(keeper):
+def evaluated(restarter):
     """Return the episodes of an evaluation."""
-    return [episode.record() for episode in evaluate(Fixed(), keeper, [1, 2]).episodes]
+    return [episode.record() for episode in evaluate(Fixed(), restarter, [1, 2]).episodes]
 
 
 class Fixed:
-    """A policy that returns the same array each time."""
+    """A policy that always returns the same array."""
 
     action = np.array([0.5, -0.5], np.float32)
 
     def predict(self, _observation, state=None, _episode_start=None, **_options):
-        """Return it."""
+        """Return the array."""
         return self.action, state
 
 
 def plain(value):
-    """Return a value with its arrays as lists, and without the seconds of episodes."""
+    """Return a value with its arrays as lists, and without the duration of episodes."""
     if isinstance(value, dict):
         return {key: plain(part) for key, part in value.items() if key != "t"}
     if isinstance(value, list | tuple):
@@ -172,15 +172,15 @@ def plain(value):
 
 @pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
 @pytest.mark.parametrize("hostile", [Hostile, Frozen])
-def test_what_an_environment_does_with_its_objects_changes_nothing(keeper, played, hostile):
+def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
     """Else a last observation is the next episode's first, and an exact resume repeats other actions."""
-    assert plain(played(keeper(hostile))) == plain(played(keeper(Honest)))
+    assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 
 
-def test_actions_of_the_training_loop_stay_as_they_are(keeper):
+def test_actions_of_the_training_loop_stay_as_they_are(restarter):
     """They go into the buffer after the step."""
     given = actions()[0]
-    env = SimulatorsVecEnv([keeper(Hostile)], 1)
+    env = SimulatorsVecEnv([restarter(Hostile)], 1)
     env.reset()
 
     env.step(given)
@@ -189,7 +189,7 @@ def test_actions_of_the_training_loop_stay_as_they_are(keeper):
 
 
 class Judge(Honest):
-    """Computes rewards of goals in the memory of the goals."""
+    """A task that computes rewards in the memory of the goals."""
 
     def compute_reward(self, achieved, desired, _info):
         """Return the distance."""
@@ -197,9 +197,9 @@ class Judge(Honest):
         return np.abs(achieved).sum(axis=1)
 
 
-def test_goals_whose_reward_was_computed_stay_as_they_are(keeper):
+def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
     """Hindsight replay learns from them afterwards."""
-    env = SimulatorsVecEnv([keeper(Honest)], 1, judge=Judge())
+    env = SimulatorsVecEnv([restarter(Honest)], 1, judge=Judge())
     achieved, desired = np.ones((4, 2)), np.zeros((4, 2))
 
     [rewards] = env.env_method("compute_reward", achieved, desired, {})
@@ -209,20 +209,20 @@ def test_goals_whose_reward_was_computed_stay_as_they_are(keeper):
 
 
 class Rising(Honest):
-    """Raises its own level at each reset, and keeps its list."""
+    """An environment that raises its own level at each reset, and keeps its list."""
 
     level, words = 0, ()
 
     def reset(self, *, seed=None, options=None):
-        """Begin on the next level."""
+        """Begin an episode on the next level."""
         self.level += 1
         self.words = [*self.words, self.level]
         return super().reset(seed=seed, options=options)
 
 
-def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(keeper):
+def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(restarter):
     """A level that a curriculum sets once, and that the environment raises, fell back at the next reset."""
-    env = SimulatorsVecEnv([keeper(Rising)], 1)
+    env = SimulatorsVecEnv([restarter(Rising)], 1)
     env.reset()
     words = ["first"]
     env.set_attr("level", 5)
@@ -237,18 +237,18 @@ def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(kee
 
 
 class WithWords(Honest):
-    """Its infos have words of their own that mean something else here, and in Stable-Baselines3."""
+    """An environment whose infos have keys with another meaning here and in Stable-Baselines3."""
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         *others, _ = super().step(action)
         words = ("valid", "episode", "sim_fault", "recovering", "extra_steps", "terminal_observation")
         return *others, {**dict.fromkeys(words, "mine"), "palaestra": "mine"}
 
 
-def test_words_of_an_environment_are_not_taken_for_ours(keeper):
+def test_words_of_an_environment_are_not_taken_for_ours(restarter):
     """They stay, but for those that only Stable-Baselines3 may say: these are moved, and a line says so."""
-    env = SimulatorsVecEnv([keeper(WithWords)], 1)
+    env = SimulatorsVecEnv([restarter(WithWords)], 1)
     env.reset()
     with structlog.testing.capture_logs() as logged:
         infos = [env.step(action)[3][0] for action in actions()]
@@ -262,7 +262,7 @@ def test_words_of_an_environment_are_not_taken_for_ours(keeper):
 
 
 def test_a_copy_shares_nothing_that_can_be_written_into():
-    """Objects of other classes are shared: a robot in an info cannot be copied."""
+    """Objects of other classes are shared, because a robot in an info cannot be copied."""
     robot = object()
     value = {"array": np.zeros((2, 2), order="F"), "parts": [({1, 2}, bytearray(b"a"))], "robot": robot}
 

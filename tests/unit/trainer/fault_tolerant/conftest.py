@@ -1,4 +1,4 @@
-"""Players of fake members."""
+"""Environment groups of fake members."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from palaestra_trainer.simulators.restarter import Restarter, settle
 
 @pytest.fixture
 def make_players():
-    """Make players of members; the rows of their steps are in `rows`, and `released` counts releases."""
+    """Make groups of members. `rows` holds the rows of their steps, and `released` counts releases."""
     made = []
 
     def make(*members, restarts=10, **options):
-        keepers = [Restarter(member, RestartLimit(restarts=restarts)) for member in members]
+        restarters = [Restarter(member, RestartLimit(restarts=restarts)) for member in members]
         rows, released = [], []
 
         def release():
-            settle(keepers)
+            settle(restarters)
             released.append(1)
 
-        players = EnvGroup(keepers, release, played=rows.append, **options)
+        players = EnvGroup(restarters, release, played=rows.append, **options)
         players.rows, players.released = rows, released
         made.append(players)
         return players

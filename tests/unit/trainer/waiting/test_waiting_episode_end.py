@@ -1,4 +1,4 @@
-"""An episode that does not end, and those who wait for its end."""
+"""An episode that does not end, and the code that waits for its end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Endless(FakeTask):
     """A task without an end."""
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         observation, reward, _, _, info = super().step(action)
         return observation, reward, False, False, info
 
@@ -29,13 +29,13 @@ class First:
     """A policy that takes the first action."""
 
     def predict(self, _observation, state=None, _episode_start=None, **_options):
-        """Return it."""
+        """Return the action."""
         return 0, state
 
 
 @pytest.fixture
-def keeper(make_member):
-    """The keeper of a member with the task."""
+def restarter(make_member):
+    """The restarter of a member with the task."""
     member = make_member("collect-0")
     member.env = Endless(OBSERVATIONS["Box"], ACTIONS["Discrete"])
     return Restarter(member)
@@ -43,26 +43,26 @@ def keeper(make_member):
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    """Wait for a few steps only."""
+    """Lower the limit of steps."""
     monkeypatch.setattr(episode_end, "MOST_STEPS", 50)
 
 
-def test_an_evaluation_gives_an_endless_episode_up(keeper):
+def test_an_evaluation_gives_an_endless_episode_up(restarter):
     """A policy that stands still would keep the run for ever, and its steps count as progress."""
     with pytest.raises(ConfigurationError, match="not ended after 50 steps, and an evaluation waits"):
-        evaluate(First(), keeper, [1])
+        evaluate(First(), restarter, [1])
 
 
-def test_reinforce_gives_an_endless_episode_up(keeper):
+def test_reinforce_gives_an_endless_episode_up(restarter):
     """It learns from whole episodes."""
-    model = REINFORCE("MlpPolicy", SimulatorsVecEnv([keeper], 1), policy_kwargs={"net_arch": [4]})
+    model = REINFORCE("MlpPolicy", SimulatorsVecEnv([restarter], 1), policy_kwargs={"net_arch": [4]})
 
     with pytest.raises(ConfigurationError, match="REINFORCE waits for its end; return truncated after"):
         model.learn(30)
 
 
 def test_a_long_episode_is_a_line_in_the_log_every_minute(clock):
-    """Else nothing is heard of a run that goes on."""
+    """Otherwise nothing would show that the run continues."""
     end = EpisodeEnd("an evaluation", clock)
     with structlog.testing.capture_logs() as logged:
         for steps in range(40):

@@ -1,8 +1,8 @@
 """The facades that environments may use: open ones that this process created for itself.
 
-In a notebook, an environment that is made after `Webots(...)` is meant for that simulator. A facade is
-offered until it is closed, except while an environment has it. A forked process is offered none of its
-parent's.
+In a notebook, an environment that is created after `Webots(...)` is meant for that simulator. A facade is
+offered until it is closed, except while an environment uses it. A forked process does not get the facades of
+its parent.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Facade = TypeVar("Facade")
 
 
 class FacadeRegistry(Generic[Facade]):
-    """The open facades of this process and its parents; it keeps none of them alive."""
+    """The open facades of this process and its parents; the registry does not keep them alive."""
 
     def __init__(self) -> None:
         self._numbers = itertools.count()
@@ -28,13 +28,13 @@ class FacadeRegistry(Generic[Facade]):
         self._open[os.getpid(), next(self._numbers)] = facade
 
     def withdraw(self, facade: Facade) -> None:
-        """Offer a facade to no environment any more; safe to repeat."""
+        """Stop offering a facade to environments; safe to repeat."""
         for key, known in list(self._open.items()):
             if known is facade:
                 self._open.pop(key, None)
 
     def offered(self) -> Facade | None:
-        """Return the newest facade that no environment has, None if each has one."""
+        """Return the newest facade that no environment uses; None: all are used, or no facade is open."""
         mine = sorted(key for key in list(self._open.keys()) if key[0] == os.getpid())
         known = (self._open.get(key) for key in reversed(mine))
         return next((facade for facade in known if facade is not None and facade not in self._taken), None)
