@@ -24,9 +24,6 @@ SECURITY = {
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# Process 1 of a container ends at a signal only if it asks for it, which rosmaster does not: without
-# somebody before it, a pod would stay for its whole grace period.
-ROS_MASTER_PROGRAM = "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!"
 # One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
 # quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
@@ -41,7 +38,7 @@ def ros_master(replica: Replica) -> Container:
         "image": _trainer_image(replica),
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         "restartPolicy": "Always",
-        "command": ["bash", "-c", ROS_MASTER_PROGRAM.format(port=port)],
+        "command": [word.format(port=port) for word in replica.layout.ros_master],
         "startupProbe": {
             "exec": {"command": probe},
             "periodSeconds": 1,
