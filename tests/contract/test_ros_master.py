@@ -1,5 +1,6 @@
 """Our ROS master against rosmaster, the one of ROS itself: the same calls get the same answers and updates."""
 
+import copy
 import logging
 import os
 import subprocess
@@ -17,7 +18,7 @@ from tests.waiting import eventually
 
 logging.getLogger("rosmaster").setLevel(logging.CRITICAL)  # it logs a traceback for each wrong argument
 URI = "http://localhost:11311/"
-CALLERS = st.sampled_from(["/a", "/b", "/ns/c", "d", "/"])
+CALLERS = st.sampled_from(["/a", "/b", "/ns/c", "/"])
 URIS = st.sampled_from([f"http://host:{port}/" for port in (1, 2, 3)] + ["ftp://host", "", 7])
 ADDRESSES = st.sampled_from(["rosrpc://host:4", "rosrpc://host:5", "host:6", None])
 NAMES = st.sampled_from(["t", "/t", "/ns/t", "ns//t/", "~t", "a b", "x:y", "/", "", 5])
@@ -78,7 +79,7 @@ class Oracle:
     def call(self, method, arguments):
         """Return code and value of the answer, and the updates in any order."""
         self._sent = []
-        code, _, value = getattr(self._handler, method)(*arguments)
+        code, _, value = getattr(self._handler, method)(*copy.deepcopy(arguments))  # it changes parameters
         return code, plain(value), sorted(self._sent, key=repr)
 
 

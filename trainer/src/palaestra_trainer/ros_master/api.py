@@ -11,6 +11,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from palaestra_protocol.xmlrpc.documents import MOST_DEPTH
 from palaestra_trainer.ros_master.answers import (
     FAILED,
     OK,
@@ -23,7 +24,7 @@ from palaestra_trainer.ros_master.answers import (
     type_name_of,
     uri_of,
 )
-from palaestra_trainer.ros_master.names import resolved
+from palaestra_trainer.ros_master.names import parts, resolved
 from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, changes
 from palaestra_trainer.ros_master.registrations import Kind, Registrations
 
@@ -193,6 +194,8 @@ class MasterApi:
 
     def _set_param(self, caller: str, key: Any, value: Any) -> Answer:
         name = resolved(text_of("key", key), caller)
+        if len(parts(name)) > MOST_DEPTH:
+            raise WrongArgument(f"key: has more than {MOST_DEPTH} parts; use a shorter name")
         if value is None:
             raise WrongArgument("value: is missing; to delete a parameter, call deleteParam")
         try:
