@@ -1,8 +1,7 @@
 """Commands in this machine's file system without the packages of ROS, in a mount namespace of their own.
 
-An overlay lies over /usr, so nothing is changed outside the namespace. What Debian's packages of ROS hold, and
-what only they need, is deleted in the overlay; that is more than an import hook could hide: programs,
-libraries and definitions too.
+An overlay lies over /usr, so nothing is changed outside the namespace. In it, everything of Debian's packages
+of ROS is deleted. That is more than an import hook could hide: programs, libraries and definitions too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Our ROS master against rosmaster, the one of ROS itself: the same calls get the same answers and updates."""
+"""Our ROS master against rosmaster, the one of ROS itself: equal answers and updates for equal calls."""
 
 import copy
 import logging
@@ -134,7 +134,12 @@ RECORDED = (
     ("registerPublisher", "/a", "/scan", "sensor_msgs/Range", "http://localhost:1/"),
     ("registerSubscriber", "/b", "/scan", "*", "http://localhost:2/"),
     ("setParam", "/a", "~gain", 2.5),
-    ("setParam", "/b", "/robot", {"name": "robotino", "wheels": [1, 2, 3], "base": {"width": 0.25, "on": True}}),
+    (
+        "setParam",
+        "/b",
+        "/robot",
+        {"name": "robotino", "wheels": [1, 2, 3], "base": {"width": 0.25, "on": True}},
+    ),
     ("getParam", "/b", "/robot/base"),
     ("getParam", "/b", "/"),
     ("searchParam", "/robot/x/y", "base/width"),
@@ -151,7 +156,10 @@ RECORDED = (
     ("getParam", "/a", "/robot"),
     ("getParam",),
     ("noSuchCall", "/a"),
-    ("system.multicall", [{"methodName": "getParam", "params": ["/a", "/robot/name"]}, {"methodName": "no", "params": []}]),
+    (
+        "system.multicall",
+        [{"methodName": "getParam", "params": ["/a", "/robot/name"]}, {"methodName": "no", "params": []}],
+    ),
 )
 
 
@@ -225,7 +233,11 @@ print(rospy.is_shutdown(), flush=True)
 def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_path):
     """Topics, parameters, and `shutdown` from the master, as with rosmaster."""
     with RosMaster(name="localhost") as master:
-        environment = {"ROS_MASTER_URI": master.uri, "ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": str(tmp_path)}
+        environment = {
+            "ROS_MASTER_URI": master.uri,
+            "ROS_HOSTNAME": "localhost",
+            "ROS_LOG_DIR": str(tmp_path),
+        }
         with subprocess.Popen(
             [sys.executable, "-c", NODE],
             env={**os.environ, **environment},
@@ -238,7 +250,9 @@ def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_pat
             node.stdin.write("\n")
             node.stdin.flush()
             topics = node.stdout.readline()
-            answered(master.uri, "registerService", ["/listener", "/s", "rosrpc://h:1", "http://localhost:1/"])
+            answered(
+                master.uri, "registerService", ["/listener", "/s", "rosrpc://h:1", "http://localhost:1/"]
+            )
             ended, _ = node.communicate("\n", timeout=60)
 
     assert parameters == "[1, 2.5, 'text'] /listener/given False\n"

@@ -56,7 +56,10 @@ BOMB = b"""<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a
     ("document", "fact"),
     [
         (BOMB, "document type"),
-        (encode_request("m", ()).replace(b"<params>\n</params>", b"<value><array><data>" * 70), "nested deeper"),
+        (
+            encode_request("m", ()).replace(b"<params>\n</params>", b"<value><array><data>" * 70),
+            "nested deeper",
+        ),
         (encode_response(5), "names no method"),
         (b"", "no element found"),
     ],

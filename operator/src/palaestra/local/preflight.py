@@ -74,7 +74,7 @@ def programs_exist(request: Request) -> Iterator[str]:
     """The program of every container exists, with the library that it needs."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
-    programs = dict.fromkeys(("palaestra-ros-master", "palaestra-sidecar"), INSTALLATION)
+    programs = {"palaestra-ros-master": INSTALLATION, "palaestra-sidecar": INSTALLATION}
     programs.update({own[0]: "spec.trainer.command"} if own else {"palaestra-train": INSTALLATION})
     for index, group in enumerate(spec.simulators):
         programs[_simulator_program(group)] = f"spec.simulators[{index}]"

@@ -89,7 +89,7 @@ def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
     parser.EndElementHandler = end
     parser.CharacterDataHandler = reader.data
     parser.StartDoctypeDeclHandler = _refuse_document_type
-    reader.xml(None, None)  # expat decodes
+    reader.xml("", None)  # without an encoding, because expat decodes
     try:
         parser.Parse(data, True)
     except UnreadableDocument:

@@ -147,7 +147,8 @@ class Server(socketserver.ThreadingTCPServer):
             match wanted:
                 case {"methodName": str(name), "params": list(parameters)} if name != _MULTICALL:
                     return [self._called(name, tuple(parameters))]
-            raise xmlrpc.client.Fault(FAULT, f"{_MULTICALL}: each call has a methodName and a list params")
+                case _:
+                    return {"faultCode": FAULT, "faultString": "a call has a methodName and a list params"}
         except xmlrpc.client.Fault as fault:
             return {"faultCode": fault.faultCode, "faultString": fault.faultString}
         except Exception as error:  # noqa: BLE001 - a call that fails prevents no other call of the request

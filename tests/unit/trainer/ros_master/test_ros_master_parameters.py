@@ -81,7 +81,9 @@ def test_a_root_that_is_no_dictionary_is_refused():
 
 def test_a_change_reaches_subscribers_above_below_and_of_the_name_itself():
     """A namespace that is replaced deletes what it does not name."""
-    found = {it.subscribed: it[1:] for it in changes("/r", {"x": 1}, ["/", "/r/", "/r/x/", "/r/y/", "/other/"])}
+    found = {
+        it.subscribed: it[1:] for it in changes("/r", {"x": 1}, ["/", "/r/", "/r/x/", "/r/y/", "/other/"])
+    }
 
     assert found == {
         "/": ("/r/", {"x": 1}, True),

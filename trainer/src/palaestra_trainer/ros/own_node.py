@@ -87,7 +87,7 @@ def _made(name: str) -> _Node:
 def _answers(master_uri: str) -> dict[str, Method]:
     """Return the calls of the Slave API; the source is http://wiki.ros.org/ROS/Slave_API."""
     return {
-        "getPid": _constant(lambda: os.getpid()),
+        "getPid": _constant(os.getpid),
         "getMasterUri": _constant(lambda: master_uri),
         "getBusStats": _constant(lambda: [[], [], []]),
         "getBusInfo": _constant(list),
@@ -106,5 +106,7 @@ def _constant(value: Callable[[], Any]) -> Method:
 
 
 def _asked_to_end(parameters: tuple[Any, ...]) -> list[Any]:
-    log.warning("the ROS node was asked to end, and continues; send a signal to the process", asked=parameters)
+    log.warning(
+        "the ROS node was asked to end, and continues; send a signal to the process", asked=parameters
+    )
     return [_OK, "this process ends only at a signal", 0]

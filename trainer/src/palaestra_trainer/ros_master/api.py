@@ -250,7 +250,7 @@ class MasterApi:
             self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
 
     def _tell_changes(self, name: str, value: Any, *, but: str | None) -> None:
-        """Add an update for each subscriber, except the one that changed a parameter that it subscribes to."""
+        """Add an update for each subscriber, except `but` if it subscribes to what it has set."""
         for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
             for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):
                 if not (change.by_caller and node == but):

@@ -79,7 +79,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _name(host: str) -> str:
-    """Return the name under which nodes reach the master: as nodes choose theirs, or of loopback's address."""
+    """Return the name under which nodes reach the master; they choose theirs in the same way."""
     if host == LOOPBACK:
         return "localhost"
     return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or host

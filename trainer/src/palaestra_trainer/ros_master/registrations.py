@@ -142,7 +142,7 @@ class Registrations:
             self._types[topic] = type_name
 
     def _entered(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
-        """Note a registration of a node; return the URI of an older one of its name, all of which is dropped."""
+        """Note a registration; drop an older node of that name, and return its URI."""
         known = self._nodes.get(node)
         if known is not None and known.uri == uri:
             known.registered.add((kind, name))
