@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import xmlrpc.client
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -90,10 +91,8 @@ def test_trainer_and_simulators_work_with_rosmaster_too(rosmaster):
     """Pods have it, and so may the machine of a user."""
 
     def answers():
-        try:
-            return xmlrpc.client.ServerProxy(rosmaster).getPid("/test")
-        except OSError:
-            return None
+        with suppress(OSError), xmlrpc.client.ServerProxy(rosmaster) as master:
+            return master.getPid("/test")
 
     eventually(answers)
     done = subprocess.run(
