@@ -16,7 +16,8 @@ if [[ ! -x .venv/bin/uv ]]; then
     .venv/bin/python -m pip install --quiet --disable-pip-version-check "$uv_pin"
   elif command -v uv >/dev/null; then
     echo "setup: making .venv with uv"
-    uv venv --quiet --clear --system-site-packages --python "$PYTHON" .venv
+    rm -rf .venv
+    uv venv --quiet --system-site-packages --python "$PYTHON" .venv
     uv pip install --quiet --python .venv "$uv_pin"
   else
     echo "$PYTHON cannot make an environment without ensurepip. Install uv, or type this line; then repeat the command:"

@@ -12,8 +12,9 @@
 - `shadowing`: a user's modules that shadow those of Python and of dependencies
 - `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
-- `places`: the connections that this server keeps
+- `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
+- `places`: the connections that these servers keep
 
 This package imports none of the others. All modules except `http`, `imports`, `places`, `shadowing`,
-`signals` and `ros.sockets` are pure: values and bytes.
+`signals`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and bytes.
 """

@@ -6,7 +6,7 @@ import http.client
 import io
 import socket
 import time
-from typing import Any
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 from palaestra_protocol.xmlrpc.documents import UnreadableDocument, decode_response, encode_request
@@ -84,7 +84,7 @@ class _Stream(io.RawIOBase):
 
 
 def _body(stream: _Stream) -> bytes:
-    response = http.client.HTTPResponse(stream)  # type: ignore[arg-type]  # it only calls `makefile`
+    response = http.client.HTTPResponse(cast("socket.socket", stream))  # it only calls `makefile`
     try:
         response.begin()
         if response.status != http.client.OK:

@@ -38,8 +38,15 @@ _MULTICALL = "system.multicall"
 
 log = logging.getLogger(__name__)
 
+_LOOPBACK = frozenset({"localhost", "127.0.0.1"})
+
 Method = Callable[[tuple[Any, ...]], Any]
 """Returns the value of a call with these parameters."""
+
+
+def bind_address(host: str) -> str:
+    """Return the address on which a ROS node of that host name listens: loopback, or every interface."""
+    return "127.0.0.1" if host in _LOOPBACK else ""
 
 
 class Server(socketserver.ThreadingTCPServer):
@@ -110,8 +117,9 @@ class Server(socketserver.ThreadingTCPServer):
         finally:
             self.places.leave(request)
 
-    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
-        """Log an error of this program; a client that goes away is none."""
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Log an error of this program; that a client goes away is not one."""
+        del request, client_address
         error = sys.exception()
         if not isinstance(error, OSError):
             log.error("XML-RPC: a request failed: %r", error)
@@ -122,18 +130,19 @@ class Server(socketserver.ThreadingTCPServer):
             method, parameters = decode_request(data)
             value = self._several(parameters) if method == _MULTICALL else self._called(method, parameters)
             return encode_response(value)
-        except UnreadableDocument as error:
-            return encode_fault(str(error))
         except xmlrpc.client.Fault as fault:
             return encode_fault(fault.faultString)
-        except Exception as error:  # noqa: BLE001 - of a method, or a value that XML-RPC does not have
-            return encode_fault(f"{type(error).__name__}: {error}")
+        except (UnreadableDocument, TypeError, OverflowError) as error:  # the latter of a value
+            return encode_fault(str(error))
 
     def _called(self, name: str, parameters: tuple[Any, ...]) -> Any:
         method = self._find(name)
         if method is None:
             raise xmlrpc.client.Fault(FAULT, f"{name} is not a method of this server")
-        return method(parameters)
+        try:
+            return method(parameters)
+        except Exception as error:  # of any type: a caller must get an answer, and others go on
+            raise xmlrpc.client.Fault(FAULT, f"{name}: {error!r}") from error
 
     def _several(self, parameters: tuple[Any, ...]) -> list[Any]:
         match parameters:
@@ -149,10 +158,8 @@ class Server(socketserver.ThreadingTCPServer):
                     return [self._called(name, tuple(parameters))]
                 case _:
                     return {"faultCode": FAULT, "faultString": "a call has a methodName and a list params"}
-        except xmlrpc.client.Fault as fault:
+        except xmlrpc.client.Fault as fault:  # a call that fails prevents no other call of the request
             return {"faultCode": fault.faultCode, "faultString": fault.faultString}
-        except Exception as error:  # noqa: BLE001 - a call that fails prevents no other call of the request
-            return {"faultCode": FAULT, "faultString": f"{type(error).__name__}: {error}"}
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -186,7 +193,7 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._send(self._answered(body))
 
-    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - http.server's signature
+    def log_message(self, *_: Any, **__: Any) -> None:
         """Log nothing."""
 
     @property

@@ -15,13 +15,12 @@ from typing import Any
 
 import structlog
 
-from palaestra_protocol.xmlrpc.server import Method, Server
+from palaestra_protocol.xmlrpc.server import Method, Server, bind_address
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros.master import Master
 
 _OK = 1
 _FAILED = 0
-_LOOPBACK = frozenset({"localhost", "127.0.0.1"})
 
 log = structlog.get_logger(__name__)
 
@@ -77,7 +76,7 @@ def _made(name: str) -> _Node:
     master.ping()
     host = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
     try:
-        server = Server(("127.0.0.1" if host in _LOOPBACK else "", 0), _answers(master.uri).get)
+        server = Server((bind_address(host), 0), _answers(master.uri).get)
     except OSError as error:
         raise ConfigurationError(f"this program cannot listen as a ROS node: {error.strerror}") from error
     server.start()

@@ -127,7 +127,7 @@ class MasterApi:
     def _unregister_service(self, caller: str, service: Any, service_api: Any) -> Answer:
         name = topic_or_service("service", service, caller)
         address = uri_of("service_api", service_api)
-        return _removed(caller, name, self._nodes.unregister_service(name, caller, address))
+        return _removed(caller, name, removed=self._nodes.unregister_service(name, caller, address))
 
     def _lookup_service(self, caller: str, service: Any) -> Answer:
         name = topic_or_service("service", service, caller)
@@ -145,7 +145,7 @@ class MasterApi:
 
     def _unregister_subscriber(self, caller: str, topic: Any, caller_api: Any) -> Answer:
         name, uri = topic_or_service("topic", topic, caller), uri_of("caller_api", caller_api)
-        return _removed(caller, name, self._nodes.unregister(Kind.SUBSCRIBER, name, caller, uri))
+        return _removed(caller, name, removed=self._nodes.unregister(Kind.SUBSCRIBER, name, caller, uri))
 
     def _register_publisher(self, caller: str, topic: Any, topic_type: Any, caller_api: Any) -> Answer:
         name, type_name = topic_or_service("topic", topic, caller), type_name_of("topic_type", topic_type)
@@ -160,7 +160,7 @@ class MasterApi:
         removed = self._nodes.unregister(Kind.PUBLISHER, name, caller, uri)
         if removed:
             self._announce(name)
-        return _removed(caller, name, removed)
+        return _removed(caller, name, removed=removed)
 
     def _lookup_node(self, caller: str, node: Any) -> Answer:
         name = name_of("node", node, caller)
@@ -257,7 +257,7 @@ class MasterApi:
                     self._updates.append(Update(uri, "paramUpdate", change.name, change.value, node))
 
 
-def _removed(node: str, name: str, removed: bool) -> Answer:  # noqa: FBT001 - the one fact of the answer
+def _removed(node: str, name: str, *, removed: bool) -> Answer:
     if removed:
         return Answer(OK, f"{node} is not registered for {name} any more", 1)
     return Answer(OK, f"{node} was not registered for {name} at this address", 0)
