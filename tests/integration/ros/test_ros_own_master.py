@@ -53,6 +53,25 @@ def test_it_prints_its_address_and_ends_at_a_signal():
         assert program.wait(PATIENCE_S) == 0
 
 
+@pytest.mark.parametrize(
+    ("address", "named", "variables"),
+    [
+        ("127.0.0.1:0", "localhost", {}),
+        ("0.0.0.0:0", socket.gethostname(), {}),
+        ("0.0.0.0:0", "10.1.2.3", {"ROS_IP": "10.1.2.3"}),
+        ("127.0.0.2:0", "127.0.0.2", {}),
+    ],
+)
+def test_its_address_has_the_name_that_nodes_would_choose(address, named, variables):
+    """Programs on other machines are told that name."""
+    own = {name: value for name, value in os.environ.items() if name not in ("ROS_HOSTNAME", "ROS_IP")}
+    with started(PROGRAM, "--listen", address, env={**own, **variables}) as program:
+        uri = program.stdout.readline().strip()
+        program.terminate()
+
+    assert uri.rpartition(":")[0] == f"http://{named}"
+
+
 def test_a_port_in_use_is_one_line():
     """A person chose it."""
     with socket.create_server(("127.0.0.1", 0)) as taken:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import ipaddress
 import logging
 import os
 import signal
+import socket
 import sys
 import threading
 from collections.abc import Sequence
@@ -82,4 +84,9 @@ def _name(host: str) -> str:
     """Return the name under which nodes reach the master; they choose theirs in the same way."""
     if host == LOOPBACK:
         return "localhost"
-    return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or host
+    own = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
+    if own:
+        return own
+    if ipaddress.ip_address(host).is_unspecified:
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host
