@@ -58,6 +58,12 @@ class Places:
         with self._lock:
             self._taken.pop(connection, None)
 
+    def clear(self) -> None:
+        """Close every connection, also those whose request is being answered."""
+        with self._lock:
+            for connection in list(self._taken):
+                self._drop(connection)
+
     def _crowd(self, peer: str) -> list[socket.socket] | None:
         """Return the connections of which one has to go before `peer` gets a place; None: there is room."""
         of_peer = [one for one, place in self._taken.items() if place.peer == peer]

@@ -157,6 +157,17 @@ def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
             assert answer.split()[1] == status
 
 
+def test_a_server_that_is_closed_closes_its_connections(server):
+    """A node that has ended must not answer as if it lived."""
+    running = server()
+    with dialed(running) as connection:
+        call(uri(running), PATIENCE_S, "double", 1)
+
+        running.close()
+
+        assert connection.recv(1) == b""
+
+
 def test_a_new_connection_takes_the_place_of_an_idle_one(server):
     """Forgotten connections must not keep a simulator from registering."""
     running = server()
@@ -223,7 +234,12 @@ def test_an_answer_that_is_no_response_is_refused(peer, answer):
         call(peer([answer]), PATIENCE_S, "m")
 
 
-@pytest.mark.parametrize("address", ["http://", "rosrpc://h:1", "http://h:x/", "http://h/", "http://ä:1/"])
+LONG = f"http://{'h' * 64}.org:1/"  # no host's name has such a part
+
+
+@pytest.mark.parametrize(
+    "address", ["http://", "rosrpc://h:1", "http://h:x/", "http://h/", "http://ä:1/", LONG]
+)
 def test_an_address_that_is_none_is_refused(address):
     """Nodes register any text as theirs."""
     with pytest.raises(UnreadableDocument, match="is not an address"):

@@ -46,6 +46,7 @@ def _parts(uri: str) -> tuple[str, int, str]:
     try:
         parts = urlsplit(uri)
         if parts.scheme == "http" and parts.hostname and parts.port and uri.isascii():
+            parts.hostname.encode("idna")  # else the lookup of its address would fail with another error
             return parts.hostname, parts.port, parts.path or "/"
     except ValueError:
         pass

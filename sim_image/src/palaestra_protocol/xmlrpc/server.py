@@ -93,11 +93,12 @@ class Server(socketserver.ThreadingTCPServer):
         self._thread.start()
 
     def close(self) -> None:
-        """Accept no more connections and free the port."""
+        """Accept no more connections, close those that are open, and free the port."""
         if self._thread is not None:
             self.shutdown()
             self._thread.join()
         self.server_close()
+        self.places.clear()
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give a connection a thread, or close it if there is no place for it."""

@@ -189,7 +189,7 @@ class MasterApi:
             self._parameters.delete(name)
         except KeyError:
             return Answer(WRONG, f"{name} is not set", 0)
-        self._tell_changes(name, {}, but=None)
+        self._report_changes(name, {}, but=None)
         return Answer(OK, f"{name} is deleted", 0)
 
     def _set_param(self, caller: str, key: Any, value: Any) -> Answer:
@@ -202,7 +202,7 @@ class MasterApi:
             self._parameters.set(name, value)
         except TypeError as error:
             raise WrongArgument(f"value: {error}") from error
-        self._tell_changes(name, value, but=caller)
+        self._report_changes(name, value, but=caller)
         return Answer(OK, f"{name} is set", 0)
 
     def _get_param(self, caller: str, key: Any) -> Answer:
@@ -249,7 +249,7 @@ class MasterApi:
         for node, uri in self._nodes.members(Kind.SUBSCRIBER, topic):
             self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
 
-    def _tell_changes(self, name: str, value: Any, *, but: str | None) -> None:
+    def _report_changes(self, name: str, value: Any, *, but: str | None) -> None:
         """Add an update for each subscriber, except `but` if it subscribes to what it has set."""
         for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
             for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):

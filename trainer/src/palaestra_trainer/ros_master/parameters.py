@@ -15,13 +15,13 @@ Tree = dict[str, Any]
 
 
 class Change(NamedTuple):
-    """What the subscribers of a parameter learn: a parameter, and its value; `{}` if it was deleted.
+    """A change for the subscribers of a name: a parameter and its value; `{}` if it was deleted.
 
     Attributes:
         subscribed: the name for which they are registered; it ends with a slash.
         name: of the parameter or namespace that has changed; it ends with a slash.
         value: its new value.
-        by_caller: whether it is a change to that name or above it, which its author knows.
+        by_caller: whether the change is at or below the subscribed name; its author gets no update of it.
     """
 
     subscribed: str
