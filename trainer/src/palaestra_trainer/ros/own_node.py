@@ -52,7 +52,7 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
 
     Raises:
         MasterLost: no master answers.
-        ConfigurationError: ROS_HOSTNAME or ROS_IP is not an address of this machine.
+        ConfigurationError: the process cannot listen.
     """
     return _ensured(name).name
 
@@ -78,7 +78,8 @@ def _made(name: str) -> _Node:
     try:
         server = Server((bind_address(host), 0), _answers(master.uri).get)
     except OSError as error:
-        raise ConfigurationError(f"this program cannot listen as a ROS node: {error.strerror}") from error
+        fact = f"{host}: cannot listen there as a ROS node: {error.strerror}"
+        raise ConfigurationError(f"{fact}; set ROS_HOSTNAME, for example to localhost") from error
     server.start()
     return _Node(name=full_name, uri=f"http://{host}:{server.port}/", pid=os.getpid())
 
