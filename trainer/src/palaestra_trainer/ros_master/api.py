@@ -29,7 +29,7 @@ from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, c
 from palaestra_trainer.ros_master.registrations import Kind, Registrations
 
 MASTER = "/master"  # the name in which the master calls nodes
-_REPLACED = "a new node has registered with this name"
+_REPLACED = "new node registered with same name"  # rosmaster's words, which people search for
 
 
 class Update(NamedTuple):
