@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
-from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.environments.options import MoveToTargetOptions, parse
 from palaestra_trainer.robots import Pose, RobotinoAbc, Scene, SceneWrapper
 
 HARDEST_AT = 0.5  # share of training
@@ -88,7 +88,7 @@ class HarderScene(SceneWrapper):
 class CurriculumEnv(MoveToTargetEnv):
     """MoveToTargetEnv at a level that follows from the progress of training."""
 
-    def __init__(self, robot: DisturbedRobot, scene: HarderScene, options: Options) -> None:
+    def __init__(self, robot: DisturbedRobot, scene: HarderScene, options: MoveToTargetOptions) -> None:
         super().__init__(robot, scene, options)
         self.harder = scene
 

@@ -6,7 +6,7 @@ right, and 2 front left.
 
 import math
 
-from palaestra_sim.scene.drive import Wheel
+from palaestra_sim.scene.wheel_kinematics import Wheel
 
 WHEELS = ("wheel0_joint", "wheel1_joint", "wheel2_joint")
 RADIUS_M = 0.063

@@ -2,7 +2,7 @@
 
 from contextlib import contextmanager
 
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots

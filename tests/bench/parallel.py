@@ -10,7 +10,7 @@ import numpy as np
 
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.entry_point import make
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from tests.bench.arena import running
 from tests.bench.sizes import scaled
 from tests.bench.stepping import rate
@@ -84,7 +84,7 @@ def started(stack, name):
 
 def vector(stack, members):
     """Return the vector environment of some members."""
-    env = SimulatorsVecEnv([Keeper(member) for member in members], 0)
+    env = SimulatorsVecEnv([Restarter(member) for member in members], 0)
     stack.callback(env.close)
     return env
 

@@ -18,7 +18,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.monitor import Monitor
 
-from palaestra_trainer.algorithms.values import arguments
+from palaestra_trainer.algorithms.hyperparameters import arguments
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import fake_arena
 from tests.bench.sizes import scaled

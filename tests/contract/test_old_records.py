@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from palaestra.api import as_data, load, validate
-from palaestra.decide.accepting import accept
-from palaestra.local import rundir
-from palaestra.local.outcome import Outcome
+from palaestra.decide.validation import accept
+from palaestra.local import run_directory
+from palaestra.local.outcome import RunOutcome
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.view.describe import describe
 from palaestra_protocol.pod.status import Termination, TrainerStatus
@@ -151,17 +151,17 @@ def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
 @pytest.mark.parametrize("run", ["interrupted", "finished"])
 def test_a_run_directory_belongs_to_the_same_job_as_before(run):
     """The same file, given to a newer `palaestra run`."""
-    recorded = yaml.safe_load((OLD / run / rundir.RECORD).read_text())
+    recorded = yaml.safe_load((OLD / run / run_directory.RECORD).read_text())
 
-    now = rundir.record_of(validate(recorded))
+    now = run_directory.record_of(validate(recorded))
 
-    rundir.refuse_another_job(OLD / run, now)
+    run_directory.refuse_another_job(OLD / run, now)
     assert fields(now) == fields(recorded)
 
 
 def test_a_finished_run_is_known_to_be_finished():
     """It is reported from its record, and nothing is started."""
-    outcome = Outcome.of(OLD / "finished")
+    outcome = RunOutcome.of(OLD / "finished")
 
     assert outcome is not None
     assert (outcome.finished, outcome.steps) == (True, 400)

@@ -7,9 +7,9 @@ from palaestra.api import load
 from palaestra.cli import main
 from palaestra.zoo import convert
 from palaestra.zoo.expressions import SHORT
-from palaestra_protocol.elsewhere import ELSEWHERE
-from palaestra_trainer.algorithms.table import check
-from palaestra_trainer.algorithms.values import CLASSES
+from palaestra_protocol.foreign_words import ELSEWHERE
+from palaestra_trainer.algorithms.hyperparameters import CLASSES
+from palaestra_trainer.algorithms.make_model import check
 from palaestra_trainer.configuration import Algorithm
 
 FILE = """\

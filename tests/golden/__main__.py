@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from palaestra.api import load
-from palaestra.api.generated import generated_files
+from palaestra.api.generated_files import generated_files
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
-from palaestra.plan.text import as_yaml
+from palaestra.plan.yaml_text import as_yaml
 from palaestra_sim.world import builtin
 from tests.chart import installation, readme
 from tests.control_plane.programs import NoPrograms

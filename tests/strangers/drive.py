@@ -9,7 +9,7 @@ import sys
 from palaestra_trainer import report
 from palaestra_trainer.configuration import load
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, Webots
+from palaestra_trainer.webots import DistanceSensor, Motor, Stepper, Webots
 
 PERIOD_MS = 64
 NEAR = 100.0  # of the lookup table of ps0 and ps7
@@ -18,7 +18,7 @@ NEAR = 100.0  # of the lookup table of ps0 and ps7
 sidecar = Sidecar(simulator.control, simulator.name)
 (robot,) = sidecar.first_state(60.0).robots
 webots = Webots(robot.ros_name, "rover", launcher=sidecar)
-simulation = Simulation([robot.ros_name], webots.supervisor, webots.observer, PERIOD_MS)
+simulation = Stepper([robot.ros_name], webots.supervisor, webots.observer, PERIOD_MS)
 front = [DistanceSensor(robot.ros_name, name) for name in ("ps0", "ps7")]
 wheels = [Motor(robot.ros_name, f"{side} wheel motor") for side in ("left", "right")]
 simulation.add(sensors=front, motors=wheels)

@@ -4,9 +4,9 @@ The reasons are those that a person reads who tries it. tests/unit/trainer/algor
 trains in every cell that works.
 """
 
-from palaestra.api.marks import between_marks
+from palaestra.api.generated_sections import between_marks
 from palaestra_trainer.algorithms import ALGORITHMS
-from palaestra_trainer.algorithms.fitting import policy_of_spaces
+from palaestra_trainer.algorithms.space_compat import policy_of_spaces
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from palaestra.api.marks import between_marks
+from palaestra.api.generated_sections import between_marks
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.devices.kind import Kind
+from palaestra_sim.scene.devices.device_type import DeviceType
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.stub.physics import StubPhysics
 
@@ -29,7 +29,7 @@ def table() -> str:
     return "\n".join(("| node | topics | services | fields without effect |", "|---|---|---|---|", *rows, ""))
 
 
-def _row(kind: Kind[Any]) -> str:
+def _row(kind: DeviceType[Any]) -> str:
     device = _device(kind)
     topics = ", ".join(f"`{it.name}` ({it.type_name})" for it in kind.topics(device))
     services = ", ".join(f"`{path}`" for path, _, _ in kind.services(device))
@@ -37,7 +37,7 @@ def _row(kind: Kind[Any]) -> str:
     return f"| {kind.node} | {topics} | {services} | {ignored} |"
 
 
-def _device(kind: Kind[Any]) -> object:
+def _device(kind: DeviceType[Any]) -> object:
     """Return a device of that type, from a world that has nothing else."""
     node = f"{kind.node} {{ }}"
     part = f"HingeJoint {{ device {node} }}" if kind.on_joint else node

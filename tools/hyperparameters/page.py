@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from palaestra.api.marks import between_marks
+from palaestra.api.generated_sections import between_marks
 from palaestra_trainer.algorithms import ALGORITHMS
 
 PAGE = "docs/trainingjob.md"

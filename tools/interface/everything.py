@@ -9,11 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from palaestra_sim.faults.survey import Survey, survey
+from palaestra_sim.faults.known_paths import KnownPaths, survey
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.devices.kind import Kind
-from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.devices.device_type import DeviceType
+from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.stub.physics import StubPhysics
 
@@ -90,7 +90,7 @@ DEF ROBOT Robot {{
 
 
 @cache
-def offered(simulator: str) -> Survey:
+def offered(simulator: str) -> KnownPaths:
     """Return the services and topics of a simulator in that world."""
     with TemporaryDirectory() as folder:
         path = Path(folder, "everything.wbt")
@@ -113,7 +113,7 @@ def groups(paths: Mapping[str, str]) -> dict[str, dict[str, str]]:
     return found
 
 
-def _part(kind: Kind[Any]) -> str:
+def _part(kind: DeviceType[Any]) -> str:
     node = f'{kind.node} {{ name "{device_name(kind.node)}" {_SETTINGS.get(kind.node, "")} }}'
     if not kind.on_joint:
         return node

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from palaestra.api.marks import between_marks
+from palaestra.api.generated_sections import between_marks
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import FAILING, device_name, groups, offered

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from palaestra.api.marks import between_marks
-from palaestra.decide.judging import JUDGED
+from palaestra.api.generated_sections import between_marks
+from palaestra.decide.replica_policy import JUDGED
 
 PAGE = "docs/judging.md"
 BEGIN = "<!-- generated: checks on a replica -->"

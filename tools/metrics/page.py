@@ -6,11 +6,11 @@ Here and in no program, since operator and trainer know nothing of each other.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from palaestra.api.marks import between_marks
-from palaestra.operator import families as operator
-from palaestra_protocol.metrics import Family, Kind, Label
-from palaestra_sim.sidecar import families as sidecar
-from palaestra_trainer import families as trainer
+from palaestra.api.generated_sections import between_marks
+from palaestra.operator import metric_definitions as operator
+from palaestra_protocol.metrics import Family, Label, MetricType
+from palaestra_sim.sidecar import metric_definitions as sidecar
+from palaestra_trainer import metric_definitions as trainer
 
 PAGE = "docs/metrics.md"
 SERIES = "<!-- generated: how many series -->"
@@ -93,7 +93,7 @@ def cardinality() -> str:
 
 
 def _type(family: Family) -> str:
-    if family.kind is not Kind.HISTOGRAM:
+    if family.kind is not MetricType.HISTOGRAM:
         return family.kind
     first, last = family.buckets[0], family.buckets[-1]
     return f"histogram, {len(family.buckets)} bounds from {first:g} to {last:g}"

@@ -7,8 +7,8 @@ from typing import Final
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene import picture_files
-from palaestra_sim.scene.eyes import Lens
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.camera_interface import Lens
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.world import builtin
 
@@ -21,8 +21,8 @@ def main() -> None:
     physics = MujocoPhysics()
     simulation = Simulation.load(builtin("arena"), physics)
     simulation.export_image(str(FOLDER / "arena.png"), 100)
-    mast = Place(simulation.robots[0].place, (0.1, 0.0, 0.45), (0.0, 0.0, 1.0, 0.5))
-    leaning = Place(mast, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.25))
+    mast = Frame(simulation.robots[0].place, (0.1, 0.0, 0.45), (0.0, 0.0, 1.0, 0.5))
+    leaning = Frame(mast, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.25))
     eye = physics.eye(leaning, Lens(size=SIZE, field_of_view_rad=1.2, near_m=0.01))
     if eye is not None:
         picture_files.save(str(FOLDER / "camera.png"), SIZE, eye.colors())

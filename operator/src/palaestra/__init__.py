@@ -11,10 +11,14 @@ __all__ = ["Client", "changed", "run"]
 
 if TYPE_CHECKING:
     from palaestra.client import Client
-    from palaestra.given import changed
-    from palaestra.local.background import run
+    from palaestra.job_input import changed
+    from palaestra.local.run_handle import run
 else:
-    _HOMES = {"Client": "palaestra.client", "changed": "palaestra.given", "run": "palaestra.local.background"}
+    _HOMES = {
+        "Client": "palaestra.client",
+        "changed": "palaestra.job_input",
+        "run": "palaestra.local.run_handle",
+    }
 
     def __getattr__(name: str) -> Any:
         """Return a public name, imported when it is asked for: plans and schemas need no cluster."""

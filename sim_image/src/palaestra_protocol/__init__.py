@@ -3,7 +3,7 @@
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
 - `ros`: between trainer and simulator: connections, types and values of ROS 1
-- `elsewhere`: words of other projects, and their places in a TrainingJob
+- `foreign_words`: words of other projects, and their places in a TrainingJob
 - `fields`: checks of received JSON, because its sender is not trusted
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
@@ -13,8 +13,8 @@
 - `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
 - `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
-- `places`: the connections that these servers keep
+- `connection_limits`: the connections that these servers keep
 
-This package imports none of the others. All modules except `http`, `imports`, `places`, `shadowing`,
-`signals`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and bytes.
+This package imports none of the others. All modules except `connection_limits`, `http`, `imports`,
+`shadowing`, `signals`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and bytes.
 """

@@ -23,8 +23,8 @@ from http.server import BaseHTTPRequestHandler
 from types import TracebackType
 from typing import Any, NamedTuple, Self, cast
 
+from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlots
 from palaestra_protocol.numbers import MOST_PORT
-from palaestra_protocol.places import MOST_CONNECTIONS, Places
 
 MOST_REQUEST_BYTES = 2**17  # enough to answer a path of 64 KiB, the longest of http.server, with 414
 MOST_BODY_BYTES = 4096
@@ -120,7 +120,7 @@ class Server(socketserver.ThreadingTCPServer):
         self.routes = routes
         self.name = name
         self.deadline_s = deadline_s
-        self.places = Places()
+        self.places = ConnectionSlots()
         self._thread: threading.Thread | None = None
         super().__init__((host, address.port), _Handler)
 

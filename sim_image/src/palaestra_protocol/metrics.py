@@ -22,7 +22,7 @@ from prometheus_client.metrics_core import Metric
 PREFIX = "palaestra_"
 
 
-class Kind(StrEnum):
+class MetricType(StrEnum):
     """Types of Prometheus."""
 
     COUNTER = "counter"
@@ -57,7 +57,7 @@ class Family:
     """
 
     name: str
-    kind: Kind
+    kind: MetricType
     meaning: str
     labels: tuple[Label, ...] = ()
     buckets: tuple[float, ...] = ()
@@ -74,7 +74,7 @@ class Family:
     def series(self, sizes: Mapping[str, int]) -> int:
         """Return the maximum number of series, with `sizes` for the bounds of the labels."""
         values = prod(sizes[label.bound] if label.bound else len(label.values) for label in self.labels)
-        samples = sum(1 for _ in self.tally().samples()) if self.kind is Kind.HISTOGRAM else 1
+        samples = sum(1 for _ in self.tally().samples()) if self.kind is MetricType.HISTOGRAM else 1
         return values * samples
 
     def tally(self) -> Tally:
@@ -94,17 +94,17 @@ class Family:
 
 def counter(name: str, meaning: str, *labels: Label) -> Family:
     """Return a family whose values only rise."""
-    return Family(name=name, kind=Kind.COUNTER, meaning=meaning, labels=labels)
+    return Family(name=name, kind=MetricType.COUNTER, meaning=meaning, labels=labels)
 
 
 def gauge(name: str, meaning: str, *labels: Label) -> Family:
     """Return a family whose values rise and fall."""
-    return Family(name=name, kind=Kind.GAUGE, meaning=meaning, labels=labels)
+    return Family(name=name, kind=MetricType.GAUGE, meaning=meaning, labels=labels)
 
 
 def histogram(name: str, meaning: str, buckets: tuple[float, ...], *labels: Label) -> Family:
     """Return a family that counts values by size."""
-    return Family(name=name, kind=Kind.HISTOGRAM, meaning=meaning, labels=labels, buckets=buckets)
+    return Family(name=name, kind=MetricType.HISTOGRAM, meaning=meaning, labels=labels, buckets=buckets)
 
 
 class Tally:

@@ -20,17 +20,17 @@ from palaestra_protocol.control import LEFT_OUT_FILE
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim import faults
 from palaestra_sim.errors import SimError, StandInError, WorldError, WorldRefusedError
-from palaestra_sim.front.backend import Backend
-from palaestra_sim.front.left_out import write_left_out
-from palaestra_sim.front.options import FrontOptions
-from palaestra_sim.front.simulator import Load, Simulator
 from palaestra_sim.ros import Loop, MasterUnreachable, RosNode
-from palaestra_sim.scene.loading import Loader
+from palaestra_sim.ros_controller.backend import Backend
+from palaestra_sim.ros_controller.left_out import write_left_out
+from palaestra_sim.ros_controller.options import FrontOptions
+from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
+from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.reading import LeaveOut
-from palaestra_sim.scene.summary import differences, lacks, silent_devices, summary
-from palaestra_sim.world.bounded import read_bounded
+from palaestra_sim.scene.validation import LeaveOut
+from palaestra_sim.scene.world_report import differences, lacks, silent_devices, summary
+from palaestra_sim.world.bounded_read import read_bounded
 from palaestra_sim.world.mjcf import is_mjcf
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
@@ -133,7 +133,7 @@ class _Process:
         self._new_node = self._node_maker()
         self._nodes: dict[str, RosNode] = {}
         self._exit_code = 0
-        self._simulator = Simulator(
+        self._simulator = RunningSimulator(
             options.world,
             load,
             self._make_node,
@@ -196,7 +196,7 @@ class _Process:
         if left_out and (file := os.environ.get(LEFT_OUT_FILE)):
             write_left_out(left_out, Path(file))
 
-    def _start_as_ordered(self, course: faults.Course) -> None:
+    def _start_as_ordered(self, course: faults.FaultState) -> None:
         """Start with the faults of a course: late, or not at all."""
         log.info("faults: %s", self._ordered)
         refused, delay_s = course.start()
@@ -210,7 +210,7 @@ class _Process:
         """Return what makes the node of a name: a plain one, unless faults are ordered."""
         if self._course is None:
             return partial(RosNode, self._loop, master_uri=self._master_uri)
-        failing = faults.Failing(course=self._course, effects=faults.Effects(self))
+        failing = faults.Failing(course=self._course, effects=faults.ProcessFaults(self))
         return partial(faults.FaultyNode, self._loop, master_uri=self._master_uri, failing=failing)
 
     def _make_node(self, name: str) -> RosNode:

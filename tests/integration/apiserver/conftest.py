@@ -7,12 +7,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from palaestra.cluster import Limits, connect
-from palaestra.cluster.limits import Backoff
+from palaestra.cluster import Timeouts, connect
 from palaestra.cluster.resources import NAMESPACES
+from palaestra.cluster.timeouts import Backoff
 from tests.integration.apiserver.server import serving
 
-HASTE = Limits(
+HASTE = Timeouts(
     connect_s=1, call_s=1, silence_s=0.5, again=Backoff(first_s=0.05, cap_s=0.2, chance=lambda: 0.0)
 )
 numbers = itertools.count(1)

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from palaestra.cluster import Api, Limits, Untrusted, account, connect
+from palaestra.cluster import Api, Timeouts, Untrusted, connect, service_account
 from palaestra.cluster.transport import Transport
-from palaestra.doctor import examining
+from palaestra.doctor import run
 from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
 from tests.integration.apiserver.server import command, reply, serving
@@ -104,7 +104,7 @@ def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_pa
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", host)
     monkeypatch.setenv("KUBERNETES_SERVICE_PORT", port)
 
-    api = Api(Transport(account.account(tmp_path), Limits()))
+    api = Api(Transport(service_account.account(tmp_path), Timeouts()))
 
     assert api.version() == "v1.36.4"
     api.close()
@@ -151,7 +151,7 @@ def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
     address, authority = wrong["name"]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
-    finding = next(iter(examining.examine(SimpleNamespace(api=api, namespace="robots"))))
+    finding = next(iter(run.examine(SimpleNamespace(api=api, namespace="robots"))))
 
     assert "is for another name" in finding.fact
     assert "tls-server-name" in finding.remedy

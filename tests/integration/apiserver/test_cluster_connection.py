@@ -11,13 +11,13 @@ from palaestra.cluster import (
     Api,
     ApiError,
     Forbidden,
-    Limits,
     NotConfigured,
+    Timeouts,
     Unreachable,
-    account,
     connect,
     connection,
     own_namespace,
+    service_account,
 )
 from palaestra.cluster.resources import PODS
 from palaestra.cluster.transport import Transport
@@ -110,7 +110,7 @@ def in_a_pod(control_plane, tmp_path, monkeypatch):
     (tmp_path / "ca.crt").write_bytes(authority.read_bytes())
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "127.0.0.1")
     monkeypatch.setenv("KUBERNETES_SERVICE_PORT", str(control_plane.port))
-    monkeypatch.setattr(account, "FILES", tmp_path)
+    monkeypatch.setattr(service_account, "FILES", tmp_path)
     return tmp_path
 
 
@@ -125,7 +125,7 @@ def test_a_pod_is_its_service_account_and_reads_its_token_anew(control_plane, in
     """The kubelet replaces tokens before they expire; the operator runs on."""
     now_s = [0.0]
     (in_a_pod / "token").write_text("expired")
-    api = Api(Transport(account.account(clock=lambda: now_s[0]), Limits()))
+    api = Api(Transport(service_account.account(clock=lambda: now_s[0]), Timeouts()))
     with pytest.raises(ApiError, match="Unauthorized"):
         api.version()
 

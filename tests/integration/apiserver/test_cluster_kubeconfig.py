@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from palaestra.cluster import Api, Limits, NotConfigured, Unreachable, account, connect
+from palaestra.cluster import Api, NotConfigured, Timeouts, Unreachable, connect, service_account
 from palaestra.cluster.resources import PODS
 from palaestra.cluster.transport import Transport
 from tests.control_plane.certificates import Authority
@@ -20,7 +20,7 @@ from tests.integration.apiserver.server import command, reply, serving, stream
 
 WORKED = b'\x03{"status": "Success"}'
 V1 = "client.authentication.k8s.io/v1"
-HASTE = Limits(connect_s=2, call_s=2)
+HASTE = Timeouts(connect_s=2, call_s=2)
 PROXIES = ("HTTPS_PROXY", "https_proxy", "HTTP_PROXY", "http_proxy", "NO_PROXY", "no_proxy", "ALL_PROXY")
 
 
@@ -344,7 +344,7 @@ def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
     with relaying(secure.port) as (address, notes):
         monkeypatch.setenv("https_proxy", f"me:pw@{address}")
 
-        ask_all(Api(Transport(account.account(tmp_path), Limits())))
+        ask_all(Api(Transport(service_account.account(tmp_path), Timeouts())))
 
         assert (set(notes.targets), set(notes.users)) == ({"10.96.0.1:443"}, {"me:pw"})
 

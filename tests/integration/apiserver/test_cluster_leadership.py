@@ -15,8 +15,8 @@ from prometheus_client import CollectorRegistry, Histogram
 
 from palaestra.cluster import Leadership, WorkQueue, connect
 from palaestra.cluster.resources import LEASES
+from palaestra.operator.fenced_client import FencedClient
 from palaestra.operator.workers import Workers
-from palaestra.operator.writing import Writer
 from tests.faults.course import Course
 from tests.faults.proxy import Proxy
 
@@ -224,7 +224,7 @@ class Absent:
         self._leadership = Leadership(
             self._api, namespace, self._name, "me", duration_s=ABSENT_S, renew_s=ABSENT_S / 5
         )
-        self._writer = Writer(self._api, self._leadership.term)
+        self._writer = FencedClient(self._api, self._leadership.term)
         self._workers = Workers(
             self._queue,
             self._reconcile,

@@ -6,7 +6,7 @@ import pytest
 
 from palaestra.api import TrainingJob
 from palaestra.api.crd import crd
-from palaestra.api.tree import walk
+from palaestra.api.model_walk import walk
 from tests.waiting import eventually
 
 # Of its own, because the other tests on this API server use the definition itself: `kubectl describe` lists a

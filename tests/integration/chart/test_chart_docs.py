@@ -6,7 +6,7 @@ import re
 import pytest
 import yaml
 
-from palaestra.observe.sources import FOR_JOBS
+from palaestra.observe.references import FOR_JOBS
 from tests.chart.helm import NAMESPACE, ROOT
 from tests.control_plane.programs import programs
 from tests.integration.chart.conftest import DEFINITION

@@ -8,7 +8,7 @@ import yaml
 
 from palaestra.cluster import connect
 from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, TRAINING_JOBS
-from palaestra.trial import TrialFailed, attempt
+from palaestra.smoke_test import TrialFailed, attempt
 from tests.chart import installation
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm
 from tests.chart.modes import MODES

@@ -14,10 +14,10 @@ from palaestra.cluster import connect
 from palaestra.cluster.errors import Unreachable
 from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
-from palaestra.given import data_of
+from palaestra.job_input import data_of
+from palaestra.sweeps.cluster_backend import QUIET_LOOKS, ClusterBackend
 from palaestra.sweeps.model import LABEL
-from palaestra.sweeps.there import QUIET_LOOKS, There
-from palaestra.sweeps.trial import State, Trial
+from palaestra.sweeps.trial import Trial, TrialProgress
 from tests.integration.apiserver.server import hang_up, raw, refusal, reply, serving, stream
 from tests.waiting import eventually
 
@@ -118,7 +118,7 @@ def test_a_wait_prints_nothing_of_its_own(waited, capsys):
 
 def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, capsys):
     """`helm test` with a typo in an image was silent until its deadline."""
-    monkeypatch.setattr("palaestra.trial.PERIOD_S", 0.0)
+    monkeypatch.setattr("palaestra.smoke_test.PERIOD_S", 0.0)
     script, kubeconfig = server
     (tmp_path / "job.yaml").write_text(JOB)
     waits = reply(obj={"status": {"phase": "Pending", "replicas": [WAITS]}})
@@ -303,14 +303,14 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
     script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]
 
     with Client(kubeconfig=kubeconfig) as client:
-        place = There(client, "s", 1, print, look_s=0.01)
+        place = ClusterBackend(client, "s", 1, print, look_s=0.01)
         place.begin(trial)
         full = not place.has_room()
         place.wait()
         figures = place.look(trial)
 
     assert full
-    assert figures.state is State.FAILED
+    assert figures.state is TrialProgress.FAILED
     assert place.has_room()
 
 
@@ -323,7 +323,7 @@ def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
     said = []
 
     with Client(kubeconfig=kubeconfig) as client, ThreadPoolExecutor(1) as pool:
-        place = There(client, "s", 1, said.append, look_s=0.01)
+        place = ClusterBackend(client, "s", 1, said.append, look_s=0.01)
         place.wait()
         place.wait()
         quiet = list(said)
@@ -351,7 +351,7 @@ def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwh
     ]
 
     with Client(kubeconfig=kubeconfig) as client:
-        place = There(client, "s", 1, print, look_s=0.01)
+        place = ClusterBackend(client, "s", 1, print, look_s=0.01)
         place.wait()
         place.begin(trial)
         place.prune(trial)
@@ -367,7 +367,7 @@ def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, tri
     script.calls = [hang_up]
 
     with Client(kubeconfig=kubeconfig) as client, pytest.raises(Unreachable):
-        There(client, "s", 1, print, look_s=0.01).begin(trial)
+        ClusterBackend(client, "s", 1, print, look_s=0.01).begin(trial)
 
 
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
@@ -377,7 +377,7 @@ def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers
     script.calls = [*answers, refusal(404, "NotFound")]
 
     with Client(kubeconfig=kubeconfig) as client:
-        There(client, "s", 1, print).prune(trial)
+        ClusterBackend(client, "s", 1, print).prune(trial)
 
     assert [asked.method for asked in script.asked] == ["GET", "DELETE"][: 1 + len(answers)]
 

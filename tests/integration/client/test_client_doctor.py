@@ -7,7 +7,7 @@ import pytest
 from palaestra.cli import main
 from palaestra.cluster import Leadership, Resource, connect
 from palaestra.cluster.resources import DEPLOYMENTS, NODES, STORAGE_CLASSES
-from palaestra.doctor import Site, Verdict, examine
+from palaestra.doctor import CheckStatus, Site, examine
 from palaestra.doctor.installation import trainer_image
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
@@ -67,7 +67,7 @@ def test_missing_nodes_storage_and_operator_are_reported(found):
         "operator's rights": "wrong",
         "metrics": "wrong",
     }
-    assert all(each.remedy for each in findings.values() if each.verdict is not Verdict.RIGHT)
+    assert all(each.remedy for each in findings.values() if each.verdict is not CheckStatus.RIGHT)
     assert "get trainingjobs" in findings["operator's rights"].fact
 
 
@@ -154,7 +154,7 @@ def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, 
 
     findings = found()
 
-    assert findings["operator"].verdict is Verdict.WRONG
+    assert findings["operator"].verdict is CheckStatus.WRONG
     assert "0 of 1 are ready" in findings["operator"].fact
     assert "palaestra-operator:0.0.0" in findings["operator"].fact
     assert "service account chosen may not" in findings["operator's rights"].fact
@@ -168,7 +168,7 @@ def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales
 
     told = [findings[what] for what in ("operator", "leader", "metrics")]
     scale = f"`kubectl scale -n {place.name} deployment/palaestra-operator --replicas=1`"
-    assert [(each.verdict, each.remedy) for each in told] == [(Verdict.WRONG, scale)] * 3
+    assert [(each.verdict, each.remedy) for each in told] == [(CheckStatus.WRONG, scale)] * 3
     assert told[0].fact.startswith(f"is scaled to 0 in {place.name}")
 
 
@@ -178,7 +178,7 @@ def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(p
 
     findings = {each.what: each for each in examine(site)}
 
-    assert findings["namespace"].verdict is Verdict.WRONG
+    assert findings["namespace"].verdict is CheckStatus.WRONG
     assert findings["namespace"].fact == "nosuch does not exist"
     assert "`kubectl create namespace nosuch`" in findings["namespace"].remedy
     assert "-n" in findings["namespace"].remedy
@@ -203,14 +203,14 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
     findings = found(nobody)
 
     nobody.close()
-    assert findings["to look at jobs"].verdict is Verdict.WRONG
+    assert findings["to look at jobs"].verdict is CheckStatus.WRONG
     assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to look at jobs"].fact
-    assert findings["to author jobs"].verdict is Verdict.WRONG
-    assert findings["to read logs"].verdict is Verdict.UNKNOWN  # not everybody has to
-    assert findings["to fetch runs"].verdict is Verdict.UNKNOWN
+    assert findings["to author jobs"].verdict is CheckStatus.WRONG
+    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not everybody has to
+    assert findings["to fetch runs"].verdict is CheckStatus.UNKNOWN
     assert "create pods/exec" in findings["to fetch runs"].fact
-    assert findings["storage class"].verdict is Verdict.UNKNOWN
-    assert findings["sidecars"].verdict is Verdict.UNKNOWN
+    assert findings["storage class"].verdict is CheckStatus.UNKNOWN
+    assert findings["sidecars"].verdict is CheckStatus.UNKNOWN
     assert place.name in findings["to look at jobs"].fact
 
 
@@ -223,10 +223,10 @@ def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(fo
     with_room = found()["sidecars"]
 
     place.api.merge(QUOTAS, place.name, "few", {"spec": {"hard": {"pods": "0"}}})
-    spent = eventually(lambda: (each := found()["sidecars"]).verdict is not Verdict.RIGHT and each)
+    spent = eventually(lambda: (each := found()["sidecars"]).verdict is not CheckStatus.RIGHT and each)
 
     assert with_room.fact == "stay unchanged when a pod is created"
-    assert spent.verdict is Verdict.UNKNOWN
+    assert spent.verdict is CheckStatus.UNKNOWN
     assert "exceeded quota: few" in spent.fact
     assert spent.remedy == "try again when the quota has room"
 
@@ -261,7 +261,7 @@ def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place)
     )
 
     found_out = eventually(
-        lambda: (each := found()["sidecars"]).verdict is Verdict.WRONG and each
+        lambda: (each := found()["sidecars"]).verdict is CheckStatus.WRONG and each
     )  # the API server learns of a policy a moment later
 
     place.api.delete(BINDINGS, None, "old")

@@ -7,14 +7,14 @@ import yaml
 
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
-from palaestra.sweeps import ledger
-from palaestra.sweeps.carrying_out import carry_out
-from palaestra.sweeps.expanding import trials
+from palaestra.sweeps import trial_log
+from palaestra.sweeps.cluster_backend import ClusterBackend, NotOfThisSweep
+from palaestra.sweeps.grid import trials
 from palaestra.sweeps.model import Objective, load
-from palaestra.sweeps.searching import InTurn
-from palaestra.sweeps.suggesting import Suggested
-from palaestra.sweeps.there import NotOfThisSweep, There
-from palaestra.sweeps.trial import State
+from palaestra.sweeps.optuna_search import OptunaSearch
+from palaestra.sweeps.runner import carry_out
+from palaestra.sweeps.search import InTurn
+from palaestra.sweeps.trial import TrialProgress
 from tests.waiting import eventually
 
 JOB = {
@@ -51,7 +51,7 @@ def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place,
     search = InTurn(trials(sweep), {})
     with ThreadPoolExecutor(1) as pool:
         carried = pool.submit(
-            carry_out, search, There(client, "s", None, print, 0.05), tmp_path, SUCCESS, print
+            carry_out, search, ClusterBackend(client, "s", None, print, 0.05), tmp_path, SUCCESS, print
         )
         eventually(lambda: place.get(TRAINING_JOBS, "s-1") or carried.done(), PATIENCE_S)
         jobs = place.api.list(TRAINING_JOBS, place.name, labels="palaestra.dev/sweep=s")
@@ -62,8 +62,11 @@ def test_trials_are_jobs_with_a_label_that_their_queue_runs(file, client, place,
     assert sorted(job["metadata"]["name"] for job in jobs) == ["s-0", "s-1"]
     assert {job["spec"]["scheduling"]["queueName"] for job in jobs} == {"trainings"}
     assert {job["spec"]["replicas"] for job in jobs} == {2}
-    ended = ledger.ended(tmp_path)
-    assert {number: found.state for number, found in ended.items()} == {0: State.COMPLETE, 1: State.FAILED}
+    ended = trial_log.ended(tmp_path)
+    assert {number: found.state for number, found in ended.items()} == {
+        0: TrialProgress.COMPLETE,
+        1: TrialProgress.FAILED,
+    }
     assert ended[0].median(sweep.spec.objective) == 0.55
 
 
@@ -71,9 +74,11 @@ def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_pat
     """Its pods would only take the place of others."""
     space = {"trainer.steps": {"low": 100, "high": 200}}
     sweep = load(file(random=space, trials=2, optuna={"startupTrials": 1}))
-    search, journal = Suggested(sweep, tmp_path), tmp_path / "optuna.journal"
+    search, journal = OptunaSearch(sweep, tmp_path), tmp_path / "optuna.journal"
     with ThreadPoolExecutor(1) as pool:
-        carried = pool.submit(carry_out, search, There(client, "s", 1, print, 0.05), tmp_path, SUCCESS, print)
+        carried = pool.submit(
+            carry_out, search, ClusterBackend(client, "s", 1, print, 0.05), tmp_path, SUCCESS, print
+        )
         eventually(lambda: place.get(TRAINING_JOBS, "s-0") or carried.done(), PATIENCE_S)
         tell("s-0", "Running", replicas=[replica(0, "Running", rate=0.9)])
         eventually(lambda: journal.exists() and '"intermediate_value"' in journal.read_text(), PATIENCE_S)
@@ -84,7 +89,7 @@ def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_pat
 
     assert place.get(TRAINING_JOBS, "s-1") is None
     assert place.get(TRAINING_JOBS, "s-0") is not None
-    assert ledger.ended(tmp_path)[1].state is State.PRUNED
+    assert trial_log.ended(tmp_path)[1].state is TrialProgress.PRUNED
 
 
 def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_path):
@@ -94,7 +99,7 @@ def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_
     search = InTurn(trials(load(file(matrix={"seed": [1]}))), {})
 
     with pytest.raises(NotOfThisSweep, match="not of this sweep; give the sweep another name"):
-        carry_out(search, There(client, "s", None, print), tmp_path, Objective.SUCCESS_RATE, print)
+        carry_out(search, ClusterBackend(client, "s", None, print), tmp_path, Objective.SUCCESS_RATE, print)
 
     assert place.get(TRAINING_JOBS, "s-0") == before
 
@@ -106,7 +111,7 @@ def test_a_namespace_in_the_job_is_that_of_the_command(file, client):
     )
 
     with pytest.raises(PalaestraError, match=r"metadata\.namespace: is x, and the sweep is for .*; choose"):
-        There(client, "s", None, print).check(trial.job)
+        ClusterBackend(client, "s", None, print).check(trial.job)
 
 
 def test_the_command_shows_a_sweep_that_has_ended_in_the_cluster(file, client, tell, typed, tmp_path):

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from palaestra.local.container import BackOff
+from palaestra.local.orphan_killer import MARKER
 from palaestra.local.output import Log
 from palaestra.local.pod import Kubelet, RunningPod
-from palaestra.local.spec import Container, Pod
-from palaestra.local.watchdog import MARKER
+from palaestra.local.pod_spec import Container, Pod
 
 PATIENCE_S = 20.0  # for what takes milliseconds on a machine that does nothing else
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from palaestra.cli import main
-from palaestra.sweeps.expanding import trials
+from palaestra.sweeps.grid import trials
 from palaestra.sweeps.model import SweepSpec, load
 from tests.pages import blocks
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra.plan.text import literal
+from palaestra.plan.yaml_text import literal
 
 PLAY = Path(__file__).with_name("play_job.py")
 MARKER = "PALAESTRA_LOCAL_CONTAINER"

@@ -9,11 +9,11 @@ import subprocess
 
 import pytest
 
-from palaestra.local import watchdog
+from palaestra.local import orphan_killer
+from palaestra.local.bounded_log import FIRST, LAST
 from palaestra.local.errors import StartFailed
-from palaestra.local.limited import FIRST, LAST
+from palaestra.local.pod_spec import Probe
 from palaestra.local.process import marked
-from palaestra.local.spec import Probe
 from tests.failing import failing
 
 
@@ -205,7 +205,7 @@ def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypa
     else:
         monkeypatch.setattr(os, "pidfd_open", failing(lack))
     with subprocess.Popen(["sleep", "60"], env=marked({}, "pod", "main")) as left:
-        killed = watchdog.kill_marked("pod/")
+        killed = orphan_killer.kill_marked("pod/")
         if not killed:
             left.kill()
 

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from palaestra.cli import main
-from palaestra.given import job_of
-from palaestra.sweeps.here import busy
+from palaestra.job_input import job_of
+from palaestra.sweeps.local_backend import busy
 from tests.local_run import EXAMPLES, below, left_of
 from tests.waiting import eventually
 

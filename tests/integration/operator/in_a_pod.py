@@ -11,5 +11,5 @@ if __name__ == "__main__":
     folder, *arguments = sys.argv[1:]
     with suppress(SystemExit), redirect_stdout(io.StringIO()):
         main(["operator", "--help"])  # imports what an operator imports, and nothing more
-    sys.modules["palaestra.cluster.account"].FILES = Path(folder)
+    sys.modules["palaestra.cluster.service_account"].FILES = Path(folder)
     sys.exit(main(arguments))

@@ -7,11 +7,11 @@ from palaestra.cluster import connect
 from palaestra.cluster.resources import CLAIMS, JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS
 from palaestra.decide import Delete, Discard, SetSuspend, Stop
 from palaestra.decide.decision import Basis
-from palaestra.operator.acting import Acting
-from palaestra.operator.confirming import Outdated
-from palaestra.operator.denials import Denials
-from palaestra.operator.strangers import Strangers
-from palaestra.operator.writing import Writer
+from palaestra.operator.executor import Executor
+from palaestra.operator.fenced_client import FencedClient
+from palaestra.operator.foreign_jobs import ForeignJobs
+from palaestra.operator.preconditions import Outdated
+from palaestra.operator.rejected_creations import RejectedCreations
 from tests.integration.operator.cluster import stranger
 from tests.integration.operator.installed import USER
 from tests.waiting import eventually
@@ -141,8 +141,8 @@ def shared_claim():
 
 def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
     """Preconditions hold at the API server: the time to live is removed, the Job resumed, in between."""
-    writer = Writer(installed, lambda: True)
-    acting = Acting(installed, writer, Strangers(installed), Denials())
+    writer = FencedClient(installed, lambda: True)
+    acting = Executor(installed, writer, ForeignJobs(installed), RejectedCreations())
     place.train()
     job = place.create(JOBS, stranger("job-0"))
     basis = Basis(uid=job["metadata"]["uid"], version=job["metadata"]["resourceVersion"])

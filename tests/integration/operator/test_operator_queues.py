@@ -7,7 +7,7 @@ import pytest
 from palaestra.api.reasons import LONGEST_FACT
 from palaestra.cluster import NotFound, Resource
 from palaestra.cluster.resources import DEFINITIONS, JOBS, RIGHTS, WORKLOADS
-from palaestra.observe.workloads import NO_WORKLOAD
+from palaestra.observe.kueue import NO_WORKLOAD
 from palaestra.operator.options import NAME
 from tests.integration.operator.cluster import kind_of_kueue, local_queues
 from tests.integration.operator.installed import USER

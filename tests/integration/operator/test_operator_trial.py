@@ -6,7 +6,7 @@ import pytest
 
 from palaestra.cli import main
 from palaestra.cluster.resources import CLAIMS, TRAINING_JOBS
-from palaestra.trial import TTL_S
+from palaestra.smoke_test import TTL_S
 from tests.integration.operator.test_operator_lifecycle import DONE
 from tests.waiting import DEADLINE_S, eventually
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from palaestra.cluster import Api
-from palaestra.operator.apart import Apart
-from palaestra.plan import GivenWorld, Verdict
+from palaestra.operator.world_check_process import WorldCheckProcess
+from palaestra.plan import GivenWorld, WorldVerdict
 from tests.bench.hostile import costly, with_world
 from tests.integration.operator.cluster import Place
 from tests.integration.operator.conftest import Start
@@ -22,7 +22,7 @@ FINE = GivenWorld(field=FIELD, source=costly(20_000))
 REMEDY = "make the world smaller, or put it into the image and name it with world.file"
 PARENT = """
 import sys
-from palaestra.operator.apart import Apart
+from palaestra.operator.world_check_process import Apart
 from palaestra.plan import GivenWorld
 from tests.bench.hostile import costly
 Apart(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_000_000))])
@@ -38,9 +38,9 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     """The same as those of a check in the same process."""
     wrong = GivenWorld(field=FIELD, source=b"#VRML_SIM R2023b utf8\n}")
 
-    found = Apart().check([FINE, wrong])
+    found = WorldCheckProcess().check([FINE, wrong])
 
-    assert found[FINE.digest] == Verdict()
+    assert found[FINE.digest] == WorldVerdict()
     assert found[wrong.digest].problem.startswith(f"{FIELD}:2:1: }} where the type of a node should be")
 
 
@@ -55,15 +55,18 @@ def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, w
     """The message names the field, the budget and the remedy; worlds before it keep their verdicts."""
     large = given(size)
 
-    found = Apart(**budget).check([FINE, large])
+    found = WorldCheckProcess(**budget).check([FINE, large])
 
     problem = f"{FIELD}: its check takes more than the {words} that a world has; {REMEDY}"
-    assert found == {FINE.digest: Verdict(), large.digest: Verdict(problem=problem, too_costly=True)}
+    assert found == {
+        FINE.digest: WorldVerdict(),
+        large.digest: WorldVerdict(problem=problem, too_costly=True),
+    }
 
 
 def test_a_deadline_is_no_verdict() -> None:
     """A busy node passes it, whatever the world."""
-    assert Apart(mebibytes=1024, deadline_s=0.01).check([given(900_000)]) == {}
+    assert WorldCheckProcess(mebibytes=1024, deadline_s=0.01).check([given(900_000)]) == {}
 
 
 def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:

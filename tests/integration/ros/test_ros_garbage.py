@@ -10,7 +10,7 @@ import pytest
 
 from palaestra_trainer.errors import MasterLost, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, RosSubscriber, ensure_node
-from palaestra_trainer.ros.wire import Wire
+from palaestra_trainer.ros.tcpros_client import TcprosClient
 
 DEADLINE_S = 60.0  # of what takes moments, on a busy machine
 HTTP = b"HTTP/1.0 200 OK\r\nContent-Type: text/xml\r\n\r\n"
@@ -121,7 +121,9 @@ def connected():
         threading.Thread(target=listening.serve_forever, args=(0.01,), daemon=True).start()
 
         def connect(deadline_s):
-            wires.append(Wire(listening.server_address, {"callerid": "/test"}, "robotino", deadline_s))
+            wires.append(
+                TcprosClient(listening.server_address, {"callerid": "/test"}, "robotino", deadline_s)
+            )
             return wires[-1], peers.get(timeout=DEADLINE_S)
 
         yield connect

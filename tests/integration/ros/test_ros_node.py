@@ -230,7 +230,7 @@ def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
 
 def links_there():
     """Return the connections of nodes that this process holds, open or closed."""
-    return [each for each in gc.get_objects() if isinstance(each, links.Link)]
+    return [each for each in gc.get_objects() if isinstance(each, links.RosLink)]
 
 
 def test_requests_wait_while_the_controller_is_blocked(peer, dial):

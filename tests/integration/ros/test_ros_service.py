@@ -13,8 +13,8 @@ import pytest
 
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
-from palaestra_trainer.waiting import patience
-from palaestra_trainer.waiting.waits import waited_s
+from palaestra_trainer.waiting import shutdown_deadline
+from palaestra_trainer.waiting.wait_time import waited_s
 
 DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
 
@@ -151,13 +151,13 @@ def test_when_patience_is_over_nobody_is_waited_for(service):
         each.begin(ask=True)
     before = waited_s()
 
-    patience.end(after_s=-1.0)
+    shutdown_deadline.end(after_s=-1.0)
     try:
         for each in never:
             with pytest.raises(SimulatorHung):
                 each.finish()
     finally:
-        patience.renew()
+        shutdown_deadline.renew()
 
     assert waited_s() - before < 5.0
     assert get_time(ask=True).value == 1.25

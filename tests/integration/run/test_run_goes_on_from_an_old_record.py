@@ -5,7 +5,7 @@ from pathlib import Path
 
 import yaml
 
-from palaestra.local import rundir
+from palaestra.local import run_directory
 from tests.local_run import LocalRun
 
 OLD = Path(__file__).parents[2] / "fixtures" / "a5276f3" / "interrupted"
@@ -17,12 +17,12 @@ def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_a5276f3(tmp_path):
 
     Its unfinished episodes cannot be replayed: a5276f3 drew their starts before it knew what stands where.
     """
-    record = yaml.safe_load((OLD / rundir.RECORD).read_text())
+    record = yaml.safe_load((OLD / run_directory.RECORD).read_text())
     run = LocalRun(tmp_path, {**record, "metadata": {"name": record["metadata"]["name"]}})
     shutil.copytree(OLD, run.directory)
     # A job's uid on a laptop follows from where its runs lie, and this one lay elsewhere.
-    record["metadata"]["uid"] = rundir.uid_of(run.directory.parent)
-    (run.directory / rundir.RECORD).write_text(yaml.safe_dump(record))
+    record["metadata"]["uid"] = run_directory.uid_of(run.directory.parent)
+    (run.directory / run_directory.RECORD).write_text(yaml.safe_dump(record))
 
     with run:
         code, output = run.end(PATIENCE_S)

@@ -7,8 +7,8 @@ import threading
 import pytest
 
 from palaestra_protocol.control import SidecarState, SimulatorState
-from palaestra_sim.sidecar.lifecycle import Event
-from palaestra_sim.sidecar.process import Command
+from palaestra_sim.sidecar.lifecycle import LifecycleEvent
+from palaestra_sim.sidecar.process import CommandLine
 from palaestra_sim.sidecar.simulator import SupervisedSimulator
 from tests.integration.sidecar.conftest import DEADLINE_S, eventually
 
@@ -27,13 +27,13 @@ def test_no_state_is_seen_half_made(statement) -> None:
     """A trainer may ask at any moment and acts on what it reads: a failure comes with how it ended."""
     program = (sys.executable, "-I", "-S", "-c", f"import os, signal, sys; {statement}")
     simulator = Watched(
-        Command(arguments=program, environment=dict(os.environ)),
+        CommandLine(arguments=program, environment=dict(os.environ)),
         SimulatorState(state=SidecarState.IDLE, driver="command", world="arena.wbt"),
     )
     owner = threading.Thread(target=simulator.run, daemon=True)
     owner.start()
 
-    simulator.ask(Event.START)
+    simulator.ask(LifecycleEvent.START)
     eventually(lambda: simulator.state.faults)
     simulator.shut_down()
     owner.join(DEADLINE_S)

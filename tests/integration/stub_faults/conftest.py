@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.faults.language import KINDS
+from palaestra_sim.faults.parser import KINDS
 
 PAGE = Path(__file__).parents[3] / "docs/simulators.md"
 ROW = re.compile(

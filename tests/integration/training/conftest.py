@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from palaestra_trainer.configuration import load
-from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.run import training
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs
 
@@ -75,7 +75,7 @@ def play(fakes, tmp_path, monkeypatch, capsys):
             fakes.before_step(members[0].robot, at, lambda: os.kill(os.getpid(), number))
             return members
 
-        code = training.run(load(job), RunDirectory(tmp_path / "run"), make_members)
+        code = run_attempt.run(load(job), RunDirectory(tmp_path / "run"), make_members)
         return code, capsys.readouterr().err
 
     return attempt

@@ -19,9 +19,9 @@ import gymnasium
 
 import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
 from palaestra_trainer.configuration import Configuration, load
-from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs
 from palaestra_trainer.testing import fake_arena, fake_seeing
@@ -112,7 +112,7 @@ def main(config: str, run: str, deaths: str = "") -> int:
     """Train; return the exit code."""
     configure_logs()
     numbers = [int(number) for number in deaths.split(",") if number]
-    return training.run(load(Path(config)), RunDirectory(Path(run)), lambda it: make_members(it, numbers))
+    return attempt.run(load(Path(config)), RunDirectory(Path(run)), lambda it: make_members(it, numbers))
 
 
 if __name__ == "__main__":

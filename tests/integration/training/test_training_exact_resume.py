@@ -18,12 +18,12 @@ from torch.optim.optimizer import register_optimizer_step_pre_hook
 from palaestra_trainer import checkpoint
 from palaestra_trainer.configuration import load
 from palaestra_trainer.errors import MasterLost
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.display import Lines
 from palaestra_trainer.telemetry.logs import configure_logs
 from palaestra_trainer.telemetry.progress import Progress
-from palaestra_trainer.waiting import patience
+from palaestra_trainer.waiting import shutdown_deadline
 
 SMALL = {"policy_kwargs": {"net_arch": [16]}}
 OFF_POLICY = SMALL | {"learning_starts": 50, "batch_size": 16, "buffer_size": 300}
@@ -89,8 +89,8 @@ def attempt(fakes):
             fakes.before_step(members[0].robot, at, interrupt)
             return members
 
-        around = training.Surroundings(make_members=make_members, display=Lines(), environment={})
-        end = training.Attempt(configuration, directory, progress, around).play()
+        around = run_attempt.AttemptDependencies(make_members=make_members, display=Lines(), environment={})
+        end = run_attempt.Attempt(configuration, directory, progress, around).play()
         episodes += progress.ended
         return end.code
 
@@ -212,7 +212,7 @@ def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_p
     def ask(*_step):
         if next(steps) == asked_at:
             terminate()
-            patience.end(0.0)
+            shutdown_deadline.end(0.0)
 
     assert attempt(job(name), whole, ended) == 0
     assert attempt(job(name), parts, played, 130, kill) == 1
@@ -235,7 +235,7 @@ def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name)
     def ask(*_step):
         if next(steps) == 1:
             terminate()
-            patience.end(0.0)
+            shutdown_deadline.end(0.0)
 
     assert attempt(thorough, whole, ended) == 0
     with register_optimizer_step_pre_hook(ask):

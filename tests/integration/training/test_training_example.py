@@ -13,7 +13,7 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3 import PPO
 
-from palaestra_trainer.tolerant import making
+from palaestra_trainer.fault_tolerant import make
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
@@ -69,7 +69,7 @@ def script(write_job, fakes, tmp_path, monkeypatch):
 
         (tmp_path / attempt).mkdir()
         monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / attempt))
-        monkeypatch.setattr(making, "connect_members", made)
+        monkeypatch.setattr(make, "connect_members", made)
         runpy.run_path(str(SCRIPT), run_name="__main__")
         return started
 

@@ -11,7 +11,7 @@ import pytest
 
 from palaestra_trainer import checkpoint, load_policy
 from palaestra_trainer.configuration import load
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
 
 GOALS = {"id": "MoveToTargetGoalEnv-v0", "reward": "Sparse", "options": {"max_steps": 30}}
@@ -49,7 +49,7 @@ def attempt(fakes, tmp_path):
             return members
 
         directory = RunDirectory(tmp_path / folder)
-        return training.run(load(job), directory, make_members), directory
+        return run_attempt.run(load(job), directory, make_members), directory
 
     return play
 

@@ -11,13 +11,13 @@ import pytest
 
 from palaestra_trainer import load_policy
 from palaestra_trainer.algorithms import make_model, policy_of, small_cnn
-from palaestra_trainer.algorithms.kept import begun_with
+from palaestra_trainer.algorithms.saved_hyperparameters import begun_with
 from palaestra_trainer.checkpoint import load_tensors
 from palaestra_trainer.configuration import load
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import fake_arena, fake_seeing
 
 PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
@@ -32,7 +32,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
     job = write_job(algorithm=algorithm, steps=128)
     assert play(job)[0] == 0
     configuration, directory = load(job), RunDirectory(tmp_path / "run")
-    env = SimulatorsVecEnv([Keeper(fakes.make_members(configuration)[0])], 1)
+    env = SimulatorsVecEnv([Restarter(fakes.make_members(configuration)[0])], 1)
     trained = make_model(begun_with(configuration, directory), env, 1)
     load_tensors(directory.model, trained)
 

@@ -16,12 +16,12 @@ import pytest
 from palaestra.local.ports import LOOPBACK, HeldPorts
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.entry_point import make
-from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
-from palaestra_trainer.simulators.member import NullWatcher
+from palaestra_trainer.simulators.interface import NullWatcher
+from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
 from palaestra_trainer.simulators.simulator import Simulator
 from tests.waiting import eventually
 
@@ -53,7 +53,7 @@ class Trained:
         self._sidecar = sidecar
         self.restarts = Restarts()
         simulator = Simulator("collect-0", sidecar, make, 20.0)
-        self.keeper = Keeper(simulator, RestartLimit(restarts=20), self.restarts)
+        self.keeper = Restarter(simulator, RestartLimit(restarts=20), self.restarts)
         self.keeper.begin_start()
         await_one([self.keeper])
         assert self.keeper.up()

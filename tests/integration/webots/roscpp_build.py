@@ -10,7 +10,7 @@ from pathlib import Path
 
 import genmsg.template_tools
 
-from palaestra_sim.message_package.writing import write
+from palaestra_sim.message_package.package_writer import write
 
 PROGRAM = Path(__file__).with_name("roscpp_client.cpp")
 TEMPLATES = "/usr/share/gencpp"

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
-from palaestra_trainer.webots import Lever, Mode, MujocoActuator, MujocoSensor, Webots
+from palaestra_trainer.webots import JointMotor, Mode, MujocoActuator, MujocoSensor, Webots
 from palaestra_trainer.webots.devices import PositionSensor
 
 STEP_MS = 40
@@ -104,7 +104,7 @@ class TestAKeyframe:
 
     def test_its_control_acts_until_the_first_command_after_a_reset(self, cartpole):
         """A command of 0 at a reset would let a robot fall that its keyframe holds up."""
-        lever = Lever("cartpole", "push", "force")
+        lever = JointMotor("cartpole", "push", "force")
         lever.release()
         start = [cartpole.step() for _ in range(5)]
         cartpole.call("supervisor/simulation_reset", "get_bool", ask=True)

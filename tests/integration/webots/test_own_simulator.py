@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 import palaestra_trainer.environments
 from palaestra_trainer.errors import Paused, SimulatorDead
-from palaestra_trainer.simulators.offered import offered_simulator
+from palaestra_trainer.simulators.notebook_simulator import offered_simulator
 from palaestra_trainer.webots import Attached, Webots
 
 NAME = "MoveToTargetEnv-v0"

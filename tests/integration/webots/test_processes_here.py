@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
-from palaestra_trainer.launching.child import drain, end_child, first_line, start_child
+from palaestra_trainer.launching.subprocesses import drain, end_child, first_line, start_child
 from palaestra_trainer.webots import Webots
 
 PATIENCE_S = 60.0
@@ -71,7 +71,7 @@ def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tm
     del master
     code = (
         "import sys\n"
-        "from palaestra_trainer.launching.process import ProcessLauncher\n"
+        "from palaestra_trainer.launching.local_simulator import ProcessLauncher\n"
         "launcher = ProcessLauncher('arena', suffix='_2')\n"
         "print(launcher.state().world, flush=True)\n"
         "sys.stdin.read()\n"
@@ -112,7 +112,7 @@ def test_after_an_interrupted_call_the_next_answer_is_its_own(own_arena, monkeyp
     """Ctrl-C in a notebook cell must not shift every later answer by one."""
     probe = own_arena.webots.observer
     before = probe.time()
-    monkeypatch.setattr("palaestra_trainer.ros.wire.Wire.receive", _interrupted)
+    monkeypatch.setattr("palaestra_trainer.ros.tcpros_client.TcprosClient.receive", _interrupted)
     with pytest.raises(KeyboardInterrupt):
         probe.time()
     monkeypatch.undo()

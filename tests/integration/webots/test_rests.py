@@ -9,8 +9,8 @@ import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Mode
 from tests.waiting import eventually
@@ -28,7 +28,7 @@ class Rested:
 
         self.launcher = ProcessLauncher("arena")
         self.simulator = Simulator("collect-0", self.launcher, make, PATIENCE_S)
-        self.keeper = Keeper(self.simulator)
+        self.keeper = Restarter(self.simulator)
         self.keeper.begin_start()
         await_one([self.keeper])
         self.env = SimulatorsVecEnv([self.keeper], 0)

@@ -14,8 +14,8 @@ from palaestra_trainer.testing.fake_burger import COURT
 from palaestra_trainer.testing.fake_epuck import PEN
 from palaestra_trainer.testing.fake_scene import arena as fake_floor
 from palaestra_trainer.webots import FLOOR, Webots
+from palaestra_trainer.webots.obstacles import ObstacleReader
 from palaestra_trainer.webots.services import Services
-from palaestra_trainer.webots.surroundings import Surroundings
 
 START, TARGET = Pose(0.0, 0.0, 1.0), (1.0, 0.0)
 FITTED = b"""
@@ -226,7 +226,7 @@ def test_only_what_looks_different_when_turned_is_asked_for_its_orientation(aren
     """Each call of a reset counts: a layout has a floor with two corners, which no heading changes."""
     services = Noting(arena.webots.supervisor.node_name)
     try:
-        things = Surroundings(services).read()
+        things = ObstacleReader(services).read()
     finally:
         services.close()
 

@@ -10,8 +10,8 @@ import pytest
 
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
-from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.launching.reservations import Reservation
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.launching.ros_name_locks import Reservation
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
@@ -99,7 +99,7 @@ def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
 def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, name):
     """Two notebooks that start at the same time must not get one name."""
     code = (
-        "from palaestra_trainer.launching.reservations import Reservation\n"
+        "from palaestra_trainer.launching.ros_name_locks import Reservation\n"
         "held = Reservation()\n"
         f"print(held.take([{name!r}]), flush=True)\n"
         "input()\n"

@@ -14,9 +14,9 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_protocol.control import SidecarState
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.simulators.budget import RestartLimit
-from palaestra_trainer.simulators.keeper import Keeper, settle
+from palaestra_trainer.simulators.restarter import Restarter, settle
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode
@@ -262,7 +262,7 @@ def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandone
     held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
     it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
-    keeper = Keeper(it.member, RestartLimit(restarts=1000))
+    keeper = Restarter(it.member, RestartLimit(restarts=1000))
     keeper.begin_mending(SimulatorDead("collect-0", "gone"))
     give_up = time.monotonic() + PATIENCE_S
     while it.first.sidecar.state().starts < 2:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import PERIOD_MS, SimulatedScene

@@ -7,7 +7,7 @@ import pytest
 from palaestra_trainer.errors import WrongData
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import wheel_speeds
-from palaestra_trainer.waiting.turns import take_turns
+from palaestra_trainer.waiting.greenlets import take_turns
 from palaestra_trainer.webots import Motor, set_velocities
 from palaestra_trainer.webots.services import Services
 

@@ -10,13 +10,13 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_sim.ros import Loop, RosNode
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
-from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Webots
-from palaestra_trainer.webots.requirements import require_devices
+from palaestra_trainer.webots.device_check import require_devices
 
 DEADLINE_S = 60.0
 ARENA = builtin("arena")
@@ -69,7 +69,7 @@ def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, w
 
     launcher = ProcessLauncher(world(source))
     simulator = Simulator("collect-0", launcher, make, DEADLINE_S)
-    keeper = Keeper(simulator)
+    keeper = Restarter(simulator)
     pids = []
     start = simulator.start
 

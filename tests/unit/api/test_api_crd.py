@@ -8,8 +8,8 @@ import pytest
 
 from palaestra.api import TrainingJob, as_data, validate
 from palaestra.api.crd import crd
-from palaestra.api.generated import crd_text
-from palaestra.api.tree import walk
+from palaestra.api.generated_files import crd_text
+from palaestra.api.model_walk import walk
 
 FORBIDDEN = {
     "$ref", "$defs", "allOf", "anyOf", "oneOf", "not", "title", "const", "examples", "propertyNames",

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from palaestra.api import TrainingJob, broken_guards, validate
-from palaestra.api.tree import fields_of, walk
+from palaestra.api.model_walk import fields_of, walk
 
 URI = "http://alice:S3CR%40ET@tracking.example.com:5000/mlflow"
 IN_VALUE = "contains a password in an address; put the value into a Secret and use secretKeyRef"

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from palaestra.api import TrainingJob
 from palaestra.api.container import Variable
+from palaestra.api.model_walk import model_at, walk
 from palaestra.api.paths import Pruned, path_of, shown
-from palaestra.api.simulators import World
-from palaestra.api.tree import model_at, walk
+from palaestra.api.simulators import WorldSource
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_nothing_taken_is_everything_left(data) -> None:
 
 def test_the_model_at_a_path_is_found_through_lists() -> None:
     """Nearest names are looked for where the mistake is."""
-    assert model_at(TrainingJob, ("spec", "simulators", 3, "world")) is World
+    assert model_at(TrainingJob, ("spec", "simulators", 3, "world")) is WorldSource
     assert model_at(TrainingJob, ("spec", "trainer", "env", 0)) is Variable
     assert model_at(TrainingJob, ("spec", "seed")) is None
     assert model_at(TrainingJob, ("spec", "nowhere", "else")) is None

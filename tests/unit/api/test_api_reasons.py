@@ -5,7 +5,7 @@ import string
 
 import pytest
 
-from palaestra.api.generated import reasons_page, reasons_table
+from palaestra.api.generated_files import reasons_page, reasons_table
 from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason, say
 
 

@@ -9,8 +9,8 @@ import re
 import pytest
 from pydantic import ValidationError
 
-from palaestra.api import TrainingJob, World
-from palaestra.api.tree import fields_of, walk
+from palaestra.api import TrainingJob, WorldSource
+from palaestra.api.model_walk import fields_of, walk
 
 COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
 
@@ -402,4 +402,4 @@ def test_only_what_lies_in_options_has_no_expression() -> None:
 def test_a_job_built_in_python_keeps_the_rules_too() -> None:
     """The rules belong to the models, not to the reading of files."""
     with pytest.raises(ValidationError, match="needs exactly one of inline"):
-        World()
+        WorldSource()

@@ -362,7 +362,7 @@ def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
 
 def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
     """An operator's image has the command and no trainer."""
-    monkeypatch.setattr("palaestra.local.exporting.PROGRAM", "palaestra-none")
+    monkeypatch.setattr("palaestra.local.export.PROGRAM", "palaestra-none")
 
     assert main(["export", str(tmp_path), "--to", "onnx"]) == 2
 

@@ -53,7 +53,7 @@ def test_a_search_without_optuna_names_the_extra(file, tmp_path, monkeypatch, ca
     """Before anything is started or written."""
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     monkeypatch.setitem(sys.modules, "optuna", None)
-    monkeypatch.delitem(sys.modules, "palaestra.sweeps.suggesting", raising=False)
+    monkeypatch.delitem(sys.modules, "palaestra.sweeps.optuna_search", raising=False)
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2
 

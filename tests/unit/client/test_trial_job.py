@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.cluster.errors import NotFound
-from palaestra.trial import TrialFailed, attempt
+from palaestra.smoke_test import TrialFailed, attempt
 
 
 class Server:
@@ -61,7 +61,7 @@ def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted,
         for kind in ("Accepted", "Running", "Suspended", "Succeeded", "Failed")
     ]
     server = Server(phase=phase, conditions=conditions)
-    monkeypatch.setattr("palaestra.trial.PERIOD_S", 0.01)
+    monkeypatch.setattr("palaestra.smoke_test.PERIOD_S", 0.01)
 
     with pytest.raises(TrialFailed, match="ImagePull: the whole message"):
         attempt(server, {"metadata": {"name": "trial"}, "spec": {}}, within_s=0.1, report=str)

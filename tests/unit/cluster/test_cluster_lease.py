@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra.cluster.tenure import Claim, Sighting, Tenure
+from palaestra.cluster.lease_timing import LeaseSpec, ObservedLease, Tenure
 
 seconds = st.floats(min_value=0, max_value=10**6)
 durations = st.floats(min_value=1, max_value=3600)
@@ -11,14 +11,14 @@ durations = st.floats(min_value=1, max_value=3600)
 
 def claim(**changes):
     """A lease that somebody holds."""
-    return Claim(**{"holder": "a", "duration_s": 15.0, "renewed": "1", "transitions": 0} | changes)
+    return LeaseSpec(**{"holder": "a", "duration_s": 15.0, "renewed": "1", "transitions": 0} | changes)
 
 
 @given(duration_s=durations, offset=seconds, sent=seconds, travel=seconds, looked=seconds, now=seconds)
 def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent, travel, looked, now):
     """Two clocks that agree on nothing but the length of a second: `offset` lies between them."""
     tenure = Tenure(sent=sent, duration_s=duration_s)
-    follower = Sighting()
+    follower = ObservedLease()
     seen = sent + travel + looked + offset  # it was written after it was sent, and seen after that
     follower.see(claim(duration_s=duration_s), seen)
 
@@ -36,7 +36,7 @@ def test_a_leader_stops_while_a_third_of_the_lease_is_left(duration_s):
 
 def test_a_renewal_starts_the_count_anew():
     """A leader that renews is never overtaken."""
-    sighting = Sighting()
+    sighting = ObservedLease()
     sighting.see(claim(renewed="1"), 0.0)
     sighting.see(claim(renewed="2"), 14.0)
 
@@ -46,7 +46,7 @@ def test_a_renewal_starts_the_count_anew():
 
 def test_seeing_the_same_again_does_not_start_the_count_anew():
     """A leader that died is followed, however often one looks."""
-    sighting = Sighting()
+    sighting = ObservedLease()
     for moment in range(15):
         sighting.see(claim(), float(moment))
 
@@ -55,7 +55,7 @@ def test_seeing_the_same_again_does_not_start_the_count_anew():
 
 def test_a_lease_that_was_given_back_is_free_at_once():
     """An operator that ends hands over without a pause."""
-    sighting = Sighting()
+    sighting = ObservedLease()
     sighting.see(claim(), 0.0)
     sighting.see(claim(holder="", duration_s=1), 0.1)
 
@@ -64,7 +64,7 @@ def test_a_lease_that_was_given_back_is_free_at_once():
 
 def test_the_times_in_a_lease_are_never_compared_with_a_clock():
     """A renewal from the year 2000 or 3000 holds as long as any."""
-    sighting = Sighting()
+    sighting = ObservedLease()
     sighting.see(claim(renewed="2000-01-01T00:00:00.000000Z"), 50.0)
 
     assert not sighting.free(64.9)
@@ -72,5 +72,5 @@ def test_the_times_in_a_lease_are_never_compared_with_a_clock():
 
 def test_a_lease_without_a_spec_is_nobodys():
     """Anything may stand in the cluster; it must not stop us."""
-    assert Claim.read({"metadata": {"name": "x"}}) == Claim()
-    assert Sighting().free(0.0)
+    assert LeaseSpec.read({"metadata": {"name": "x"}}) == LeaseSpec()
+    assert ObservedLease().free(0.0)

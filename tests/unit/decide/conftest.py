@@ -19,7 +19,7 @@ from palaestra.decide import (
     Decision,
     Delete,
     Discard,
-    Record,
+    ReconcileRecord,
     Replace,
     Times,
     accept,
@@ -28,7 +28,7 @@ from palaestra.decide import (
     prepare,
 )
 from palaestra.observe import Objects, Polled, observe, references
-from palaestra.plan import ClusterLayout, Images, Verdict
+from palaestra.plan import ClusterLayout, Images, WorldVerdict
 from palaestra_protocol.pod.status import SimulatorStatus, Termination, TrainerStatus
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
@@ -59,7 +59,7 @@ class Scene:
         }
         self.now = START  # the operator's wall clock, which somebody may set
         self.clock_s = 1000.0  # its monotonic clock
-        self.record = Record()
+        self.record = ReconcileRecord()
         self.behind_s = 0.0  # the node's clock, against that of the API server
         self.server_s = 0.0  # the API server's clock, against START
         self.layout = ClusterLayout(
@@ -72,7 +72,7 @@ class Scene:
         self.there: dict[tuple[str, str], dict[str, Any]] = {}
         self.denied: dict[int | None, str] = {}
         self.kueue = False
-        self.verdicts: dict[str, Verdict] | None = None  # None: the plan checks the worlds
+        self.verdicts: dict[str, WorldVerdict] | None = None  # None: the plan checks the worlds
         self.switchers: dict[str, str] = {}
         self.unadmitted: dict[str, str] = {}
         self.deleted = False
@@ -136,7 +136,7 @@ class Scene:
 
     def restart(self) -> None:
         """Let another process go on: it remembers nothing, and its monotonic clock is another."""
-        self.record, self.clock_s, self.polled = Record(), 5.0, {}
+        self.record, self.clock_s, self.polled = ReconcileRecord(), 5.0, {}
 
     def stamp(self, seconds: float = 0) -> str:
         """Return a moment, by default now, as an API server writes it."""

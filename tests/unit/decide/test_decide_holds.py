@@ -8,7 +8,7 @@ import pytest
 from palaestra.api.status import Phase
 from palaestra.decide import Create, accept, prepare, wants_whole, worlds_to_check
 from palaestra.observe import Lacking, Objects, observe, references
-from palaestra.plan import Allowed, Verdict
+from palaestra.plan import Allowed, WorldVerdict
 from tests.e2e.escalations import METADATA
 
 INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
@@ -377,9 +377,11 @@ COSTLY = "spec.simulators[0].world.inline: its check takes more than its budget"
     ("verdict", "reason", "phase"),
     [
         pytest.param(None, "CheckingWorlds", Phase.PENDING, id="not yet"),
-        pytest.param(Verdict(), "Accepted", Phase.PENDING, id="fine"),
-        pytest.param(Verdict(problem="a fact"), "WorldInvalid", Phase.FAILED, id="wrong"),
-        pytest.param(Verdict(problem=COSTLY, too_costly=True), "WorldTooCostly", Phase.FAILED, id="costly"),
+        pytest.param(WorldVerdict(), "Accepted", Phase.PENDING, id="fine"),
+        pytest.param(WorldVerdict(problem="a fact"), "WorldInvalid", Phase.FAILED, id="wrong"),
+        pytest.param(
+            WorldVerdict(problem=COSTLY, too_costly=True), "WorldTooCostly", Phase.FAILED, id="costly"
+        ),
     ],
 )
 def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
@@ -404,7 +406,7 @@ def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
     sources = {each: config_map({"hall.wbt": WORLD_TEXT}) for each in references(job)}
     observed = replace(observe(job, Objects()), sources=sources)
     [world] = worlds_to_check(job, observed, scene.layout)
-    scene.verdicts = {world.digest: Verdict(problem=COSTLY, too_costly=True)}
+    scene.verdicts = {world.digest: WorldVerdict(problem=COSTLY, too_costly=True)}
 
     scene.settle()
 

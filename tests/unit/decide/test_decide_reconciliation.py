@@ -2,7 +2,7 @@
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import ConditionStatus, Phase
-from palaestra.decide import Refused, reject
+from palaestra.decide import JobRefused, reject
 
 NO_WORLD = [
     {"name": "collect", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}},
@@ -75,7 +75,7 @@ def test_a_job_that_was_refused_is_stalled(make_scene):
     """A spec does not change, so nothing mends it."""
     scene = make_scene()
 
-    status = reject(scene.raw, Refused(Reason.INVALID_SPEC, "spec.seed: too large"), scene.now).status
+    status = reject(scene.raw, JobRefused(Reason.INVALID_SPEC, "spec.seed: too large"), scene.now).status
 
     assert status is not None
     assert gaps(status) == {"Stalled": ("InvalidSpec", "spec.seed: too large")}

@@ -5,7 +5,7 @@ import json
 import pytest
 from pydantic.alias_generators import to_camel
 
-from palaestra.api.history import Faults, Goodput
+from palaestra.api.attempt_status import Faults, Goodput
 from palaestra.api.status import ConditionStatus, Phase
 from palaestra.decide import accept, prepare
 from palaestra.observe import Objects, observe

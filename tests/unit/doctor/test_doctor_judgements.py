@@ -8,11 +8,11 @@ import yaml
 
 from palaestra.api.crd import crd
 from palaestra.cli.doctor import shown
-from palaestra.doctor import Verdict
-from palaestra.doctor.finding import right, wrong
+from palaestra.doctor import CheckStatus
+from palaestra.doctor.check_result import right, wrong
 from palaestra.doctor.installation import judged_images
 from palaestra.doctor.platform import FIRST, difference, judged_pod, judged_version, release, trial_pod
-from palaestra.doctor.rights import OPERATOR, OPERATOR_WITH_KUEUE
+from palaestra.doctor.rbac import OPERATOR, OPERATOR_WITH_KUEUE
 
 ROOT = Path(__file__).parents[3]
 
@@ -43,7 +43,7 @@ def test_a_pod_that_came_back_as_it_was_is_right():
     pod = trial_pod("lab", "trainer:1")
     pod["spec"]["initContainers"].insert(0, {"name": "added-by-a-mesh"})
 
-    assert judged_pod(pod).verdict is Verdict.RIGHT
+    assert judged_pod(pod).verdict is CheckStatus.RIGHT
 
 
 def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
@@ -53,7 +53,7 @@ def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
 
     found = judged_pod(pod)
 
-    assert found.verdict is Verdict.WRONG
+    assert found.verdict is CheckStatus.WRONG
     assert "webhook" in found.remedy
 
 
@@ -71,7 +71,7 @@ def operator(**images):
 
 def test_images_that_are_named_by_digest_are_right():
     """Nobody can change what they are."""
-    assert judged_images(operator()).verdict is Verdict.RIGHT
+    assert judged_images(operator()).verdict is CheckStatus.RIGHT
 
 
 @pytest.mark.parametrize("part", PINNED)
@@ -79,7 +79,7 @@ def test_an_image_that_is_named_by_tag_is_a_warning(part):
     """A run that goes on after an interruption may meet another image under the same tag."""
     found = judged_images(operator(**{part: "registry.example.com/image:1"}))
 
-    assert found.verdict is Verdict.WARNING
+    assert found.verdict is CheckStatus.WARNING
     assert found.fact.startswith("registry.example.com/image:1: ")
     assert "digest" in found.remedy
 

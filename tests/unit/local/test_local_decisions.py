@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from palaestra.api import validate
 from palaestra.local.container import BackOff
-from palaestra.local.jobs import IDLE_PODS, Tries, Verdict, verdict
+from palaestra.local.retry_policy import IDLE_PODS, RetryVerdict, Tries, verdict
 from palaestra.plan import ClusterLayout, Images, identified, plan
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
@@ -16,15 +16,15 @@ PLANNED = plan(identified(validate({**JOB, "spec": {}}), "uid"), ClusterLayout(i
 @pytest.mark.parametrize(
     ("code", "meaning"),
     [
-        (0, Verdict.COMPLETE),
-        (1, Verdict.COUNT),
-        (2, Verdict.FAIL_JOB),
-        (75, Verdict.IGNORE),
-        (80, Verdict.FAIL_JOB),
-        (81, Verdict.FAIL_JOB),
-        (82, Verdict.COUNT),
-        (137, Verdict.COUNT),
-        (143, Verdict.COUNT),
+        (0, RetryVerdict.COMPLETE),
+        (1, RetryVerdict.COUNT),
+        (2, RetryVerdict.FAIL_JOB),
+        (75, RetryVerdict.IGNORE),
+        (80, RetryVerdict.FAIL_JOB),
+        (81, RetryVerdict.FAIL_JOB),
+        (82, RetryVerdict.COUNT),
+        (137, RetryVerdict.COUNT),
+        (143, RetryVerdict.COUNT),
     ],
 )
 def test_the_planned_job_says_what_an_exit_code_means(code, meaning):
@@ -34,7 +34,7 @@ def test_the_planned_job_says_what_an_exit_code_means(code, meaning):
 
 def test_without_a_policy_every_failure_is_counted():
     """Kubernetes' default."""
-    assert verdict({"spec": {}}, 75) is Verdict.COUNT
+    assert verdict({"spec": {}}, 75) is RetryVerdict.COUNT
 
 
 def test_rules_are_read_in_order_and_the_first_match_decides():
@@ -45,8 +45,8 @@ def test_rules_are_read_in_order_and_the_first_match_decides():
     ]
     job = {"spec": {"podFailurePolicy": {"rules": rules}}}
 
-    assert verdict(job, 8) is Verdict.IGNORE
-    assert verdict(job, 7) is Verdict.FAIL_JOB
+    assert verdict(job, 8) is RetryVerdict.IGNORE
+    assert verdict(job, 7) is RetryVerdict.FAIL_JOB
 
 
 @given(st.integers(min_value=0, max_value=20))
@@ -54,7 +54,7 @@ def test_a_limit_of_n_means_n_plus_one_pods(limit):
     """The first pod is no retry."""
     tries = Tries(limit=limit)
     pods = 1
-    while tries.another(Verdict.COUNT, step=0):
+    while tries.another(RetryVerdict.COUNT, step=0):
         pods += 1
 
     assert pods == limit + 1
@@ -63,7 +63,7 @@ def test_a_limit_of_n_means_n_plus_one_pods(limit):
 def test_ignored_pods_that_get_no_further_are_bounded():
     """Kubernetes has no bound for them; a master that never comes up would be waited for for ever."""
     tries = Tries(limit=0)
-    went_on = [tries.another(Verdict.IGNORE, step=0) for _ in range(IDLE_PODS)]
+    went_on = [tries.another(RetryVerdict.IGNORE, step=0) for _ in range(IDLE_PODS)]
 
     assert went_on == [True] * (IDLE_PODS - 1) + [False]
 
@@ -72,7 +72,7 @@ def test_progress_makes_ignored_pods_unbounded():
     """A run that is interrupted every hour and gets further each time ends some day."""
     tries = Tries(limit=0)
 
-    assert all(tries.another(Verdict.IGNORE, step=step) for step in range(1, 50))
+    assert all(tries.another(RetryVerdict.IGNORE, step=step) for step in range(1, 50))
 
 
 def test_the_wait_before_the_next_pod_doubles_and_is_bounded():
@@ -80,7 +80,7 @@ def test_the_wait_before_the_next_pod_doubles_and_is_bounded():
     tries = Tries(limit=100)
     waits = []
     for _ in range(9):
-        tries.another(Verdict.COUNT, step=0)
+        tries.another(RetryVerdict.COUNT, step=0)
         waits.append(tries.wait_s)
 
     assert waits == [1, 2, 4, 8, 16, 32, 60, 60, 60]

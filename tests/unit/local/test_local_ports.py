@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from palaestra.local.errors import Refused
+from palaestra.local.errors import RunRefused
 from palaestra.local.ports import HeldPorts
 
 
@@ -46,5 +46,5 @@ def test_a_port_in_use_is_refused_with_a_remedy():
     with socket.create_server(("127.0.0.1", 0)) as server, HeldPorts() as held:
         port = server.getsockname()[1]
 
-        with pytest.raises(Refused, match=rf"^port {port}: .*in use.*--ros-port"):
+        with pytest.raises(RunRefused, match=rf"^port {port}: .*in use.*--ros-port"):
             held.this(port)

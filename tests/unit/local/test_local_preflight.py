@@ -8,8 +8,8 @@ import pytest
 
 from palaestra.api import validate
 from palaestra.local import preflight
-from palaestra.local.errors import Refused
-from palaestra.local.preflight import Request
+from palaestra.local.errors import RunRefused
+from palaestra.local.preflight import PreflightRequest
 from palaestra_sim.world import builtin
 from tests.failing import failing
 
@@ -21,7 +21,7 @@ def request_for(tmp_path):
     """Return a builder of requests to run a job with this spec."""
 
     def make(**spec):
-        return Request(job=validate({**JOB, "spec": spec}), runs=tmp_path / "runs")
+        return PreflightRequest(job=validate({**JOB, "spec": spec}), runs=tmp_path / "runs")
 
     return make
 
@@ -174,7 +174,7 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
     """It would end the run in the middle of a checkpoint."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
-    with pytest.raises(Refused, match=r"MiB are free and a run takes .*--dir"):
+    with pytest.raises(RunRefused, match=r"MiB are free and a run takes .*--dir"):
         preflight.check(request_for())
 
 
@@ -193,7 +193,7 @@ def test_all_problems_are_reported_at_once(request_for, monkeypatch):
     """An author fixes all problems of a job in one go."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(RunRefused) as refused:
         preflight.check(request_for(trainer={"command": ["no-such-program"]}))
 
     assert len(str(refused.value).splitlines()) == 2

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_protocol.metrics import PREFIX, Kind
+from palaestra_protocol.metrics import PREFIX, MetricType
 from tests.tables import for_each
 from tools.metrics import page
 
@@ -71,7 +71,7 @@ def test_a_name_tells_its_home(program):
 @each_family
 def test_a_counter_and_nothing_else_ends_in_total(family):
     """A reader knows by the name whether to take a rate."""
-    assert family.name.endswith("_total") is (family.kind is Kind.COUNTER)
+    assert family.name.endswith("_total") is (family.kind is MetricType.COUNTER)
 
 
 @each_family
@@ -108,7 +108,7 @@ def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
     """Few enough that each of thousands of trainers may have them."""
     buckets = family.buckets
 
-    assert bool(buckets) is (family.kind is Kind.HISTOGRAM)
+    assert bool(buckets) is (family.kind is MetricType.HISTOGRAM)
     assert list(buckets) == sorted(set(buckets))
     assert len(buckets) <= 30
 

@@ -11,10 +11,10 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
-from palaestra.operator import families as of_operator
+from palaestra.operator import metric_definitions as of_operator
 from palaestra.operator.metrics import Metrics
-from palaestra_protocol.metrics import Kind
-from palaestra_trainer import families as of_trainer
+from palaestra_protocol.metrics import MetricType
+from palaestra_trainer import metric_definitions as of_trainer
 from palaestra_trainer.telemetry.metrics import registry
 from palaestra_trainer.telemetry.progress import Progress
 
@@ -53,7 +53,7 @@ def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, decla
     text = served()
     found = series(text)
 
-    names = {family.name for family in declared.FAMILIES if family.kind is Kind.HISTOGRAM}
+    names = {family.name for family in declared.FAMILIES if family.kind is MetricType.HISTOGRAM}
     assert {f"# TYPE {name} histogram" for name in names} <= set(text.splitlines())
     assert {name for name, *_ in found} >= names - {"palaestra_simulator_step_duration_seconds"}
     for (name, *_), samples in found.items():

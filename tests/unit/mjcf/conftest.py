@@ -2,9 +2,9 @@
 
 import pytest
 
-from palaestra_sim.mujoco.mjcf.loading import load as load_mjcf
+from palaestra_sim.mujoco.mjcf.loader import load as load_mjcf
 from palaestra_sim.scene.mode import Mode
-from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.validation import LeaveOut
 
 CARTPOLE = """<mujoco model="cartpole">
   <custom>

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 

@@ -4,7 +4,7 @@ import mujoco
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.mujoco.mjcf.loading import load as load_mjcf
+from palaestra_sim.mujoco.mjcf.loader import load as load_mjcf
 from palaestra_sim.scene.mode import Mode
 
 SCENE = """<mujoco model="cell">

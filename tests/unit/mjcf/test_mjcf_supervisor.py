@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.tree.fields import FieldType
-from palaestra_sim.seam import UnsimulatedError
 from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.image_buffer import ImageBuffer
 from palaestra_sim.scene.mode import Mode
-from palaestra_sim.scene.raster import Raster
 from palaestra_sim.scene.simulation import Simulation
-from palaestra_sim.seam import UnsimulatedError
 
 WORLD = """#VRML_SIM R2023b utf8
 WorldInfo {{ }}
@@ -40,7 +40,7 @@ def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
     assert display.attach("eye")
     display.picture.draw([(4, 2)], (0, 0, 0, 255))
 
-    seen = Raster(width=16, height=8, pixels=bytearray(camera.value))
+    seen = ImageBuffer(width=16, height=8, pixels=bytearray(camera.value))
     shown = display.shown
     assert shown.at(0, 0) == seen.at(0, 0) != (0, 0, 0, 255)
     assert (shown.at(3, 2), shown.at(4, 2)) == (WHITE, (0, 0, 0, 255))

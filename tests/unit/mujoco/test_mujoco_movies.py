@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movie, frame_step_ms
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.tree.fields import FieldType
-from palaestra_sim.seam import UnsimulatedError
 from palaestra_sim.stub.physics import StubPhysics
 from tests.failing import failing
 
@@ -103,7 +103,7 @@ def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
-        from palaestra_sim.mujoco.film import MujocoFilm
+        from palaestra_sim.mujoco.video import MujocoFilm
         from palaestra_sim.scene.movies import Movie
         names = [f"{tmp_path}/{{name}}.mp4" for name in ("drive", "drive-2")]
         films = [MujocoFilm(Movie(path=it, size={SIZE}, quality=100, acceleration=1)) for it in names]

@@ -4,11 +4,11 @@ import pytest
 
 from palaestra.cluster import AlreadyExists, NotFound
 from palaestra.decide import Create
-from palaestra.operator.acting import Acting
-from palaestra.operator.confirming import Outdated
-from palaestra.operator.denials import Denials
-from palaestra.operator.strangers import Strangers
-from palaestra.operator.writing import Writer
+from palaestra.operator.executor import Executor
+from palaestra.operator.fenced_client import FencedClient
+from palaestra.operator.foreign_jobs import ForeignJobs
+from palaestra.operator.preconditions import Outdated
+from palaestra.operator.rejected_creations import RejectedCreations
 
 KEY = ("robots", "job")
 RAW = {"metadata": {"namespace": "robots", "name": "job", "uid": "u", "resourceVersion": "1"}}
@@ -64,8 +64,8 @@ class Server:
 )
 def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(change, wrong):
     """Pods would train whatever it says, now or later."""
-    api, denials = Server({**WANTED, **change}), Denials()
-    acting = Acting(api, Writer(api, lambda: True), None, denials)
+    api, denials = Server({**WANTED, **change}), RejectedCreations()
+    acting = Executor(api, FencedClient(api, lambda: True), None, denials)
 
     refused = acting.carry_out(RAW, (Create(object=WANTED, replica=0),))
 
@@ -81,7 +81,7 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
 def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there, made):
     """Else an event would say that it was created; whose the name is, the next look tells."""
     api = Server(there)
-    acting = Acting(api, Writer(api, lambda: True), Strangers(api), Denials())
+    acting = Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations())
 
     refused = acting.carry_out(RAW, (Create(object=a_job("ours"), replica=0),))
 
@@ -113,7 +113,7 @@ def test_a_job_is_not_created_beside_a_pod_that_may_write_to_its_volume(pod, wai
     job["spec"] = {"template": {"spec": a_pod()["spec"]}}
     api = Server(job)
     api.pods = [pod]
-    acting = Acting(api, Writer(api, lambda: True), Strangers(api), Denials())
+    acting = Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations())
 
     try:
         acting.carry_out(RAW, (Create(object=job, replica=0),))

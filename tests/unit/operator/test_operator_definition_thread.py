@@ -2,7 +2,7 @@
 
 import threading
 
-from palaestra.operator.definition import Definition
+from palaestra.operator.crd_check import CrdCheck
 
 
 class Server:
@@ -26,7 +26,7 @@ def test_a_document_that_nobody_foresaw_does_not_end_the_operator(monkeypatch):
     broken = []
     monkeypatch.setattr(threading, "excepthook", broken.append)
     server, stopping = Server(), threading.Event()
-    definition = Definition(server, lambda: None)
+    definition = CrdCheck(server, lambda: None)
 
     definition.follow(stopping, 60.0)
     assert server.asked.wait(5)

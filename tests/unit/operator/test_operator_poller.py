@@ -8,8 +8,8 @@ from contextlib import ExitStack, contextmanager
 import pytest
 from structlog.testing import capture_logs
 
+from palaestra.operator.poll_schedule import PollTarget
 from palaestra.operator.poller import MOST_BYTES, Poller
-from palaestra.operator.schedule import Target
 from palaestra_protocol.pod.status import TrainerStatus
 
 JOB = ("robots", "job")
@@ -34,7 +34,7 @@ class Trainer(socketserver.ThreadingTCPServer):
 
     def target(self, uid="pod", key=JOB):
         """Return it as one of the trainers to ask."""
-        return Target(key=key, uid=uid, host="127.0.0.1", port=self.server_address[1])
+        return PollTarget(key=key, uid=uid, host="127.0.0.1", port=self.server_address[1])
 
     def asked(self, count):
         """Wait until so many more questions are over: the next one begins after them."""

@@ -8,14 +8,14 @@ from prometheus_client import CollectorRegistry, Histogram
 
 from palaestra.api.reasons import Reason
 from palaestra.cluster import Conflict, WorkQueue
-from palaestra.cluster.limits import Backoff
+from palaestra.cluster.timeouts import Backoff
 from palaestra.decide import Replace, SetSuspend, Stop
 from palaestra.decide.decision import Basis
-from palaestra.operator.acting import Acting
-from palaestra.operator.confirming import Outdated
-from palaestra.operator.denials import Denials
+from palaestra.operator.executor import Executor
+from palaestra.operator.fenced_client import FencedClient, NotLeading
+from palaestra.operator.preconditions import Outdated
+from palaestra.operator.rejected_creations import RejectedCreations
 from palaestra.operator.workers import Workers
-from palaestra.operator.writing import NotLeading, Writer
 
 WAIT_S = 10.0
 GOOD, BAD = ("robots", "good"), ("robots", "bad")
@@ -174,7 +174,7 @@ class Refusing:
 def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_words(action, desk):
     """A replica that is past its deadline and is not stopped must not train on in silence."""
     api = Refusing()
-    acting = Acting(api, Writer(api, lambda: 1), None, Denials())
+    acting = Executor(api, FencedClient(api, lambda: 1), None, RejectedCreations())
     tries = threading.Semaphore(0)
 
     def reconcile(_):

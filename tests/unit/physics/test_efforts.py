@@ -5,9 +5,9 @@ import math
 import pytest
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.simulation import Simulation
-from palaestra_sim.seam import UnsimulatedError
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 

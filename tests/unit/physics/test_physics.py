@@ -9,7 +9,7 @@ import pytest
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.simulation import Simulation
-from palaestra_sim.scene.tree.catalogue import FieldType
+from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra.api.container import Resources
-from palaestra.local.spec import read_pod
+from palaestra.local.pod_spec import read_pod
 from palaestra.plan import ClusterLayout, Images, LocalLayout, plan, resources
 
 TWO_GROUPS = [

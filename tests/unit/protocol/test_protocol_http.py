@@ -11,6 +11,7 @@ from http import HTTPStatus
 
 import pytest
 
+from palaestra_protocol.connection_limits import MOST_OF_PEER
 from palaestra_protocol.http import (
     MOST_BODY_BYTES,
     MOST_REQUEST_BYTES,
@@ -20,7 +21,6 @@ from palaestra_protocol.http import (
     json_response,
     probe_response,
 )
-from palaestra_protocol.places import MOST_OF_PEER
 from tests.waiting import eventually
 
 LOOPBACK = Address("127.0.0.1", 0)

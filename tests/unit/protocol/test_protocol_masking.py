@@ -7,7 +7,7 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra.api.lines import one_line, printable
+from palaestra.api.text import one_line, printable
 from palaestra_protocol.fields import clipped
 from palaestra_protocol.masking import masked
 from palaestra_protocol.pod.status import FaultRecord, Termination

@@ -7,7 +7,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 from prometheus_client.registry import Collector
 
-from palaestra_protocol.metrics import Family, Kind, Label, Tally
+from palaestra_protocol.metrics import Family, Label, MetricType, Tally
 
 MOST_S = 2e-6
 
@@ -37,14 +37,14 @@ class Shown(Collector):
 def test_the_samples_of_a_counter_have_its_labels():
     """In their order; its name is the one that was declared."""
     colors = Label(name="color", values=("red", "blue"))
-    family = Family(name="balls_total", kind=Kind.COUNTER, meaning="Balls.", labels=(colors,))
+    family = Family(name="balls_total", kind=MetricType.COUNTER, meaning="Balls.", labels=(colors,))
 
     assert Shown(family, {("red",): 3}).samples() == {("balls_total", ("color", "red")): 3}
 
 
 def test_a_family_without_a_value_is_there_with_its_meaning():
     """Unknown is not zero, and a dashboard finds the name."""
-    family = Family(name="height_metres", kind=Kind.GAUGE, meaning="How high.")
+    family = Family(name="height_metres", kind=MetricType.GAUGE, meaning="How high.")
     registry = CollectorRegistry()
     registry.register(Shown(family, {}))
 
@@ -55,7 +55,7 @@ def test_a_family_without_a_value_is_there_with_its_meaning():
 
 def test_a_histogram_counts_what_is_up_to_each_bound():
     """A value at a bound belongs to it, as Prometheus has it."""
-    family = Family(name="wait_seconds", kind=Kind.HISTOGRAM, meaning="Wait.", buckets=(1.0, 2.0))
+    family = Family(name="wait_seconds", kind=MetricType.HISTOGRAM, meaning="Wait.", buckets=(1.0, 2.0))
     tally = family.tally()
     for value in (0.5, 1.0, 1.5, 9.0):
         tally.observe(value)
@@ -71,7 +71,7 @@ def test_a_histogram_counts_what_is_up_to_each_bound():
 
 def test_a_histogram_of_what_may_be_negative_has_no_sum():
     """A sum that falls looks like a restart; without the count, OpenTelemetry drops the histogram."""
-    family = Family(name="gain", kind=Kind.HISTOGRAM, meaning="Gain.", buckets=(-1.0, 0.0))
+    family = Family(name="gain", kind=MetricType.HISTOGRAM, meaning="Gain.", buckets=(-1.0, 0.0))
 
     names = {name for name, *_ in Shown(family, {(): family.tally()}).samples()}
     assert names == {"gain_bucket", "gain_count"}
@@ -79,7 +79,11 @@ def test_a_histogram_of_what_may_be_negative_has_no_sum():
 
 @pytest.mark.parametrize(
     ("kind", "buckets", "series"),
-    [(Kind.GAUGE, (), 6), (Kind.HISTOGRAM, (1.0, 2.0), 6 * 5), (Kind.HISTOGRAM, (-1.0, 2.0), 6 * 4)],
+    [
+        (MetricType.GAUGE, (), 6),
+        (MetricType.HISTOGRAM, (1.0, 2.0), 6 * 5),
+        (MetricType.HISTOGRAM, (-1.0, 2.0), 6 * 4),
+    ],
 )
 def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
     """As many as are served at most."""

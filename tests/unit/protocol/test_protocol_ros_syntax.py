@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra_protocol.ros.syntax import Field, parse
+from palaestra_protocol.ros.syntax import MessageField, parse
 
 
 def test_fields_are_read_with_their_types_in_full():
@@ -10,10 +10,10 @@ def test_fields_are_read_with_their_types_in_full():
     text = "Header header\nPoint[] points\nsensor_msgs/Image image\nfloat64[9] covariance  # row by row\n"
 
     assert parse("demo/Path", text).fields == (
-        Field("std_msgs/Header", "", "header"),
-        Field("demo/Point", "[]", "points"),
-        Field("sensor_msgs/Image", "", "image"),
-        Field("float64", "[9]", "covariance"),
+        MessageField("std_msgs/Header", "", "header"),
+        MessageField("demo/Point", "[]", "points"),
+        MessageField("sensor_msgs/Image", "", "image"),
+        MessageField("float64", "[9]", "covariance"),
     )
 
 

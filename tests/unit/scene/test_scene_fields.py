@@ -7,8 +7,8 @@ from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.simulation import Simulation
-from palaestra_sim.scene.summary import differences
-from palaestra_sim.scene.tree.catalogue import FieldType, field_kinds
+from palaestra_sim.scene.tree.field_types import FieldType, field_kinds
+from palaestra_sim.scene.world_report import differences
 from palaestra_sim.stub.physics import StubPhysics
 
 OTHER = {

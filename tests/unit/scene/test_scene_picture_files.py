@@ -6,9 +6,9 @@ import zlib
 
 import pytest
 
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene import picture_files
-from palaestra_sim.scene.raster import Raster
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.scene.image_buffer import ImageBuffer
 
 BLUE, RED = bytes((255, 0, 0, 255)), bytes((0, 0, 255, 255))
 
@@ -42,7 +42,7 @@ def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
     path, pixels = str(tmp_path / "eye.png"), BLUE + bytes((1, 2, 3, 4))
 
     assert picture_files.save(path, (2, 1), pixels, alpha=True)
-    assert picture_files.load(path) == Raster(width=2, height=1, pixels=bytearray(pixels))
+    assert picture_files.load(path) == ImageBuffer(width=2, height=1, pixels=bytearray(pixels))
 
 
 def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):

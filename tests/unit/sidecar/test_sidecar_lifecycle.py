@@ -7,13 +7,13 @@ import pytest
 
 from palaestra_protocol.control import SidecarState
 from palaestra_sim.sidecar import lifecycle
-from palaestra_sim.sidecar.lifecycle import TABLE, Action, Event
+from palaestra_sim.sidecar.lifecycle import TABLE, Action, LifecycleEvent
 
 IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 ARROW = re.compile(r"^ {4}(\w+) +--(\w+)--> +(\w+) +(\w+)$", re.MULTILINE)
 
 
-def after(*events: Event, state: SidecarState = IDLE) -> SidecarState:
+def after(*events: LifecycleEvent, state: SidecarState = IDLE) -> SidecarState:
     """Return the state after events that are all allowed."""
     for event in events:
         step = lifecycle.step(state, event)
@@ -25,7 +25,7 @@ def after(*events: Event, state: SidecarState = IDLE) -> SidecarState:
 def test_the_picture_is_the_table() -> None:
     """People read the docstring, the program reads the table."""
     picture = {
-        (SidecarState(state), Event(event)): (SidecarState(then), Action(action))
+        (SidecarState(state), LifecycleEvent(event)): (SidecarState(then), Action(action))
         for state, event, then, action in ARROW.findall(lifecycle.__doc__ or "")
     }
 
@@ -34,47 +34,52 @@ def test_the_picture_is_the_table() -> None:
 
 def test_a_life_that_goes_well() -> None:
     """The trainer starts it, talks to it, and announces its end."""
-    assert after(Event.START, Event.READY, Event.STOP, Event.EXITED) is IDLE
+    assert (
+        after(LifecycleEvent.START, LifecycleEvent.READY, LifecycleEvent.STOP, LifecycleEvent.EXITED) is IDLE
+    )
 
 
 def test_a_simulator_that_failed_is_started_again() -> None:
     """The decision is the trainer's; the sidecar only tells."""
-    assert after(Event.START, Event.EXITED) is FAILED
-    assert after(Event.START, Event.EXITED, Event.START) is STARTING
+    assert after(LifecycleEvent.START, LifecycleEvent.EXITED) is FAILED
+    assert after(LifecycleEvent.START, LifecycleEvent.EXITED, LifecycleEvent.START) is STARTING
 
 
 @pytest.mark.parametrize("state", [STARTING, READY, STOPPING])
 def test_a_simulator_is_not_started_where_one_runs(state) -> None:
     """Rule 1: two with the same ROS names would throw each other out of the master."""
-    assert lifecycle.step(state, Event.START) is None
+    assert lifecycle.step(state, LifecycleEvent.START) is None
 
 
 @pytest.mark.parametrize("state", [state for state in SidecarState if state is not STARTING])
 def test_only_a_starting_simulator_gets_ready(state) -> None:
     """Rule 2: a round trip that was on its way when the simulator died proves nothing."""
-    assert lifecycle.step(state, Event.READY) is None
+    assert lifecycle.step(state, LifecycleEvent.READY) is None
 
 
 @pytest.mark.parametrize("state", [STARTING, READY])
 def test_an_exit_that_nobody_announced_is_a_fault(state) -> None:
     """Rule 3: whatever its code."""
-    assert lifecycle.step(state, Event.EXITED) == (FAILED, Action.BLAME)
+    assert lifecycle.step(state, LifecycleEvent.EXITED) == (FAILED, Action.BLAME)
 
 
 def test_an_exit_after_an_announced_stop_is_wanted() -> None:
     """Rule 3: also when the deadline had to kill it."""
-    assert after(Event.START, Event.STOP, Event.DEADLINE, Event.EXITED) is IDLE
+    assert (
+        after(LifecycleEvent.START, LifecycleEvent.STOP, LifecycleEvent.DEADLINE, LifecycleEvent.EXITED)
+        is IDLE
+    )
 
 
 def test_a_stop_can_be_repeated() -> None:
     """Rule 4: a trainer in a hurry brings the deadline forward."""
-    assert lifecycle.step(STOPPING, Event.STOP) == (STOPPING, Action.WAIT)
+    assert lifecycle.step(STOPPING, LifecycleEvent.STOP) == (STOPPING, Action.WAIT)
 
 
 @pytest.mark.parametrize("state", [IDLE, FAILED])
 def test_where_nothing_runs_there_is_nothing_to_stop(state) -> None:
     """Rule 6: and the reason of a failure stays to be read."""
-    assert lifecycle.step(state, Event.STOP) is None
+    assert lifecycle.step(state, LifecycleEvent.STOP) is None
 
 
 @pytest.mark.parametrize("state", SidecarState)
@@ -82,7 +87,7 @@ def test_the_end_of_the_container_is_allowed_everywhere(state) -> None:
     """Rule 5: a kubelet does not ask twice."""
     running = state in {STARTING, READY, STOPPING}
 
-    step = lifecycle.step(state, Event.SHUTDOWN)
+    step = lifecycle.step(state, LifecycleEvent.SHUTDOWN)
     assert step == ((STOPPING, Action.TERMINATE) if running else (state, Action.NOTHING))
 
 
@@ -95,6 +100,6 @@ def test_every_state_can_be_left_and_reached() -> None:
 
 def test_what_the_table_does_not_have_is_refused() -> None:
     """Rule 6: fifteen of thirty pairs."""
-    refused = [pair for pair in product(SidecarState, Event) if lifecycle.step(*pair) is None]
+    refused = [pair for pair in product(SidecarState, LifecycleEvent) if lifecycle.step(*pair) is None]
 
     assert len(refused) == 15

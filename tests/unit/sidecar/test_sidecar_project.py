@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_sim.errors import SidecarError
-from palaestra_sim.sidecar import preparation, project
+from palaestra_sim.sidecar import project, world_files
 from palaestra_sim.world import RunIdentity, builtin, builtin_path
 
 IDENTITY = RunIdentity(job="j", replica=0, group="collect", index=0)
@@ -39,7 +39,7 @@ def named(tmp_path):
 
     def write(world, slot="a"):
         identity = replace(IDENTITY, slot=slot)
-        return preparation.named(world, tmp_path / "work", identity, clock=True, as_project=True)
+        return world_files.named(world, tmp_path / "work", identity, clock=True, as_project=True)
 
     return write
 
@@ -90,7 +90,7 @@ def test_a_second_simulator_of_a_world_is_in_a_project_too(source, tmp_path) -> 
     content = builtin("arena")
     world = source("controllers/roll/roll.py", content=content)
 
-    again = preparation.renamed(world, tmp_path / "work", "_2", as_project=True)
+    again = world_files.renamed(world, tmp_path / "work", "_2", as_project=True)
 
     assert again.name == "arena_2.wbt"
     assert read(again, "../controllers/roll/roll.py") == "controllers/roll/roll.py"
@@ -100,7 +100,7 @@ def test_other_simulators_get_the_world_alone(source, tmp_path) -> None:
     """The stub starts no controller, so it needs no project."""
     world = source("controllers/roll/roll.py")
 
-    alone = preparation.named(world, tmp_path / "work", IDENTITY, clock=True)
+    alone = world_files.named(world, tmp_path / "work", IDENTITY, clock=True)
 
     assert list((tmp_path / "work").iterdir()) == [alone]
 
@@ -156,7 +156,7 @@ def test_a_source_called_as_a_generated_world_stays_as_it_is(source, named) -> N
     """The link to it gives way to the generated world, at every start."""
     world = source("controllers/roll/roll.py", world="source/worlds/collect-0.wbt")
 
-    for slot in (*preparation.SLOTS, *preparation.SLOTS):
+    for slot in (*world_files.SLOTS, *world_files.SLOTS):
         named(world, slot)
 
     assert world.read_bytes() == BALL
@@ -166,7 +166,7 @@ def test_the_work_folder_is_not_linked_into_itself(source, tmp_path) -> None:
     """A program that follows links would never come to an end."""
     world = source("controllers/roll/roll.py")
 
-    made = preparation.named(
+    made = world_files.named(
         world, tmp_path / "source" / "runs" / "work", IDENTITY, clock=True, as_project=True
     )
 
@@ -178,7 +178,7 @@ def test_a_work_folder_around_the_project_of_the_world_is_refused(source, tmp_pa
     world = source("x").parents[1].rename(tmp_path / "project") / "worlds" / "arena.wbt"
 
     with pytest.raises(SidecarError, match=r"^--work: .*: has the project of the world; give another"):
-        preparation.named(world, tmp_path, IDENTITY, clock=True, as_project=True)
+        world_files.named(world, tmp_path, IDENTITY, clock=True, as_project=True)
     assert [path.name for path in world.parent.iterdir()] == ["arena.wbt"]
 
 
@@ -193,12 +193,12 @@ def test_files_above_the_project_are_found_from_the_generated_world(source, tmp_
     world = source("shared/Box.proto", "lab/x", world="source/lab/worlds/arena.wbt", content=content)
     (tmp_path / "source/shared/Box.proto").write_text("<mujocoinclude/>")
 
-    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True)
+    made = world_files.named(world, tmp_path / "work", IDENTITY, clock=True)
 
     assert made.parent == tmp_path / "work" / "project" / "lab" / "worlds"
     assert read(made, "../../shared/Box.proto") == "<mujocoinclude/>"
     assert read(made, "../x") == "lab/x"
-    assert preparation.root_of(world, None) == tmp_path / "source"
+    assert world_files.root_of(world, None) == tmp_path / "source"
 
 
 @pytest.mark.parametrize(
@@ -213,8 +213,8 @@ def test_a_root_that_does_not_hold_all_is_refused(source, tmp_path, root, refusa
     world = source("shared/Box.proto", world="source/lab/worlds/arena.wbt", content=PROTO)
 
     with pytest.raises(SidecarError, match=f"^--root: {tmp_path}/{refusal}"):
-        preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path / root)
-    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path)
+        world_files.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path / root)
+    made = world_files.named(world, tmp_path / "work", IDENTITY, clock=True, root=tmp_path)
     assert made.parent == tmp_path / "work" / "project" / "source" / "lab" / "worlds"
 
 
@@ -222,7 +222,7 @@ def test_the_world_in_its_own_root_has_only_its_neighbors(source, tmp_path) -> N
     """A person says that nothing above belongs to it."""
     world = source("worlds/map.json", "secret", content=RELATIVE)
 
-    made = preparation.named(world, tmp_path / "work", IDENTITY, clock=True, root=world.parent)
+    made = world_files.named(world, tmp_path / "work", IDENTITY, clock=True, root=world.parent)
 
     assert read(made, "map.json") == "worlds/map.json"
     assert [it.name for it in (tmp_path / "work" / "project").iterdir()] == ["worlds"]

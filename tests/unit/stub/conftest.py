@@ -13,10 +13,10 @@ from contextlib import nullcontext
 import pytest
 
 from palaestra_protocol.ros.rostypes import service_type
-from palaestra_sim.front.options import FrontOptions
-from palaestra_sim.front.simulator import Simulator
 from palaestra_sim.ros.node import LATER, ServiceFailed
-from palaestra_sim.scene.loading import Loader
+from palaestra_sim.ros_controller.options import FrontOptions
+from palaestra_sim.ros_controller.simulator import RunningSimulator
+from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
@@ -224,7 +224,7 @@ def start(ros, tmp_path):
         path = tmp_path / "worlds" / "arena.wbt"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(builtin("arena") if world is None else world)
-        simulator = Simulator(
+        simulator = RunningSimulator(
             path,
             Loader(physics=StubPhysics),
             ros.make_node,

@@ -6,9 +6,9 @@ import pytest
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.geometry import turn
-from palaestra_sim.scene.nodes.growing import Descriptions
-from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse
 from palaestra_sim.world.stand_ins import shipped

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.scene.base import Base
-from palaestra_sim.scene.drive import Wheel, find_drive
+from palaestra_sim.scene.mobile_base import MobileBase
 from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.scene.wheel_kinematics import Wheel, find_drive
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 from palaestra_sim.stub.outline import RoundPart, discs_of_box
@@ -27,7 +27,7 @@ def pair():
 
     def make(outline=ROUND, obstacles=(), others=()):
         motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]
-        body = StubBody(Base(motors, find_drive(PAIR)), outline)
+        body = StubBody(MobileBase(motors, find_drive(PAIR)), outline)
         body.face(Neighborhood(obstacles, body.radius), others)
 
         def go(left, right, steps):
@@ -78,7 +78,7 @@ def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
 
 def test_a_body_without_wheels_stays():
     """A push is over with the next step."""
-    body = StubBody(Base(), ROUND)
+    body = StubBody(MobileBase(), ROUND)
     body.push(1.0, 0.0, 0.5)
 
     body.advance(STEP_S)
@@ -89,13 +89,13 @@ def test_a_body_without_wheels_stays():
 def test_a_drive_wants_one_motor_a_wheel():
     """A mistake of the reader, not of the world."""
     with pytest.raises(ValueError, match="do not fit a drive of 2 wheels"):
-        Base([Motor(MotorSpec(name="alone"))], find_drive(PAIR))
+        MobileBase([Motor(MotorSpec(name="alone"))], find_drive(PAIR))
 
 
 @pytest.mark.parametrize(("heading", "half"), [(0.0, 0.3), (math.pi / 2, 0.1), (math.pi, 0.3)])
 def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
     """Half its length ahead, half its width to the side."""
-    body = StubBody(Base(), LONG)
+    body = StubBody(MobileBase(), LONG)
     body.face(Neighborhood([Block(1.05, 0.0, 0.0, (0.1, 4.0))], body.radius), ())
     body.place(1.0 - half + 0.02, 0.0, heading)
 
@@ -143,7 +143,7 @@ def test_an_outline_beside_the_origin_goes_along(pair):
 
 def test_a_robot_meets_every_disc_of_another(pair):
     """And the other one feels it."""
-    other = StubBody(Base(), LONG)
+    other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.5, 0.0)
     body, go = pair(others=[other])
     body.place(0.0, 0.5, 0.0)
@@ -156,7 +156,7 @@ def test_a_robot_meets_every_disc_of_another(pair):
 
 def test_rays_meet_every_disc_of_a_robot():
     """A ray that passes the origin of a long robot still hits its end."""
-    other = StubBody(Base(), LONG)
+    other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.25, math.pi / 2)
     fan = Fan([(0.0, 0.0, 1.0, 0.0)], [5.0])
     fan.face(Neighborhood((), 0.0), [other])
@@ -176,7 +176,7 @@ def test_a_long_robot_never_ends_inside_anything(commands, heading):
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]
-    body = StubBody(Base(motors, find_drive(PAIR)), LONG)
+    body = StubBody(MobileBase(motors, find_drive(PAIR)), LONG)
     body.face(Neighborhood(walls, body.radius), ())
     body.place(0.5, 0.5, heading)
     for motor in motors:

@@ -9,15 +9,15 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import message_type, reading_field
 from palaestra_protocol.ros.tcpros import LENGTH
-from palaestra_sim.faults.damage import damaged_message
-from palaestra_sim.faults.language import parse
-from palaestra_sim.ros.topics import Publisher, Topic
+from palaestra_sim.faults.corruption import damaged_message
+from palaestra_sim.faults.parser import parse
+from palaestra_sim.ros.topics import PublishedTopic, Publisher
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.devices.kind import ROLES
+from palaestra_sim.scene.devices.device_type import ROLES
 from palaestra_sim.scene.nodes.types import type_number
-from palaestra_sim.scene.tree.catalogue import field_kinds
-from palaestra_sim.scene.tree.effects import require_effect
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.scene.tree.field_types import field_kinds
+from palaestra_sim.scene.tree.write_rules import require_effect
 
 COMMON = {"get_model", "get_name", "get_node_type"}
 NAMES_ON_JOINT = {f"get_{role}_name" for role in ROLES}
@@ -169,7 +169,7 @@ def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, na
         link = SimpleNamespace(sent=[])
         link.send_newest = link.sent.append
         type_ = message_type(topic.type_name)
-        wire = Topic("/device", type_, latched=False)
+        wire = PublishedTopic("/device", type_, latched=False)
         wire.links.append(link)
         publisher = Publisher(wire, dict(topic.constants))
         value = value_of(topic)

@@ -3,8 +3,8 @@
 import pytest
 
 from palaestra_sim.ros.node import ServiceFailed
-from palaestra_sim.scene import raster
-from palaestra_sim.scene.raster import Raster
+from palaestra_sim.scene import image_buffer
+from palaestra_sim.scene.image_buffer import ImageBuffer
 
 RED = (0, 0, 255, 255)
 ROBOT = """Robot { supervisor TRUE controller "ros" controllerArgs [ "--name=painter" "--synchronize" ]
@@ -29,19 +29,22 @@ def lit(picture):
 @pytest.mark.parametrize(
     ("points", "rows"),
     [
-        (raster.line(0, 0, 4, 2), ["##...", "..#..", "...##", ".....", "....."]),
-        (raster.rectangle(1, 1, 3, 3), [".....", ".###.", ".#.#.", ".###.", "....."]),
-        (raster.filled_rectangle(3, 3, 5, 5), [".....", ".....", ".....", "...##", "...##"]),
-        (raster.oval(2, 2, 2, 2), [".###.", "##.##", "#...#", "##.##", ".###."]),
-        (raster.filled_oval(2, 2, 2, 1), [".....", "..#..", "#####", "..#..", "....."]),
-        (raster.outline([(0, 0), (4, 0), (0, 4)]), ["#####", "#..#.", "#.#..", "##...", "#...."]),
-        (raster.filled_polygon([(0, 0), (4, 0), (0, 4)]), ["#####", "####.", "###..", "##...", "#...."]),
+        (image_buffer.line(0, 0, 4, 2), ["##...", "..#..", "...##", ".....", "....."]),
+        (image_buffer.rectangle(1, 1, 3, 3), [".....", ".###.", ".#.#.", ".###.", "....."]),
+        (image_buffer.filled_rectangle(3, 3, 5, 5), [".....", ".....", ".....", "...##", "...##"]),
+        (image_buffer.oval(2, 2, 2, 2), [".###.", "##.##", "#...#", "##.##", ".###."]),
+        (image_buffer.filled_oval(2, 2, 2, 1), [".....", "..#..", "#####", "..#..", "....."]),
+        (image_buffer.outline([(0, 0), (4, 0), (0, 4)]), ["#####", "#..#.", "#.#..", "##...", "#...."]),
+        (
+            image_buffer.filled_polygon([(0, 0), (4, 0), (0, 4)]),
+            ["#####", "####.", "###..", "##...", "#...."],
+        ),
     ],
     ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
 )
 def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
     """Pixel by pixel."""
-    picture = Raster(width=5, height=5)
+    picture = ImageBuffer(width=5, height=5)
     picture.draw(points, RED)
 
     assert lit(picture) == rows

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from palaestra_sim.ros.node import ServiceFailed
 from palaestra_sim.scene.geometry import axis_angle_to_quaternion
 from palaestra_sim.scene.nodes.types import type_number
-from palaestra_sim.scene.tree.catalogue import FieldType, field_kinds, kinds_of
+from palaestra_sim.scene.tree.field_types import FieldType, field_kinds, kinds_of
 from palaestra_sim.scene.tree.fields import quaternion_to_axis_angle
 from palaestra_sim.world import builtin
 from tests.scenes import load_scene

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.front.left_out import left_out_lines, write_left_out
+from palaestra_sim.ros_controller.left_out import left_out_lines, write_left_out
 
 
 def error(line, fact="the stub simulates no Drone", world="my.wbt"):

@@ -6,10 +6,10 @@ import random
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.scene.joints import Joint, JointPlace
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.joints import Joint, JointFrame
 from palaestra_sim.scene.motion import motion_of
 from palaestra_sim.scene.motors import Motor, MotorSpec
-from palaestra_sim.scene.places import Place
 from tests.robotino import WHEELS, wheel_speeds
 from tests.scenes import load_scene
 
@@ -118,14 +118,14 @@ def test_a_gps_on_a_joint_moves_with_it(load):
 
 def test_a_place_on_a_slider_moves_along_its_axis():
     """The axis is in the frame around the joint, which is turned here."""
-    frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
+    frame = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
     motor = Motor(MotorSpec(name="lift"))
     motor.speed_rad_s = 0.2
-    end = JointPlace(
+    end = JointFrame(
         frame, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), Joint(axis=(1.0, 0.0, 0.0), slides=True, motor=motor)
     )
 
-    motion = motion_of(Place(end, (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0)), body=None)
+    motion = motion_of(Frame(end, (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0)), body=None)
 
     assert motion.velocity == pytest.approx((0.0, 0.2, 0.0))
     assert motion.turning == (0.0, 0.0, 0.0)

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.scene.base import Base
-from palaestra_sim.scene.drive import find_drive
+from palaestra_sim.scene.mobile_base import MobileBase
 from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.scene.wheel_kinematics import find_drive
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 from tests.robotino import ROBOTINO, WHEELS, twist, wheel_speeds
@@ -26,7 +26,7 @@ def build():
         wheels = [Motor(MotorSpec(name=name, **{"max_velocity_rad_s": 137.46, **spec})) for name in WHEELS]
         for wheel in wheels:
             wheel.set_position(math.inf)
-        body = StubBody(Base(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
+        body = StubBody(MobileBase(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
         body.face(Neighborhood(obstacles, RADIUS), others)
 
         def go(vx, vy, omega, steps):
@@ -303,7 +303,7 @@ def test_a_robot_never_ends_inside_anything(commands):
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     obstacles = [*walls, Disc(0.6, 0.6, 0.1)]
     wheels = [Motor(MotorSpec(name=name, max_velocity_rad_s=137.46)) for name in WHEELS]
-    body = StubBody(Base(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
+    body = StubBody(MobileBase(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
     body.face(Neighborhood(obstacles, RADIUS), ())
     for wheel in wheels:
         wheel.set_position(math.inf)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.scene.lookup import LookupTable
+from palaestra_sim.scene.lookup_table import LookupTable
 from palaestra_sim.stub.obstacles import Disc, Neighborhood
 from palaestra_sim.stub.rays import Fan
 

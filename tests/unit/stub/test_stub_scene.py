@@ -8,7 +8,7 @@ import pytest
 from palaestra_sim.errors import WorldError, WorldRefusedError
 from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.scene.reader import read_scene
-from palaestra_sim.scene.tree.catalogue import FieldType
+from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.outline import obstacle
 from palaestra_sim.stub.physics import StubPhysics

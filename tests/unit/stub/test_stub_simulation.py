@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.scene.robot import seed_of
-from palaestra_sim.scene.tree.catalogue import FieldType
+from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.world import builtin
 from tests.robotino import WHEELS, wheel_speeds
 from tests.scenes import load_scene

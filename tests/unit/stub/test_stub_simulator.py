@@ -3,9 +3,9 @@
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.front.simulator import Simulator
 from palaestra_sim.ros.node import ServiceFailed
-from palaestra_sim.scene.loading import Loader
+from palaestra_sim.ros_controller.simulator import RunningSimulator
+from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
@@ -33,7 +33,7 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     path.write_bytes(b"#VRML_SIM R2023b utf8\nColosseum { }\n")
 
     with pytest.raises(WorldError, match=r"bad.wbt:2:1: the stub simulates no Colosseum"):
-        Simulator(path, Loader(physics=StubPhysics), ros.make_node)
+        RunningSimulator(path, Loader(physics=StubPhysics), ros.make_node)
 
     assert ros.nodes == []
 

@@ -4,7 +4,7 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import last_field, message_type
 from palaestra_protocol.ros.tcpros import LENGTH
-from palaestra_sim.ros.topics import Publisher, Topic
+from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 
 class Link:
@@ -24,7 +24,7 @@ def publish():
 
     def send(type_name, value, **template):
         link = Link()
-        topic = Topic("/robotino/gps/values", message_type(type_name), latched=False)
+        topic = PublishedTopic("/robotino/gps/values", message_type(type_name), latched=False)
         topic.links.append(link)
         publisher = Publisher(topic, template)
         for _ in range(2):

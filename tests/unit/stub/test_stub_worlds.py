@@ -5,13 +5,13 @@ import math
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.front.simulator import Simulator
-from palaestra_sim.scene.loading import Loader
+from palaestra_sim.ros_controller.simulator import RunningSimulator
+from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
-from palaestra_sim.scene.nodes import growing
-from palaestra_sim.scene.nodes.growing import Descriptions
-from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.nodes import instantiate
+from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.outline import obstacle
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse, parse_proto
@@ -101,7 +101,7 @@ def test_a_proto_inside_itself_ends():
 
 def test_protos_that_double_at_each_level_end(monkeypatch):
     """Twenty levels would be a million nodes; the world is refused instead."""
-    monkeypatch.setattr(growing, "MAX_NODES", 1000)
+    monkeypatch.setattr(instantiate, "MAX_NODES", 1000)
 
     with pytest.raises(WorldError, match="the world has more than 1000 nodes"):
         load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } Loop { } ] } }")
@@ -397,16 +397,18 @@ def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
     world = tmp_path / "worlds" / "mine.wbt"
     world.write_text(f'{HEAD}EXTERNPROTO "../protos/Stool.proto"\nStool {{ }}')
 
-    assert len(Simulator(world, Loader(physics=StubPhysics), ros.make_node).simulation.scene.solids) == 1
+    assert (
+        len(RunningSimulator(world, Loader(physics=StubPhysics), ros.make_node).simulation.scene.solids) == 1
+    )
 
     world.write_text(f'{HEAD}EXTERNPROTO "../protos/Lamp.proto"\nLamp {{ }}')
     with pytest.raises(WorldError, match=r"mine.wbt:3:1: Lamp is not expanded \(.*Lamp.proto:2:.*template"):
-        Simulator(world, Loader(physics=StubPhysics), ros.make_node)
+        RunningSimulator(world, Loader(physics=StubPhysics), ros.make_node)
 
     lamp = load("[Lamp]\ncylinder = { radius = 0.1, height = 2 }", "mine.toml")
     assert (
         len(
-            Simulator(
+            RunningSimulator(
                 world, Loader(physics=StubPhysics, stand_ins=lamp), ros.make_node
             ).simulation.scene.solids
         )

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from palaestra.sweeps.model import Sweep, load
-from palaestra.sweeps.trial import Figures, Point, RunFigures
+from palaestra.sweeps.trial import Point, RunFigures, TrialFigures
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}, "spec": {}}
 
@@ -28,9 +28,9 @@ def sweep(tmp_path: Path) -> Callable[..., Sweep]:
 
 def figures(
     *curves: dict[int, float], ended: bool = True, succeeded: bool = True, reason: str = ""
-) -> Figures:
+) -> TrialFigures:
     """Return the figures of a trial whose runs have these success rates by step."""
-    return Figures.of(
+    return TrialFigures.of(
         tuple(
             RunFigures(
                 curve=tuple(

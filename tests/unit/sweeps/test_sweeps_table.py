@@ -1,21 +1,25 @@
 """The result: medians and quartiles over seeds, as text and as a picture."""
 
-from palaestra.sweeps.drawing import draw
 from palaestra.sweeps.model import Objective
-from palaestra.sweeps.table import Row, lines
-from palaestra.sweeps.trial import Figures, State
+from palaestra.sweeps.plot import draw
+from palaestra.sweeps.table import TrialRow, lines
+from palaestra.sweeps.trial import TrialFigures, TrialProgress
 from tests.unit.sweeps.conftest import figures
 
 RATE = Objective.SUCCESS_RATE
 ROWS = [
-    Row(
+    TrialRow(
         name="s-0",
         changes={"trainer.a": 1e-4, "b": "x"},
         figures=figures({5: 0.2, 10: 0.4}, {5: 0.0, 10: 0.8}),
     ),
-    Row(name="s-1", changes={"trainer.a": 1e-3, "b": "x"}, figures=figures({5: 0.9}, {5: 0.7}, {5: 0.8})),
-    Row(name="s-2", changes={"trainer.a": 1e-2, "b": "x"}, figures=figures({5: 1.0}, succeeded=False)),
-    Row(name="s-3", changes={"trainer.a": 0.1, "b": "x"}, figures=Figures(state=State.WAITING)),
+    TrialRow(
+        name="s-1", changes={"trainer.a": 1e-3, "b": "x"}, figures=figures({5: 0.9}, {5: 0.7}, {5: 0.8})
+    ),
+    TrialRow(name="s-2", changes={"trainer.a": 1e-2, "b": "x"}, figures=figures({5: 1.0}, succeeded=False)),
+    TrialRow(
+        name="s-3", changes={"trainer.a": 0.1, "b": "x"}, figures=TrialFigures(state=TrialProgress.WAITING)
+    ),
 ]
 
 
@@ -37,7 +41,7 @@ def test_a_curve_goes_as_far_as_all_of_its_seeds() -> None:
     found = figures({5: 0.2, 10: 0.4, 15: 1.0}, {4: 0.1, 10: 0.8}, ended=False)
 
     assert found.common(RATE) == {5: 0.15000000000000002, 10: 0.6000000000000001}
-    assert found.state is State.RUNNING
+    assert found.state is TrialProgress.RUNNING
     assert found.common(Objective.MEAN_RETURN)[10] == -0.6000000000000001
 
 

@@ -16,7 +16,7 @@ from gymnasium import spaces
 from palaestra_protocol.pod.status import Termination
 from palaestra_trainer.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory
 
 PATIENCE_S = 20.0
@@ -282,6 +282,6 @@ def play(directory, make_member):
                 member.take_step = lambda take=member.take_step: (take(), on_step())
             return list(members.values())
 
-        return training.run(configuration, into, make_members, **options), members
+        return attempt.run(configuration, into, make_members, **options), members
 
     return run

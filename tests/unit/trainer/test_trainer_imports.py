@@ -6,7 +6,7 @@ import sys
 
 IMPORT = """
 import json, sys
-import palaestra_trainer.cli, palaestra_trainer.run.training, palaestra_trainer.simulators.connect
+import palaestra_trainer.cli, palaestra_trainer.run.attempt, palaestra_trainer.simulators.connect
 imported = sorted(sys.modules)
 """
 USE = """

@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 
-from palaestra.client import Happening
+from palaestra.client import Event
 from palaestra.view import describe, happened
 from tests.unit.view.jobs import CREATED, NOW, make_job
 
@@ -94,7 +94,7 @@ def test_the_storage_of_the_run_is_shown():
 
 def test_events_have_an_age_and_a_count():
     """A message that the API server broke into lines is one."""
-    event = Happening(
+    event = Event(
         time=NOW - timedelta(minutes=3),
         warning=True,
         about="Pod/job-0-x7k2p",
@@ -110,7 +110,7 @@ def test_events_have_an_age_and_a_count():
 
 def test_an_event_about_a_container_names_it():
     """A pod of five containers had five lines `Container created`."""
-    event = Happening(
+    event = Event(
         time=NOW,
         warning=False,
         about="Pod/job-0-x7k2p",

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from palaestra_sim.world import (
     Item,
-    Part,
+    ShapePart,
     StandInError,
     expand,
     load_stand_ins,
     shipped_stand_ins,
 )
-from palaestra_sim.world.formulas import parse_formula
+from palaestra_sim.world.expressions import parse_formula
 
 PAGE = Path(__file__).parents[3] / "docs/simulators.md"
 # The types that are in most worlds of other people, beside robots and devices.
@@ -32,12 +32,12 @@ TexturedBackgroundLight LegoWall MazeBlock TinkerbotsBase SumoInterface Pedestri
 """
 
 
-def parts(name: str, **values: Sequence[Item]) -> tuple[Part, ...]:
+def parts(name: str, **values: Sequence[Item]) -> tuple[ShapePart, ...]:
     """Return the parts of an object of a type that ships."""
     return expand(shipped_stand_ins()[name], values)
 
 
-def made(text: str, **values: Sequence[Item]) -> tuple[Part, ...]:
+def made(text: str, **values: Sequence[Item]) -> tuple[ShapePart, ...]:
     """Return the parts of an object of the only type of a file."""
     (stand_in,) = load_stand_ins(text, "mine.toml").values()
     return expand(stand_in, values)
@@ -87,8 +87,8 @@ def test_every_object_has_a_place_and_a_name() -> None:
 
 def test_a_box_has_the_size_of_its_field() -> None:
     """In both places: the default, and the value of the world."""
-    assert parts("WoodenBox") == (Part(shape="box", size=(0.6, 0.6, 0.6)),)
-    assert parts("WoodenBox", size=(1.0, 2.0, 3.0)) == (Part(shape="box", size=(1, 2, 3)),)
+    assert parts("WoodenBox") == (ShapePart(shape="box", size=(0.6, 0.6, 0.6)),)
+    assert parts("WoodenBox", size=(1.0, 2.0, 3.0)) == (ShapePart(shape="box", size=(1, 2, 3)),)
 
 
 @pytest.mark.parametrize("value", [(), (1.0, 2.0), ("a", "b", "c"), (None,)])
@@ -101,17 +101,17 @@ def test_a_wall_stands_on_its_origin_and_a_box_is_around_it() -> None:
     """Most of what is built stands; most of what is put down has its origin in the middle."""
     (wall,) = parts("Wall")
 
-    assert wall == Part(shape="box", size=(0.2, 1, 2.4), position=(0, 0, 1.2))
+    assert wall == ShapePart(shape="box", size=(0.2, 1, 2.4), position=(0, 0, 1.2))
 
 
 def test_an_arena_is_a_floor_within_four_walls() -> None:
     """The walls stand around the floor, not on it."""
     floor, front, back, left, right = parts("RectangleArena", floorSize=(3.0, 2.0), wallHeight=(0.4,))
 
-    assert floor == Part(shape="plane", size=(3, 2))
-    assert front == Part(shape="box", size=(0.01, 2, 0.4), position=(1.505, 0, 0.2))
+    assert floor == ShapePart(shape="plane", size=(3, 2))
+    assert front == ShapePart(shape="box", size=(0.01, 2, 0.4), position=(1.505, 0, 0.2))
     assert back.position == (-1.505, 0.0, 0.2)
-    assert left == Part(shape="box", size=(3.02, 0.01, 0.4), position=(0, 1.005, 0.2))
+    assert left == ShapePart(shape="box", size=(3.02, 0.01, 0.4), position=(0, 1.005, 0.2))
     assert right.position == (0.0, -1.005, 0.2)
 
 
@@ -119,7 +119,7 @@ def test_a_round_arena_is_closed() -> None:
     """Its wall is a ring of boxes that overlap at the corners."""
     floor, *ring = parts("CircleArena", radius=(2.0,))
 
-    assert floor == Part(shape="plane", size=(4, 4))
+    assert floor == ShapePart(shape="plane", size=(4, 4))
     assert len(ring) == 24
     assert {round(math.hypot(*box.position[:2]), 2) for box in ring} == {1.99}
     assert math.isclose(sum(box.size[0] - box.size[1] for box in ring), 2 * math.pi * 2.005, rel_tol=0.01)
@@ -131,8 +131,8 @@ def test_a_building_has_a_wall_between_each_two_corners() -> None:
 
     first, second, third = parts("SimpleBuilding", corners=corners, floorNumber=(2.0,))
 
-    assert first == Part(shape="box", size=(6.2, 0.2, 6), position=(3, 0, 3))
-    assert second == Part(shape="box", size=(4.2, 0.2, 6), position=(6, 2, 3), turn=math.pi / 2)
+    assert first == ShapePart(shape="box", size=(6.2, 0.2, 6), position=(3, 0, 3))
+    assert second == ShapePart(shape="box", size=(4.2, 0.2, 6), position=(6, 2, 3), turn=math.pi / 2)
     assert third.position == (3.0, 2.0, 3.0)
 
 
@@ -178,10 +178,10 @@ def test_a_part_is_placed_turned_and_left_out_by_formulas() -> None:
     """
 
     assert made(text) == (
-        Part(shape="cylinder", size=(0.2, 0.5), position=(0, 0, 0.25)),
-        Part(shape="sphere", size=(0.1,)),
+        ShapePart(shape="cylinder", size=(0.2, 0.5), position=(0, 0, 0.25)),
+        ShapePart(shape="sphere", size=(0.1,)),
     )
-    assert made(text, hasBack=(True,), height=(0.4,))[1] == Part(
+    assert made(text, hasBack=(True,), height=(0.4,))[1] == ShapePart(
         shape="box", size=(0.03, 0.4, 0.4), position=(-0.19, 0, 0.4 + 0.2), turn=0.2
     )
 
@@ -205,7 +205,7 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
         "Crate": "solid",
         "Stool": "solid",
     }
-    assert expand(mine["Crate"], {}) == (Part(shape="box", size=(0.6, 0.4, 0.3), position=(0, 0, 0.15)),)
+    assert expand(mine["Crate"], {}) == (ShapePart(shape="box", size=(0.6, 0.4, 0.3), position=(0, 0, 0.15)),)
 
 
 @pytest.mark.parametrize(

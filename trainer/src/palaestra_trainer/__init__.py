@@ -14,24 +14,24 @@ from palaestra_trainer.deferred import defer_unused_imports
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from palaestra_trainer.run.policies import Policy
-    from palaestra_trainer.tolerant.env import TolerantEnv
-    from palaestra_trainer.tolerant.players import Players
-    from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
-    from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+    from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
+    from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+    from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+    from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+    from palaestra_trainer.run.policies import TrainedPolicy
 
 defer_unused_imports()
 defer_compiler()
 
 
-def load_policy(run_or_zip: str | Path) -> Policy:
+def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
     """Return the policy of a run directory, or of a model zip inside one; see `policies.load_policy`."""
     from palaestra_trainer.run import policies
 
     return policies.load_policy(run_or_zip)
 
 
-def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> TolerantEnv:
+def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> FaultTolerantEnv:
     """Return a gymnasium.Env in a simulator of its own, for a training loop of any library.
 
     A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
@@ -51,14 +51,14 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
         ConfigurationError: the environment is missing or wrong, or no simulator with the role is free.
         FaultBudgetSpent: the simulator does not start.
     """
-    from palaestra_trainer.tolerant.env import TolerantEnv
+    from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
 
-    return TolerantEnv(_players(environment, 1, role, options))
+    return FaultTolerantEnv(_players(environment, 1, role, options))
 
 
 def make_vec_env(
     environment: str | None = None, num_envs: int | None = None, *, role: str = "Collect", **options: Any
-) -> TolerantVectorEnv:
+) -> FaultTolerantVectorEnv:
     """Return a gymnasium VectorEnv whose simulators step at the same time; see `make_env`.
 
     Episodes are reset in their last step (`AutoresetMode.SAME_STEP`). After a fault, that step waits until
@@ -73,14 +73,14 @@ def make_vec_env(
     Raises:
         As `make_env`.
     """
-    from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+    from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 
-    return TolerantVectorEnv(_players(environment, num_envs, role, options))
+    return FaultTolerantVectorEnv(_players(environment, num_envs, role, options))
 
 
 def make_sb3_vec_env(
     environment: str | None = None, num_envs: int | None = None, *, role: str = "Collect", **options: Any
-) -> TolerantVecEnv:
+) -> FaultTolerantVecEnv:
     """Return a Stable-Baselines3 VecEnv whose simulators step at the same time; see `make_vec_env`.
 
     Args:
@@ -92,9 +92,9 @@ def make_sb3_vec_env(
     Raises:
         As `make_env`.
     """
-    from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
+    from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 
-    return TolerantVecEnv(_players(environment, num_envs, role, options))
+    return FaultTolerantVecEnv(_players(environment, num_envs, role, options))
 
 
 def report(*, step: int, success_rate: float | None = None) -> None:
@@ -111,16 +111,16 @@ def report(*, step: int, success_rate: float | None = None) -> None:
         ValueError: the step is negative, or the rate not within 0 to 1.
         ConfigurationError: the configuration cannot be read, or its statusAddress is in use.
     """
-    from palaestra_trainer.run import reporting
+    from palaestra_trainer.run import custom_program
 
-    reporting.report(step, success_rate)
+    custom_program.report(step, success_rate)
 
 
-def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> Players:
+def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> EnvGroup:
     from palaestra_trainer.configuration import Environment
     from palaestra_trainer.errors import ConfigurationError
+    from palaestra_trainer.fault_tolerant.make import make_players
     from palaestra_trainer.simulators.entry_point import role_of
-    from palaestra_trainer.tolerant.making import make_players
 
     if environment is None and options:
         raise ConfigurationError(

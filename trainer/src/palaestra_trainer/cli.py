@@ -25,8 +25,8 @@ from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs, last_lines
-from palaestra_trainer.waiting.interruption import end_undisturbed, leaving_when_asked
-from palaestra_trainer.waiting.leaving import leave_after
+from palaestra_trainer.waiting.exit import leave_after
+from palaestra_trainer.waiting.signals import end_undisturbed, leaving_when_asked
 
 log = structlog.get_logger(__name__)
 
@@ -112,11 +112,11 @@ def train(arguments: Sequence[str] | None = None) -> int:
     with leaving_when_asked():
         # Imported here, so that a wrong configuration is reported at once, not after seconds of imports.
         with without_collections():
-            from palaestra_trainer.run import training
+            from palaestra_trainer.run import attempt
             from palaestra_trainer.simulators.connect import connect_members
             from palaestra_trainer.telemetry import display
 
-        return training.run(
+        return attempt.run(
             configuration,
             directory,
             connect_members,
@@ -201,7 +201,7 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> None:
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
     with without_collections():
-        from palaestra_trainer.run.measuring import measure
+        from palaestra_trainer.run.evaluate import measure
         from palaestra_trainer.simulators.connect import connect_here, connect_members
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)

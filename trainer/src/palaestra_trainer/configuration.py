@@ -27,7 +27,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic.alias_generators import to_camel
 from pydantic_core import ErrorDetails
 
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
 
 log = structlog.get_logger(__name__)

@@ -7,11 +7,11 @@ from them. No module here uses a cluster, a file or a clock.
 from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob
 from palaestra.api.loading import as_data, broken_guards, dump, load, validate
 from palaestra.api.scheduling import Scheduling
-from palaestra.api.simulators import Driver, SimulatorGroup, World
+from palaestra.api.simulators import Driver, SimulatorGroup, WorldSource
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
 from palaestra.api.trainer import Reward, Trainer
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 
 __all__ = [
     "API_VERSION",
@@ -27,7 +27,7 @@ __all__ = [
     "Storage",
     "Trainer",
     "TrainingJob",
-    "World",
+    "WorldSource",
     "as_data",
     "broken_guards",
     "dump",

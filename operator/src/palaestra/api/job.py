@@ -24,7 +24,7 @@ from palaestra.api.simulators import SimulatorGroup
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
 from palaestra.api.trainer import Trainer
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"

@@ -13,10 +13,10 @@ from pydantic import ValidationError
 
 from palaestra.api.job import API_VERSION, KIND, TrainingJob
 from palaestra.api.model import FIELDS_ONLY, Rule
+from palaestra.api.model_walk import objects
 from palaestra.api.paths import Path, Pruned, shown
-from palaestra.api.sentences import quoted, sentence
-from palaestra.api.tree import objects
-from palaestra.api.yaml_text import NotYaml, read, write
+from palaestra.api.validation_messages import quoted, sentence
+from palaestra.api.yaml_io import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
 _NOT_EXACT = 2.0**53  # larger floats stand for several whole numbers

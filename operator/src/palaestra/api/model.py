@@ -94,7 +94,7 @@ class ApiModel(BaseModel):
         return schema
 
 
-class Reported(ApiModel):
+class StatusModel(ApiModel):
     """One object of a status: like every other object, but unknown fields are ignored.
 
     A newer release may have written the status, with more fields. No model of what a person writes inherits

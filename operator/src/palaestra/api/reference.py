@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from palaestra.api.crd import schema
+from palaestra.api.generated_sections import between_marks
 from palaestra.api.job import TrainingJob
-from palaestra.api.marks import between_marks
+from palaestra.api.model_walk import model_at
 from palaestra.api.structural import Schema
-from palaestra.api.tree import model_at
 
 BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
 

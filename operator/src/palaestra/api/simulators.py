@@ -22,7 +22,7 @@ from palaestra.api.fields import (
 )
 from palaestra.api.model import ApiModel, Rule
 from palaestra.api.passwords import NO_PASSWORD_IN_COMMAND, NO_PASSWORD_IN_WORDS
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 
 
 class Driver(StrEnum):
@@ -57,7 +57,7 @@ class ConfigMapKey(ApiModel):
     """Key whose value is the text of a `.wbt` file, or of a model of MuJoCo."""
 
 
-class World(ApiModel):
+class WorldSource(ApiModel):
     """The source of the world: exactly one of four.
 
     Every simulator runs its own copy. In the copy, only the `controllerArgs` of robots whose controller is
@@ -176,7 +176,7 @@ class SimulatorGroup(ApiModel):
     command: Words = ()
     """Program and arguments, for driver `command` only."""
 
-    world: World = World(builtin=Builtin.ARENA)
+    world: WorldSource = WorldSource(builtin=Builtin.ARENA)
     """World that the simulators load, from exactly one of four sources."""
 
     recycle: Recycle | None = None

@@ -14,11 +14,11 @@ from typing import Annotated
 
 from pydantic import Field
 
+from palaestra.api.attempt_status import Faults, Goodput, LastAttempt, MemoryKills
 from palaestra.api.fields import KNOWN_ITEMS, Count, Fraction, Image, Listed, Sentence, Word, Words
-from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
-from palaestra.api.model import Reported
+from palaestra.api.model import StatusModel
 from palaestra_protocol.control import SidecarState
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 
 
 class Phase(StrEnum):
@@ -54,7 +54,7 @@ class ConditionStatus(StrEnum):
     UNKNOWN = "Unknown"
 
 
-class Condition(Reported):
+class Condition(StatusModel):
     """A condition of the job, in the format of Kubernetes' own conditions."""
 
     type: ConditionType = Field(strict=False)
@@ -76,7 +76,7 @@ class Condition(Reported):
     """Generation of the spec to which this condition applies; absent: unknown."""
 
 
-class LastCheckpoint(Reported):
+class LastCheckpoint(StatusModel):
     """The newest checkpoint in the run directory."""
 
     step: Count
@@ -86,7 +86,7 @@ class LastCheckpoint(Reported):
     """Time at which it was saved."""
 
 
-class Restarts(Reported):
+class Restarts(StatusModel):
     """Restarts in a replica, by cause.
 
     The number of the attempt is 1 + trainer + disruption + suspension + operator.
@@ -112,7 +112,7 @@ class Restarts(Reported):
     that a container of others kept alive. At most `backoffLimit`; absent: none."""
 
 
-class PodReference(Reported):
+class PodReference(StatusModel):
     """The pod of the current attempt."""
 
     name: Word
@@ -132,7 +132,7 @@ class LostPart(StrEnum):
     RUN_DIRECTORY = "RunDirectory"
 
 
-class LostRun(Reported):
+class LostRun(StatusModel):
     """A run that had trained and is lost."""
 
     what: LostPart = Field(strict=False)
@@ -150,7 +150,7 @@ class LostRun(Reported):
     replica waits for that."""
 
 
-class SimulatorStatus(Reported):
+class SimulatorStatus(StatusModel):
     """One simulator of a replica, as the trainer reports it."""
 
     name: Word
@@ -178,7 +178,7 @@ class SimulatorStatus(Reported):
     """State of its standby, `starting` or `ready`; absent: it has no standby."""
 
 
-class SuccessInterval(Reported):
+class SuccessInterval(StatusModel):
     """The 95 % interval (Wilson) of a success rate."""
 
     low: Fraction
@@ -191,7 +191,7 @@ class SuccessInterval(Reported):
     """Number of episodes."""
 
 
-class ReplicaStatus(Reported):
+class ReplicaStatus(StatusModel):
     """One training run."""
 
     index: Count
@@ -281,7 +281,7 @@ class ReplicaStatus(Reported):
     """Run that the replica has lost last; absent: none."""
 
 
-class Release(Reported):
+class Release(StatusModel):
     """The images for containers without an image of their own, fixed when the job was accepted."""
 
     trainer: Image
@@ -301,7 +301,7 @@ class Release(Reported):
     and need it for each new pod. Absent: the job names none, or an older release accepted it."""
 
 
-class Status(Reported):
+class Status(StatusModel):
     """Status of a TrainingJob, written by the operator only."""
 
     observed_generation: Count | None = None

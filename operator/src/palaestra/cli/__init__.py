@@ -7,9 +7,9 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from palaestra.api.lines import printable
+from palaestra.api.text import printable
 from palaestra.cli.commands import COMMANDS
-from palaestra.cli.parsing import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMESPACE, WRONG_INPUT
+from palaestra.cli.subcommands import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMESPACE, WRONG_INPUT
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import KILLED, LocalError
 from palaestra_protocol.imports import import_without, without_collections

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from palaestra.api.lines import printable
-from palaestra.cli.parsing import CONTEXT, KUBECONFIG, NAMESPACE, Commands, command
+from palaestra.api.text import printable
+from palaestra.cli.subcommands import CONTEXT, KUBECONFIG, NAMESPACE, Commands, command
 from palaestra.client import Client, ClientError
 from palaestra.cluster import ApiError, Forbidden
 from palaestra.errors import SpecErrors

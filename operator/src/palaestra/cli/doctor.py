@@ -4,9 +4,9 @@ import argparse
 from collections.abc import Iterator
 
 from palaestra.cli.cluster import REFUSED, cluster_command, say
-from palaestra.cli.parsing import Commands
+from palaestra.cli.subcommands import Commands
 from palaestra.client import Client
-from palaestra.doctor import Finding, Site, Verdict, examine
+from palaestra.doctor import CheckResult, CheckStatus, Site, examine
 from palaestra.operator.options import DEFAULT_NAMESPACE
 
 DOCTOR = """\
@@ -35,10 +35,10 @@ def _doctor(client: Client, options: argparse.Namespace) -> int:
     for finding in examine(site):
         found.append(finding)
         say(shown(finding))
-    return REFUSED if any(finding.verdict is Verdict.WRONG for finding in found) else 0
+    return REFUSED if any(finding.verdict is CheckStatus.WRONG for finding in found) else 0
 
 
-def shown(found: Finding) -> Iterator[str]:
+def shown(found: CheckResult) -> Iterator[str]:
     """Yield a line for a finding, and one for its remedy."""
     yield f"{found.verdict:<8} {found.what:<{WIDTH}} {found.fact}"
     if found.remedy:

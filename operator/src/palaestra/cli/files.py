@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from palaestra.api import TrainingJob, load
+from palaestra.bounded_read import MOST_JOB_BYTES, MOST_WORLD_BYTES, read_bounded
 from palaestra.errors import PalaestraError
-from palaestra.reading import MOST_JOB_BYTES, MOST_WORLD_BYTES, read_bounded
 
 
 def job(file: Path) -> TrainingJob:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from palaestra.cli.files import read_text
-from palaestra.cli.parsing import Commands, command
+from palaestra.cli.subcommands import Commands, command
 from palaestra.errors import PalaestraError
 from palaestra.local.files import write
 from palaestra.zoo import convert

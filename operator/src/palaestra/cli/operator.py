@@ -6,9 +6,9 @@ import re
 from importlib.metadata import version
 
 from palaestra.api.container import Resources
-from palaestra.cli.parsing import Commands, command
+from palaestra.cli.subcommands import Commands, command
 from palaestra.cluster import own_namespace
-from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
+from palaestra.operator.options import DEFAULT_NAMESPACE, OperatorOptions, address
 from palaestra.operator.run import run
 from palaestra.plan import Allowed, Images
 from palaestra.plan.resources import Defaults
@@ -216,7 +216,7 @@ def _operator(options: argparse.Namespace) -> int:
         webots=options.webots_image,
     )
     return run(
-        Options(
+        OperatorOptions(
             images=images,
             operator_namespace=options.operator_namespace,
             monitoring_namespace=options.monitoring_namespace,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir, job
-from palaestra.cli.parsing import Commands, command
-from palaestra.given import changed
-from palaestra.local.run import Options, run
+from palaestra.cli.subcommands import Commands, command
+from palaestra.job_input import changed
+from palaestra.local.run import RunOptions, run
 from palaestra_protocol.numbers import MOST_PORT, whole
 
 MODEL = "model.zip"  # the best policy of a run
@@ -51,7 +51,7 @@ def add(commands: Commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     return run(
         _wanted(options),
-        Options(
+        RunOptions(
             runs=options.dir,
             version=version("palaestra"),
             replica=options.replica,

@@ -12,20 +12,20 @@ from typing import Any
 
 from palaestra.cli.cluster import add_cluster, connected, say
 from palaestra.cli.files import add_dir
-from palaestra.cli.parsing import Commands, command
+from palaestra.cli.subcommands import Commands, command
 from palaestra.client import Client
 from palaestra.errors import PalaestraError, SpecErrors
-from palaestra.local import rundir
+from palaestra.local import run_directory
 from palaestra.local.errors import KILLED
 from palaestra.local.files import write
-from palaestra.sweeps import expanding, ledger
-from palaestra.sweeps.carrying_out import Place, carry_out
-from palaestra.sweeps.here import Here
+from palaestra.sweeps import grid, trial_log
+from palaestra.sweeps.cluster_backend import ClusterBackend
+from palaestra.sweeps.local_backend import LocalBackend
 from palaestra.sweeps.model import Objective, Sweep, load
-from palaestra.sweeps.searching import InTurn, Search
-from palaestra.sweeps.table import Row, lines
-from palaestra.sweeps.there import There
-from palaestra.sweeps.trial import State
+from palaestra.sweeps.runner import TrialBackend, carry_out
+from palaestra.sweeps.search import InTurn, Search
+from palaestra.sweeps.table import TrialRow, lines
+from palaestra.sweeps.trial import TrialProgress
 from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_protocol.signals import obeyed
@@ -87,7 +87,7 @@ def _sweep(options: argparse.Namespace) -> int:
 def _here(options: argparse.Namespace) -> int:
     sweep = _loaded(options.file)
     folder = options.dir.absolute() / sweep.metadata.name
-    place = Here(folder, options.at_once)
+    place = LocalBackend(folder, options.at_once)
     with _begun(sweep, place, folder) as search:
         code = 0
         try:
@@ -99,7 +99,7 @@ def _here(options: argparse.Namespace) -> int:
         return code or shown
 
 
-def _carried_out(search: Search, place: Here, folder: Path, objective: Objective) -> None:
+def _carried_out(search: Search, place: LocalBackend, folder: Path, objective: Objective) -> None:
     """Run the trials, and end what still runs at the end."""
     try:
         carry_out(search, place, folder, objective, _say)
@@ -114,7 +114,7 @@ def _there(client: Client, options: argparse.Namespace) -> int:
     sweep = _loaded(options.file)
     folder = options.dir.absolute() / sweep.metadata.name
     default = None if sweep.spec.optuna is None else SEARCHED_AT_ONCE
-    place = There(client, sweep.metadata.name, options.at_once or default, _say)
+    place = ClusterBackend(client, sweep.metadata.name, options.at_once or default, _say)
     with _begun(sweep, place, folder) as search:
         carry_out(search, place, folder, sweep.spec.objective, _say)
         return _shown(search, place, sweep, folder)
@@ -135,21 +135,21 @@ def _loaded(file: Path) -> Sweep:
 
 
 @contextmanager
-def _begun(sweep: Sweep, place: Here | There, folder: Path) -> Iterator[Search]:
+def _begun(sweep: Sweep, place: LocalBackend | ClusterBackend, folder: Path) -> Iterator[Search]:
     """Check every trial, lock the folder and yield the search."""
     try:
-        trials = expanding.trials(sweep)
+        trials = grid.trials(sweep)
     except SpecErrors as error:
         raise PalaestraError(str(error)) from error
     for trial in trials:
         place.check(trial.job)
-    suggesting = None if sweep.spec.optuna is None else _extra("suggesting", "spec.optuna")
-    with rundir.locked(folder):
-        ledger.begin(folder, sweep)
-        if suggesting is None:
-            yield InTurn(trials, ledger.ended(folder))
+    optuna_search = None if sweep.spec.optuna is None else _extra("optuna_search", "spec.optuna")
+    with run_directory.locked(folder):
+        trial_log.begin(folder, sweep)
+        if optuna_search is None:
+            yield InTurn(trials, trial_log.ended(folder))
         else:
-            yield suggesting.Suggested(sweep, folder)
+            yield optuna_search.Suggested(sweep, folder)
 
 
 def _extra(module: str, purpose: str) -> Any:
@@ -182,14 +182,14 @@ def _interruptible() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _shown(search: Search, place: Place, sweep: Sweep, folder: Path) -> int:
+def _shown(search: Search, place: TrialBackend, sweep: Sweep, folder: Path) -> int:
     """Print the table, write it and the picture into the folder, and return the exit code."""
-    ended, objective = ledger.ended(folder), sweep.spec.objective
+    ended, objective = trial_log.ended(folder), sweep.spec.objective
     rows = [
-        Row(
+        TrialRow(
             name=trial.name,
             changes=trial.changes,
-            figures=ended.get(trial.number) or replace(place.look(trial), state=State.WAITING),
+            figures=ended.get(trial.number) or replace(place.look(trial), state=TrialProgress.WAITING),
         )
         for trial in search.known
     ]
@@ -197,8 +197,8 @@ def _shown(search: Search, place: Place, sweep: Sweep, folder: Path) -> int:
     write(folder / "table.txt", "".join(f"{line}\n" for line in table).encode())
     say(["", *table, "", f"folder: {folder}"])
     try:
-        if _extra("drawing", "curves.png").draw(rows, objective, folder / "curves.png"):
+        if _extra("plot", "curves.png").draw(rows, objective, folder / "curves.png"):
             _say(f"picture: {folder / 'curves.png'}")
     except PalaestraError as error:
         sys.stderr.write(f"{error}\n")
-    return FAILED if any(row.figures.state is State.FAILED for row in rows) else 0
+    return FAILED if any(row.figures.state is TrialProgress.FAILED for row in rows) else 0

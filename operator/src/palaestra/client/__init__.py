@@ -11,7 +11,6 @@
 copies a run out of its volume with the pod of `reading_pod`, which runs `packing`.
 """
 
-from palaestra.client.asking import asked, check_namespace
 from palaestra.client.client import Client
 from palaestra.client.errors import (
     ClientError,
@@ -26,14 +25,15 @@ from palaestra.client.errors import (
     QueueDecides,
     TookTooLong,
 )
-from palaestra.client.happenings import Happening
-from palaestra.client.waiting import why
+from palaestra.client.events import Event
+from palaestra.client.not_found_errors import asked, check_namespace
+from palaestra.client.wait_progress import why
 
 __all__ = [
     "Client",
     "ClientError",
     "EndedOtherwise",
-    "Happening",
+    "Event",
     "HasEnded",
     "NoPod",
     "NoSuchJob",

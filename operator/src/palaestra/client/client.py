@@ -10,15 +10,15 @@ from typing import Literal, Self
 from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, PodReference
-from palaestra.client.asking import asked
 from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, NothingLost, QueueDecides
-from palaestra.client.fetching import fetch
-from palaestra.client.following import changes
-from palaestra.client.happenings import Happening, happenings
-from palaestra.client.waiting import News, current, why
+from palaestra.client.events import Event, happenings
+from palaestra.client.fetch import fetch
+from palaestra.client.not_found_errors import asked
+from palaestra.client.wait_progress import News, current, why
+from palaestra.client.watch import changes
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.resources import TRAINING_JOBS
-from palaestra.given import Given, data_of, name_of
+from palaestra.job_input import Given, data_of, name_of
 from palaestra.objects import Object
 from palaestra.plan import ClusterLayout, Images
 from palaestra.plan.replica import RESTART_LOST_RUNS, ROS_MASTER, TRAINER, Replica
@@ -211,7 +211,7 @@ class Client:
                 f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what it waits for"
             ) from error
 
-    def events(self, name: str) -> tuple[Happening, ...]:
+    def events(self, name: str) -> tuple[Event, ...]:
         """Return the events about a job and the objects created for it, oldest first.
 
         Raises:

@@ -42,12 +42,12 @@ from palaestra.cluster.errors import (
     Untrusted,
 )
 from palaestra.cluster.lease import Leadership
-from palaestra.cluster.limits import Limits
-from palaestra.cluster.queue import WorkQueue
 from palaestra.cluster.recorder import Recorder
 from palaestra.cluster.reflector import Reflector
 from palaestra.cluster.resources import Resource
 from palaestra.cluster.store import Store
+from palaestra.cluster.timeouts import Timeouts
+from palaestra.cluster.workqueue import WorkQueue
 
 __all__ = [
     "AlreadyExists",
@@ -59,7 +59,6 @@ __all__ = [
     "Gone",
     "Invalid",
     "Leadership",
-    "Limits",
     "NamespaceTerminating",
     "NoSuchKind",
     "NotConfigured",
@@ -69,6 +68,7 @@ __all__ = [
     "Resource",
     "ServerError",
     "Store",
+    "Timeouts",
     "TooManyRequests",
     "Unreachable",
     "Untrusted",

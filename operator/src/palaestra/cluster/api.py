@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from palaestra.cluster.errors import Gone, NotFound
-from palaestra.cluster.lines import lines
+from palaestra.cluster.pod_logs import lines
 from palaestra.cluster.resources import PODS, Resource, resource_of
 from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
-from palaestra.cluster.watching import Watch
+from palaestra.cluster.watch import Watch
 from palaestra.objects import Object
 
 Objects = list[Object]

@@ -3,18 +3,18 @@
 import os
 from pathlib import Path
 
-from palaestra.cluster.access import Access
-from palaestra.cluster.account import FILES, account
 from palaestra.cluster.api import Api
+from palaestra.cluster.client_config import Access
 from palaestra.cluster.errors import CONFIGURE, NotConfigured
-from palaestra.cluster.limits import Limits
+from palaestra.cluster.service_account import FILES, account
+from palaestra.cluster.timeouts import Timeouts
 from palaestra.cluster.transport import Transport
 
 OWN_NAMESPACE = FILES / "namespace"
 DEFAULT = "default"
 
 
-def connect(kubeconfig: str | None = None, context: str | None = None, limits: Limits | None = None) -> Api:
+def connect(kubeconfig: str | None = None, context: str | None = None, limits: Timeouts | None = None) -> Api:
     """Return the API server to use; nothing is sent yet.
 
     Args:
@@ -26,7 +26,7 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: L
         NotConfigured: no API server is named, or its credentials cannot be read.
     """
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
-    return Api(Transport(_access(files, context), limits or Limits()))
+    return Api(Transport(_access(files, context), limits or Timeouts()))
 
 
 def _access(files: str | None, context: str | None) -> Access:

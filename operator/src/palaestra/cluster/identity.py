@@ -15,7 +15,7 @@ from urllib3.util import make_headers
 from palaestra.cluster.errors import NotConfigured, Unreachable
 from palaestra.cluster.plugin import Credentials, Plugin
 from palaestra.cluster.tls import add_identity
-from palaestra.cluster.tokens import Token, text_of
+from palaestra.cluster.tokens import FileToken, text_of
 
 Authorization = Callable[[], str | None]
 TOKEN, TOKEN_FILE, NAME, PASSWORD = "token", "tokenFile", "username", "password"
@@ -91,7 +91,7 @@ class _OfPlugin:
 def _of_file(file: Path) -> Authorization:
     if not text_of(file):
         raise NotConfigured(f"{TOKEN_FILE}: {file} is missing or empty; log in again, or name another file")
-    return Token(file, time.monotonic)
+    return FileToken(file, time.monotonic)
 
 
 def _always(header: str | None) -> Authorization:

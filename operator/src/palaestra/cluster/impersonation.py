@@ -7,7 +7,7 @@ import string
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra.cluster.access import Headers
+from palaestra.cluster.client_config import Headers
 from palaestra.cluster.errors import NotConfigured
 
 USER, UID, GROUPS, EXTRA = "as", "as-uid", "as-groups", "as-user-extra"

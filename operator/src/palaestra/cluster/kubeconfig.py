@@ -24,8 +24,8 @@ from kubernetes.config.kube_config import ConfigNode, KubeConfigLoader, KubeConf
 from urllib3.exceptions import InsecureRequestWarning, LocationParseError
 from urllib3.util import parse_url
 
-from palaestra.cluster.access import Access
-from palaestra.cluster.dialing import connections
+from palaestra.cluster.client_config import Access
+from palaestra.cluster.connection_pool import connections
 from palaestra.cluster.errors import CONFIGURE, NotConfigured, Unreachable
 from palaestra.cluster.identity import PROVIDER, Authorization, authorization
 from palaestra.cluster.impersonation import impersonation

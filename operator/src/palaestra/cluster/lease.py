@@ -16,8 +16,8 @@ import structlog
 
 from palaestra.cluster.api import Api
 from palaestra.cluster.errors import AlreadyExists, ApiError, Conflict, NotFound
+from palaestra.cluster.lease_timing import LeaseSpec, ObservedLease, Tenure
 from palaestra.cluster.resources import LEASES
-from palaestra.cluster.tenure import Claim, Sighting, Tenure
 from palaestra.objects import Object
 
 log = structlog.get_logger("palaestra.cluster")
@@ -58,7 +58,7 @@ class Leadership:
         self._namespace, self._name, self._identity = namespace, name, identity
         self._duration_s = duration_s
         self._renew_s = renew_s
-        self._sighting = Sighting()
+        self._sighting = ObservedLease()
         self._tenure: Tenure | None = None
         self._terms = 0
         self._version = ""
@@ -135,7 +135,7 @@ class Leadership:
             return
         except Conflict:  # written by another process, or by a request of ours whose answer was lost
             found = self._api.get(LEASES, self._namespace, self._name)
-        claim = Claim.read(found)
+        claim = LeaseSpec.read(found)
         self._version = str(found["metadata"]["resourceVersion"])
         self._sighting.see(claim, time.monotonic())
         ours = claim.holder == self._identity
@@ -144,7 +144,7 @@ class Leadership:
         elif ours or self._sighting.free(time.monotonic()):
             self._take(claim, ours=ours)
 
-    def _take(self, claim: Claim, *, ours: bool) -> None:
+    def _take(self, claim: LeaseSpec, *, ours: bool) -> None:
         change: dict[str, Any] = {}
         if not ours:
             change = {"acquireTime": _now(), "leaseTransitions": claim.transitions + 1}

@@ -17,7 +17,7 @@ from palaestra.cluster.api import Api, Page
 from palaestra.cluster.errors import ApiError, Gone
 from palaestra.cluster.resources import Resource
 from palaestra.cluster.store import Store, key_of
-from palaestra.cluster.watching import Watch
+from palaestra.cluster.watch import Watch
 from palaestra.objects import Key, Object
 
 log = structlog.get_logger("palaestra.cluster")

@@ -8,7 +8,7 @@ from palaestra.cluster.errors import Unreachable
 FRESH_S = 60.0  # a kubelet replaces a token minutes before it expires
 
 
-class Token:
+class FileToken:
     """The token in a file, read again every minute."""
 
     def __init__(self, file: Path, clock: Callable[[], float]) -> None:

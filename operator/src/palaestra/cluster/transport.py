@@ -16,10 +16,10 @@ from urllib.parse import urlencode
 from urllib3 import BaseHTTPResponse, HTTPHeaderDict, Timeout
 from urllib3.exceptions import HTTPError, ProtocolError
 
-from palaestra.cluster.access import Access, Headers
-from palaestra.cluster.dialing import dialed
+from palaestra.cluster.client_config import Access, Headers
+from palaestra.cluster.connection_pool import dialed
 from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, Untrusted, from_status
-from palaestra.cluster.limits import Limits
+from palaestra.cluster.timeouts import Timeouts
 from palaestra.cluster.tls import refused_certificate
 
 OnRequest = Callable[[str, str, int, float], None]
@@ -83,7 +83,7 @@ class Transport:
         on_request: called after every request.
     """
 
-    def __init__(self, access: Access, limits: Limits) -> None:
+    def __init__(self, access: Access, limits: Timeouts) -> None:
         self.limits = limits
         self.on_request: OnRequest = nothing
         self.host = access.host
@@ -134,12 +134,12 @@ class Transport:
         Raises:
             ApiError: the API server refuses, or cannot be reached.
         """
-        from palaestra.cluster import executing  # noqa: PLC0415 - it needs a library of people's tools
+        from palaestra.cluster import pod_exec  # noqa: PLC0415 - it needs a library of people's tools
 
         started, code = time.monotonic(), 0
         try:
             headers = (("User-Agent", "palaestra"), *self._authorization(), *self._access.headers)
-            command = executing.open_socket(
+            command = pod_exec.open_socket(
                 self._dial(f"{call.method} {self.host}{call.path}"),
                 self.host + call.address,
                 headers,
@@ -151,7 +151,7 @@ class Transport:
             raise
         finally:
             self.on_request(call.verb, call.plural, code, time.monotonic() - started)
-        return executing.output(command, deadline)
+        return pod_exec.output(command, deadline)
 
     def close(self) -> None:
         """Close all idle connections."""

@@ -16,22 +16,21 @@ Objects are created only after the status that accepts the job was written. It h
 that an upgraded operator makes the same plan. Terminal replicas are never planned again.
 """
 
-from palaestra.decide.accepting import Refused, accept, managed_here, reject
-from palaestra.decide.deciding import decide
+from palaestra.decide.clocks import ReconcileRecord, Times
 from palaestra.decide.decision import (
     Action,
     Create,
     Decision,
     Delete,
     Discard,
-    Happening,
-    HappeningType,
+    EmittedEvent,
+    EventType,
     Replace,
     SetSuspend,
     Stop,
 )
-from palaestra.decide.fitting import fitted
-from palaestra.decide.preparing import (
+from palaestra.decide.job_decision import decide
+from palaestra.decide.preconditions import (
     Prepared,
     complete,
     lacking_claims,
@@ -40,8 +39,9 @@ from palaestra.decide.preparing import (
     wants_whole,
     worlds_to_check,
 )
-from palaestra.decide.times import Record, Times
-from palaestra.decide.writing import as_data, write_in_s
+from palaestra.decide.status_patch import as_data, write_in_s
+from palaestra.decide.status_size import fitted
+from palaestra.decide.validation import JobRefused, accept, managed_here, reject
 
 __all__ = [
     "Action",
@@ -49,11 +49,11 @@ __all__ = [
     "Decision",
     "Delete",
     "Discard",
-    "Happening",
-    "HappeningType",
+    "EmittedEvent",
+    "EventType",
+    "JobRefused",
     "Prepared",
-    "Record",
-    "Refused",
+    "ReconcileRecord",
     "Replace",
     "SetSuspend",
     "Stop",

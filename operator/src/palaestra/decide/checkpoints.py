@@ -1,12 +1,12 @@
 """What the next pod of a replica begins with, in words."""
 
-from palaestra.decide.situation import Situation
+from palaestra.decide.replica_context import ReplicaContext
 
 RESUMES = "the next pod resumes from the last checkpoint"
 BEGINS = "the next pod starts the run again, because no checkpoint was reported"
 
 
-def next_pod(situation: Situation) -> str:
+def next_pod(situation: ReplicaContext) -> str:
     """Return the beginning of a replica's next pod; a run without a reported checkpoint does not resume.
 
     A program of the job's own need not report its checkpoints; a reported step is all that is known then.
@@ -14,7 +14,7 @@ def next_pod(situation: Situation) -> str:
     return RESUMES if has_checkpoint(situation) else BEGINS
 
 
-def has_checkpoint(situation: Situation) -> bool:
+def has_checkpoint(situation: ReplicaContext) -> bool:
     """Return whether an attempt of the replica has reported a checkpoint."""
     seen = situation.seen
     polled = seen.polled.status.last_checkpoint if seen.polled is not None else None

@@ -7,9 +7,9 @@ from typing import Any
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Status
-from palaestra.decide.times import Record
+from palaestra.decide.clocks import ReconcileRecord
 from palaestra.observe.jobs import REPLACED, STOPPED, SUSPENDED
-from palaestra.observe.views import Suspended
+from palaestra.observe.models import Suspended
 from palaestra.plan.job import suspend_set
 
 
@@ -138,7 +138,7 @@ Change = Stop | Replace | SetSuspend | Discard  # of a Job
 Action = Create | Change | Delete
 
 
-class HappeningType(StrEnum):
+class EventType(StrEnum):
     """The type of an event."""
 
     NORMAL = "Normal"
@@ -146,13 +146,13 @@ class HappeningType(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Happening:
+class EmittedEvent:
     """An event about the TrainingJob, to be written after the status.
 
     With `once` it describes a state: each reconcile yields it, and only the first one is written.
     """
 
-    type: HappeningType
+    type: EventType
     reason: Reason
     message: str
     replica: int | None = None
@@ -173,6 +173,6 @@ class Decision:
 
     status: Status | None
     actions: tuple[Action, ...] = ()
-    events: tuple[Happening, ...] = ()
+    events: tuple[EmittedEvent, ...] = ()
     wake_after_s: float | None = None
-    record: Record = field(default_factory=Record)
+    record: ReconcileRecord = field(default_factory=ReconcileRecord)

@@ -6,8 +6,7 @@ If the trainer no longer reports a value, the last one stays: unknown is neither
 from datetime import datetime
 
 from palaestra.api import Role
-from palaestra.api.history import Faults, Goodput
-from palaestra.api.lines import one_line
+from palaestra.api.attempt_status import Faults, Goodput
 from palaestra.api.status import (
     TERMINAL,
     LastCheckpoint,
@@ -15,10 +14,11 @@ from palaestra.api.status import (
     SimulatorStatus,
     SuccessInterval,
 )
-from palaestra.decide.counting import of_this_run
-from palaestra.decide.situation import Situation
-from palaestra.decide.times import Wait, after
-from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra.api.text import one_line
+from palaestra.decide.clocks import Wait, after
+from palaestra.decide.replica_context import ReplicaContext
+from palaestra.decide.restart_counts import of_this_run
+from palaestra.observe.json_access import MOST_COUNT, as_time
 from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
 from palaestra_protocol.pod.status import Cause, CheckpointStatus, Termination, TrainerStatus
@@ -28,7 +28,7 @@ LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
 LONGEST_FAULT = 200
 
 
-def progress(situation: Situation, phase: Phase) -> dict[str, object]:
+def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
     """Return the fields of a replica's status that its trainer has reported.
 
     A trainer that has not read its run directory yet reports step 0, whatever was learned before.
@@ -57,7 +57,7 @@ def progress(situation: Situation, phase: Phase) -> dict[str, object]:
     return fields
 
 
-def last_progress(situation: Situation) -> datetime | None:
+def last_progress(situation: ReplicaContext) -> datetime | None:
     """Return when the step count of the current attempt last moved, or an evaluation did.
 
     None if it is not known to have begun to train. A step of an environment alone is no progress, because the
@@ -76,7 +76,7 @@ def last_progress(situation: Situation) -> datetime | None:
     return after(situation.now, -int(situation.waited_s(wait)))
 
 
-def standstill(situation: Situation) -> Wait | None:
+def standstill(situation: ReplicaContext) -> Wait | None:
     """Return the wait for the next step, of learning or of an evaluation; None if it does not train.
 
     If the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
@@ -97,7 +97,7 @@ def _step(report: TrainerStatus | Termination) -> int | None:
     return None if report.attempt is None and report.step == 0 else min(report.step, MOST_COUNT)
 
 
-def _spent(situation: Situation, polled: TrainerStatus) -> dict[str, object]:
+def _spent(situation: ReplicaContext, polled: TrainerStatus) -> dict[str, object]:
     """Return what the run has spent so far; {} if the trainer's release does not report it."""
     if not polled.goodput:
         return {}

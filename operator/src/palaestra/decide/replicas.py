@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, field
 
-from palaestra.api.lines import one_line
 from palaestra.api.status import TERMINAL, ReplicaStatus
-from palaestra.decide.judging import Course, judge
-from palaestra.decide.memory import memory_kills
+from palaestra.api.text import one_line
+from palaestra.decide.last_attempt import last_attempt
+from palaestra.decide.oom_kills import memory_kills
 from palaestra.decide.progress import progress
-from palaestra.decide.remembering import last_attempt
-from palaestra.decide.situation import Situation, Verdict
+from palaestra.decide.replica_context import ReplicaContext, ReplicaVerdict
+from palaestra.decide.replica_policy import ReplicaActions, judge
 
 LONGEST_NODE = 253  # characters of a node's name, as the API server bounds it
 
@@ -18,16 +18,16 @@ class Decided:
     """The status of a replica, and what follows for it."""
 
     status: ReplicaStatus
-    course: Course = field(default_factory=Course)
+    course: ReplicaActions = field(default_factory=ReplicaActions)
 
 
-def decided(situation: Situation) -> Decided:
+def decided(situation: ReplicaContext) -> Decided:
     """Return what follows for a replica that had not ended."""
     verdict, course = judge(situation)
     return Decided(status=_status(situation, verdict), course=course)
 
 
-def _status(situation: Situation, verdict: Verdict) -> ReplicaStatus:
+def _status(situation: ReplicaContext, verdict: ReplicaVerdict) -> ReplicaStatus:
     old, reason = situation.old, verdict.explanation.reason.value
     changed = (old.phase, old.reason) != (verdict.phase, reason) or old.since is None
     counts = situation.counted
@@ -51,7 +51,7 @@ def _status(situation: Situation, verdict: Verdict) -> ReplicaStatus:
     )
 
 
-def _node(situation: Situation) -> str | None:
+def _node(situation: ReplicaContext) -> str | None:
     """Return the node of the newest pod; after the pod is gone, the one that it had."""
     pod = situation.seen.pod
     return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None

@@ -9,7 +9,7 @@
 No check changes anything; a check that must create an object does a dry run.
 """
 
-from palaestra.doctor.examining import CHECKS, examine
-from palaestra.doctor.finding import Finding, Site, Verdict
+from palaestra.doctor.check_result import CheckResult, CheckStatus, Site
+from palaestra.doctor.run import CHECKS, examine
 
-__all__ = ["CHECKS", "Finding", "Site", "Verdict", "examine"]
+__all__ = ["CHECKS", "CheckResult", "CheckStatus", "Site", "examine"]

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from importlib.metadata import version
 
 from palaestra.client.errors import TookTooLong
-from palaestra.client.following import changes
+from palaestra.client.watch import changes
 from palaestra.cluster import ApiError, Forbidden, NotFound
 from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS, WORKLOADS
-from palaestra.doctor.finding import Finding, Site, right, unknown, warning, wrong
-from palaestra.doctor.rights import OPERATOR, OPERATOR_WITH_KUEUE, Account, missing
+from palaestra.doctor.check_result import CheckResult, Site, right, unknown, warning, wrong
+from palaestra.doctor.rbac import OPERATOR, OPERATOR_WITH_KUEUE, Account, missing
 from palaestra.objects import Object
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
@@ -26,7 +26,7 @@ PORT_NAME = "metrics"
 RENEWED_WITHIN_S = 20.0  # a Lease is valid for 15 s
 
 
-def runs(site: Site) -> Iterator[Finding]:
+def runs(site: Site) -> Iterator[CheckResult]:
     """Check whether the operator is installed and ready."""
     deployment = _deployment(site)
     remedy = _remedy(site, deployment)
@@ -43,14 +43,14 @@ def runs(site: Site) -> Iterator[Finding]:
     yield right("operator", fact) if ready else wrong("operator", fact, remedy)
 
 
-def images(site: Site) -> Iterator[Finding]:
+def images(site: Site) -> Iterator[CheckResult]:
     """Check whether the operator's image and the default images of jobs are pinned by digest."""
     deployment = _deployment(site)
     if deployment is not None:  # `runs` reports a missing Deployment
         yield judged_images(_container(deployment))
 
 
-def judged_images(container: Object) -> Finding:
+def judged_images(container: Object) -> CheckResult:
     """Return the finding for the images in the operator's container: a warning if one has no digest."""
     release = Images.of_release(version("palaestra"))
     named = (
@@ -69,7 +69,7 @@ def judged_images(container: Object) -> Finding:
     )
 
 
-def leads(site: Site) -> Iterator[Finding]:
+def leads(site: Site) -> Iterator[CheckResult]:
     """Check whether an operator leads: wait for a renewal of its Lease, without comparing two clocks."""
     deployment = _deployment(site)
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
@@ -94,7 +94,7 @@ def leads(site: Site) -> Iterator[Finding]:
     yield wrong("leader", f"there is no Lease {NAME} in {site.operator_namespace}", remedy)
 
 
-def operator_rights(site: Site) -> Iterator[Finding]:
+def operator_rights(site: Site) -> Iterator[CheckResult]:
     """Report the rights that the operator's account lacks in the namespace of the jobs.
 
     The rights for Kueue are checked if the cluster serves Kueue's Workloads.
@@ -117,7 +117,7 @@ def operator_rights(site: Site) -> Iterator[Finding]:
         yield right(what, f"suffice in {site.namespace}")
 
 
-def metrics(site: Site) -> Iterator[Finding]:
+def metrics(site: Site) -> Iterator[CheckResult]:
     """Check whether an operator serves its metrics; the request goes through the API server."""
     pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
     running = [pod for pod in pods if pod["status"].get("phase") == "Running"]

@@ -10,7 +10,7 @@ from palaestra.api.job import API_VERSION
 from palaestra.client.errors import INSTALL
 from palaestra.cluster import Forbidden, Invalid, NotFound
 from palaestra.cluster.resources import DEFINITIONS, NAMESPACES, NODES, PODS, STORAGE_CLASSES
-from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
+from palaestra.doctor.check_result import CheckResult, Site, right, unknown, wrong
 from palaestra.doctor.installation import trainer_image
 from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
@@ -27,12 +27,12 @@ DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
 OVER_QUOTA = "exceeded quota"
 
 
-def answers(site: Site) -> Iterator[Finding]:
+def answers(site: Site) -> Iterator[CheckResult]:
     """Check whether the API server responds and supports sidecar containers."""
     yield judged_version("API server", site.api.version())
 
 
-def nodes(site: Site) -> Iterator[Finding]:
+def nodes(site: Site) -> Iterator[CheckResult]:
     """Check whether the oldest kubelet supports sidecar containers."""
     versions = [node["status"]["nodeInfo"]["kubeletVersion"] for node in site.api.list(NODES)]
     if not versions:
@@ -41,7 +41,7 @@ def nodes(site: Site) -> Iterator[Finding]:
     yield judged_version("nodes", min(versions, key=release))
 
 
-def judged_version(what: str, text: str) -> Finding:
+def judged_version(what: str, text: str) -> CheckResult:
     """Return whether a version such as `v1.33.2+k3s1` supports sidecar containers, as a finding."""
     if release(text) < FIRST:
         fact = f"{text} is older than 1.33, the first version with stable sidecar containers"
@@ -55,7 +55,7 @@ def release(text: str) -> tuple[int, int]:
     return (int(found[1]), int(found[2])) if found else (0, 0)
 
 
-def definition(site: Site) -> Iterator[Finding]:
+def definition(site: Site) -> Iterator[CheckResult]:
     """Check whether the cluster serves TrainingJobs, with the definition of this release."""
     what, remedy = "TrainingJobs", INSTALL
     if not site.api.serves(API_VERSION):
@@ -74,7 +74,7 @@ def definition(site: Site) -> Iterator[Finding]:
         yield right(what, f"have the definition of {version('palaestra')}")
 
 
-def namespace(site: Site) -> Iterator[Finding]:
+def namespace(site: Site) -> Iterator[CheckResult]:
     """Check whether the namespace of the jobs exists."""
     what, name = "namespace", site.namespace
     try:
@@ -97,7 +97,7 @@ def difference(ours: Any, found: Any, path: str) -> str | None:
     return next((place for name, one, other in pairs if (place := difference(one, other, name))), None)
 
 
-def sidecars(site: Site) -> Iterator[Finding]:
+def sidecars(site: Site) -> Iterator[CheckResult]:
     """Check by a dry run whether the sidecars of a pod stay unchanged when the API server admits it."""
     what = "sidecars"
     try:
@@ -119,7 +119,7 @@ def sidecars(site: Site) -> Iterator[Finding]:
         yield judged_pod(made)
 
 
-def judged_pod(made: Object) -> Finding:
+def judged_pod(made: Object) -> CheckResult:
     """Return the finding for the trial pod as the API server returned it."""
     found = {
         container["name"]: container.get("restartPolicy")
@@ -151,7 +151,7 @@ def trial_pod(namespace: str, image: str) -> Object:
     }
 
 
-def storage(site: Site) -> Iterator[Finding]:
+def storage(site: Site) -> Iterator[CheckResult]:
     """Check whether a claim that names no class gets a default storage class."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from palaestra.local import probe
 from palaestra.local.output import Log
+from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import NOT_RUNNABLE, Process, end_marked, marked
-from palaestra.local.spec import Container, Pod
 
 DRAIN_S = 0.5  # for output that is still in the pipe; another process may hold the pipe open for longer
 TERMINATED = 128 + signal.SIGTERM

@@ -21,7 +21,7 @@ class LocalError(PalaestraError):
     exit_code = 1
 
 
-class Refused(LocalError, ValueError):
+class RunRefused(LocalError, ValueError):
     """The run cannot be started as asked; nothing was started and nothing was changed."""
 
     exit_code = int(ExitCode.CONFIGURATION)

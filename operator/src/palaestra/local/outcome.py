@@ -16,7 +16,7 @@ FILE = "outcome.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class RunOutcome:
     """The result of a replica's run; a value that was not measured is None.
 
     `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted`: a person
@@ -68,7 +68,7 @@ class Outcome:
             return None
 
 
-def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
+def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
     """Return the lines to show at the end.
 
     Values that were not measured are left out: a program of the user's own may measure nothing.

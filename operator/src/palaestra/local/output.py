@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
+from palaestra.local.bounded_log import LimitedFile
 from palaestra.local.errors import StorageFailed
-from palaestra.local.limited import LimitedFile
 from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]

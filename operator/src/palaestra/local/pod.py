@@ -16,8 +16,8 @@ from typing import Any
 from palaestra.local.container import BackOff, Running
 from palaestra.local.errors import StartFailed
 from palaestra.local.output import Log, Show
-from palaestra.local.process import Watchdog
-from palaestra.local.spec import Container, Pod
+from palaestra.local.pod_spec import Container, Pod
+from palaestra.local.process import OrphanKiller
 
 LONG_S = 10.0  # for the start of a container; importing PyTorch takes several seconds
 TRIES = 3  # runs of a sidecar for which others wait, after which the pod has failed
@@ -49,7 +49,7 @@ class RunningPod:
         self._pod = pod
         self._kubelet = kubelet
         self._stop = asyncio.Event()
-        self._watchdog: Watchdog | None = None
+        self._watchdog: OrphanKiller | None = None
         self._running: list[Running] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._end_of_grace: float | None = None
@@ -72,7 +72,7 @@ class RunningPod:
         Raises:
             StartFailed: a sidecar for which others wait did not start.
         """
-        self._watchdog = Watchdog(self._pod.uid)
+        self._watchdog = OrphanKiller(self._pod.uid)
         try:
             for spec in self._pod.init:
                 running = self._add(spec)

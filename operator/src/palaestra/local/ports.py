@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
-from palaestra.local.errors import Refused
+from palaestra.local.errors import RunRefused
 
 LOOPBACK = "127.0.0.1"
 
@@ -34,7 +34,7 @@ class HeldPorts:
         try:
             return self._bind(port)
         except OSError as error:
-            raise Refused(
+            raise RunRefused(
                 f"port {port}: {error.strerror or error}; "
                 "choose another with --ros-port, or leave it out for a free one"
             ) from error

@@ -11,14 +11,14 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
-from palaestra.local.errors import Refused
+from palaestra.local.errors import RunRefused
 from palaestra.local.files import without_locks
-from palaestra.local.rundir import job_directory
+from palaestra.local.run_directory import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import RootError, WorldError
-from palaestra_sim.world.bounded import read_bounded
+from palaestra_sim.world.bounded_read import read_bounded
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
 PYTHON_PATH = "PYTHONPATH"
@@ -27,28 +27,28 @@ INSTALLATION = "this installation"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class PreflightRequest:
     """The job to run, and the folder of its runs."""
 
     job: TrainingJob
     runs: Path
 
 
-Check = Callable[[Request], Iterator[str]]
+Check = Callable[[PreflightRequest], Iterator[str]]
 ENVIRONMENT = Path("/proc/self/environ")
 
 
-def check(request: Request) -> None:
+def check(request: PreflightRequest) -> None:
     """Run every check.
 
     Raises:
         Refused: a check failed; the message has one line for each problem.
     """
     if problems := [problem for check in CHECKS for problem in check(request)]:
-        raise Refused("\n".join(problems))
+        raise RunRefused("\n".join(problems))
 
 
-def processes_can_be_found(request: Request) -> Iterator[str]:
+def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
     """The system has Linux' /proc, by which the runner finds the processes that a container leaves behind."""
     del request
     try:
@@ -57,20 +57,20 @@ def processes_can_be_found(request: Request) -> Iterator[str]:
         yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc, as in a container or WSL 2"
 
 
-def no_module_is_shadowed(request: Request) -> Iterator[str]:
+def no_module_is_shadowed(request: PreflightRequest) -> Iterator[str]:
     """No module on PYTHONPATH has the name of one that the ROS master or the trainer needs."""
     own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
     for python_path in {os.environ.get(PYTHON_PATH, ""), *own}:
         yield from shadows(python_path or "")
 
 
-def nothing_is_put_off(request: Request) -> Iterator[str]:
+def nothing_is_put_off(request: PreflightRequest) -> Iterator[str]:
     """The job is not suspended, because no operator is here to resume it."""
     if request.job.spec.suspend:
         yield "spec.suspend: is true, which puts the training off; set it to false to train now"
 
 
-def programs_exist(request: Request) -> Iterator[str]:
+def programs_exist(request: PreflightRequest) -> Iterator[str]:
     """The program of every container exists, with the library that it needs."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
@@ -83,7 +83,7 @@ def programs_exist(request: Request) -> Iterator[str]:
             yield f"{field}: {problem}"
 
 
-def worlds_are_right(request: Request) -> Iterator[str]:
+def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
     """Each world in a file is correct; it is read here too, although the sidecar generates it."""
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
@@ -92,7 +92,7 @@ def worlds_are_right(request: Request) -> Iterator[str]:
             yield from (f"{field}.{problem}" for problem in _problems(Path(group.world.file), root))
 
 
-def initial_policy_is_there(request: Request) -> Iterator[str]:
+def initial_policy_is_there(request: PreflightRequest) -> Iterator[str]:
     """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes.
 
     It may be gone once every replica has a checkpoint, because they resume from that.
@@ -113,7 +113,7 @@ def initial_policy_is_there(request: Request) -> Iterator[str]:
         )
 
 
-def space_is_left(request: Request) -> Iterator[str]:
+def space_is_left(request: PreflightRequest) -> Iterator[str]:
     """The disk has space for the run."""
     folder = _existing(request.runs)
     if not os.access(folder, os.W_OK):
@@ -125,7 +125,7 @@ def space_is_left(request: Request) -> Iterator[str]:
         )
 
 
-def locks_work(request: Request) -> Iterator[str]:
+def locks_work(request: PreflightRequest) -> Iterator[str]:
     """The file system of the runs has locks; a file without a name is locked, so nothing is left behind."""
     folder = _existing(request.runs)
     with suppress(OSError), TemporaryFile(dir=folder) as file:  # not writable: `space_is_left` reports it
@@ -152,7 +152,7 @@ def _existing(path: Path) -> Path:
     return next(parent for parent in (path, *path.parents) if parent.exists())
 
 
-def _all_have_learned(request: Request) -> bool:
+def _all_have_learned(request: PreflightRequest) -> bool:
     directory = job_directory(request.runs, request.job.metadata.name)
     runs = (directory / str(replica) for replica in range(request.job.spec.replicas))
     return all(any((run / "checkpoints").glob("[0-9]*")) for run in runs)

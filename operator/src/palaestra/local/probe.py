@@ -7,8 +7,8 @@ import urllib.request
 from collections.abc import Mapping
 from http import HTTPStatus
 
+from palaestra.local.pod_spec import Probe
 from palaestra.local.process import Process
-from palaestra.local.spec import Probe
 
 DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy: the address is on loopback
 

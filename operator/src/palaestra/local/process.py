@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Self
 
-from palaestra.local import watchdog
-from palaestra.local.ending import when_ended
+from palaestra.local import orphan_killer
+from palaestra.local.child_end import when_ended
 
 NOT_RUNNABLE = 127  # a shell's exit code for a program that it cannot find
 
@@ -76,14 +76,14 @@ class Process:
             self._ended.set_result(code if code >= 0 else 128 - code)
 
 
-class Watchdog:
+class OrphanKiller:
     """Ends all processes of a pod when it is closed, or when this process ends."""
 
     def __init__(self, pod_uid: str) -> None:
         reader, self._writer = os.pipe()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-S", str(Path(watchdog.__file__)), f"{pod_uid}/"],
+                [sys.executable, "-I", "-S", str(Path(orphan_killer.__file__)), f"{pod_uid}/"],
                 stdin=reader,
                 env={},
                 start_new_session=True,
@@ -109,7 +109,7 @@ def marked(env: Mapping[str, str], pod_uid: str, container: str) -> dict[str, st
     The programs of this installation come first on the PATH, as in an image.
     """
     machine = {**os.environ, "PATH": program_path()}
-    return {**machine, **env, watchdog.MARKER: f"{pod_uid}/{container}/"}
+    return {**machine, **env, orphan_killer.MARKER: f"{pod_uid}/{container}/"}
 
 
 def program_path() -> str:
@@ -119,4 +119,4 @@ def program_path() -> str:
 
 async def end_marked(pod_uid: str, container: str) -> None:
     """Kill the remaining processes of a container, because it ends with its first process."""
-    await asyncio.to_thread(watchdog.sweep, f"{pod_uid}/{container}/")
+    await asyncio.to_thread(orphan_killer.sweep, f"{pod_uid}/{container}/")

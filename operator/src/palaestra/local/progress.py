@@ -8,14 +8,14 @@ import yaml
 
 from palaestra.local.probe import DIRECT
 from palaestra_protocol.fields import MOST_BYTES, decoded
+from palaestra_protocol.pod.enums import FaultKind
 from palaestra_protocol.pod.status import TrainerStatus
-from palaestra_protocol.pod.terms import FaultKind
 
 ANSWER_S = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
+class RunProgress:
     """The newest figures of a run; a value that is not known is None.
 
     Attributes:
@@ -37,19 +37,19 @@ class Progress:
     faults: int = 0
 
 
-class Watch:
+class ProgressReader:
     """Reads the progress of one run, from its start on."""
 
     def __init__(self, directory: Path) -> None:
         """Remember what an earlier run left in the directory; its address may be another program's by now."""
         self._file = directory / "training.yaml"
         self._stale = self._written()
-        self._last = Progress()
+        self._last = RunProgress()
 
-    def progress(self) -> Progress:
+    def progress(self) -> RunProgress:
         """Return the newest figures; the last ones while the trainer does not answer."""
         if (status := self._status()) is not None:
-            self._last = Progress(
+            self._last = RunProgress(
                 phase=status.phase,
                 step=status.step,
                 target=status.target,

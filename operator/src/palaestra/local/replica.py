@@ -12,16 +12,16 @@ from typing import Any
 from palaestra.local.container import BackOff
 from palaestra.local.errors import KILLED
 from palaestra.local.interrupt import Interrupt
-from palaestra.local.jobs import Tries, verdict
-from palaestra.local.outcome import Outcome
+from palaestra.local.outcome import RunOutcome
 from palaestra.local.output import Log, Show, say
 from palaestra.local.pod import Kubelet, RunningPod
-from palaestra.local.spec import Pod, read_pod
+from palaestra.local.pod_spec import Pod, read_pod
+from palaestra.local.retry_policy import Tries, verdict
 from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
 from palaestra.plan.containers import BUILT_IN
+from palaestra_protocol.pod.enums import SILENT
 from palaestra_protocol.pod.status import ExitCode
-from palaestra_protocol.pod.terms import SILENT
 
 FAILED = 1
 DEADLINE_EXCEEDED = "DeadlineExceeded"
@@ -44,7 +44,7 @@ class Setting:
     deadline_s: float | None = None
 
 
-async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
+async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
     """Run pods until the Job is complete, failed, interrupted or too late; return the outcome.
 
     Raises:
@@ -106,7 +106,7 @@ def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str,
     return logs
 
 
-def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
+def _ended_early(outcome: RunOutcome, interrupt: Interrupt) -> RunOutcome:
     """Return the outcome of a run that was ended early; a run that is complete anyway stays complete.
 
     A trainer that was asked to end exits with 75 after it has saved. No other exit code becomes 75.
@@ -121,7 +121,7 @@ def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
     return outcome
 
 
-def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int) -> Outcome:
+def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int) -> RunOutcome:
     """Return the outcome from the trainer's report, in summary.json or in its termination message.
 
     An exit code 0 of the built-in loop without a report is not its own: a library has ended the process.
@@ -132,7 +132,7 @@ def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int)
     if code == ExitCode.DONE and not said and _trains_by_itself(planned):
         code, said["reason"] = FAILED, ENDED_BY_OTHERS
     checkpoint = word.get("last_checkpoint")
-    return Outcome(
+    return RunOutcome(
         exit_code=code,
         reason=str(said.get("reason", "")),
         steps=said.get("step", said.get("steps")),

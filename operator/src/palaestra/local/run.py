@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palaestra.api import TrainingJob
-from palaestra.local import preflight, rundir
-from palaestra.local.errors import KILLED, Refused
-from palaestra.local.outcome import Outcome, summary
+from palaestra.local import preflight, run_directory
+from palaestra.local.errors import KILLED, RunRefused
+from palaestra.local.outcome import RunOutcome, summary
 from palaestra.local.output import say
+from palaestra.local.pod_spec import read_pod
 from palaestra.local.ports import HeldPorts
 from palaestra.local.replica import DEADLINE_EXCEEDED, Setting, meaning, run_replica
-from palaestra.local.spec import read_pod
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode
@@ -26,7 +26,7 @@ SHOWN_LINES = 5  # of the trainer's log, if it failed without a termination mess
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
+class RunOptions:
     """The options of the command line.
 
     `lock` is the descriptor of the run directory's lock, which the process that started this one has taken
@@ -42,7 +42,7 @@ class Options:
     lock: int | None = None
 
 
-def run(job: TrainingJob, options: Options) -> int:
+def run(job: TrainingJob, options: RunOptions) -> int:
     """Run a job's replicas and return the exit code: 0, or that of the first unfinished replica.
 
     Raises:
@@ -50,8 +50,8 @@ def run(job: TrainingJob, options: Options) -> int:
         PlanError: it cannot be run on one machine.
         WorldError: one of its worlds is wrong.
     """
-    directory = rundir.job_directory(options.runs, job.metadata.name)
-    job = identified(job, rundir.uid_of(directory))
+    directory = run_directory.job_directory(options.runs, job.metadata.name)
+    job = identified(job, run_directory.uid_of(directory))
     chosen = _chosen(job, options.replica)
     check(job, directory, chosen, options)
     outcomes = []
@@ -62,21 +62,21 @@ def run(job: TrainingJob, options: Options) -> int:
     return next((outcome.exit_code for outcome in outcomes if not outcome.finished), 0)
 
 
-def check(job: TrainingJob, directory: Path, chosen: range, options: Options) -> None:
+def check(job: TrainingJob, directory: Path, chosen: range, options: RunOptions) -> None:
     """Do all checks that need no file to be written; raises the same errors as `run`."""
     planned = plan(job, layout(directory, options, Ports()), mounted=dict.fromkeys(chosen, ()))
     for replica in planned.replicas.values():
         read_pod(replica.job["spec"]["template"], uid="")
-    preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
+    preflight.check(preflight.PreflightRequest(job=job, runs=options.runs.absolute()))
 
 
-def layout(directory: Path, options: Options, ports: Ports) -> LocalLayout:
+def layout(directory: Path, options: RunOptions, ports: Ports) -> LocalLayout:
     """Return the layout of a job whose runs are in `directory`."""
     images = Images.of_release(options.version)
     return LocalLayout(images=images, job_directory=str(directory), ports=ports)
 
 
-def chosen_ports(held: HeldPorts, job: TrainingJob, options: Options) -> Ports:
+def chosen_ports(held: HeldPorts, job: TrainingJob, options: RunOptions) -> Ports:
     """Return free ports for one replica, all chosen before the first is used.
 
     Raises:
@@ -95,37 +95,37 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
     if replica is None:
         return range(job.spec.replicas)
     if not 0 <= replica < job.spec.replicas:
-        raise Refused(
+        raise RunRefused(
             f"--replica {replica}: the job has {job.spec.replicas}; "
             f"use 0 to {job.spec.replicas - 1}, or raise spec.replicas"
         )
     return range(replica, replica + 1)
 
 
-def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Outcome:
-    record = rundir.record_of(job)
-    with rundir.locked(path, options.lock), HeldPorts() as held:
+def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) -> RunOutcome:
+    record = run_directory.record_of(job)
+    with run_directory.locked(path, options.lock), HeldPorts() as held:
         ports = chosen_ports(held, job, options)
-        anew = options.fresh or rundir.is_correction(path, record)
-        if anew and (aside := rundir.set_aside(path)):
+        anew = options.fresh or run_directory.is_correction(path, record)
+        if anew and (aside := run_directory.set_aside(path)):
             say(f"{path}: the run that was there is now {aside}")
-        rundir.refuse_another_job(path, record)
-        before = Outcome.of(path)
-        if before is not None and before.finished and not rundir.is_prolonged(path, record):
+        run_directory.refuse_another_job(path, record)
+        before = RunOutcome.of(path)
+        if before is not None and before.finished and not run_directory.is_prolonged(path, record):
             say(
                 f"{job.metadata.name}-{replica}: finished already; "
                 "more spec.trainer.steps prolong it, --fresh begins anew"
             )
             _tell(before, path)
             return before
-        rundir.prepare(path, record)
+        run_directory.prepare(path, record)
         planned = plan(job, layout(path.parent, options, ports), mounted={replica: ()}).replicas[replica]
         say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
         say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
         return _trained(planned, path, options, job.spec.active_deadline_seconds)
 
 
-def _trained(planned: ReplicaPlan, path: Path, options: Options, deadline_s: float | None) -> Outcome:
+def _trained(planned: ReplicaPlan, path: Path, options: RunOptions, deadline_s: float | None) -> RunOutcome:
     on_terminal = sys.stdout.isatty() and not options.verbose
     setting = Setting(
         directory=path,
@@ -140,7 +140,7 @@ def _trained(planned: ReplicaPlan, path: Path, options: Options, deadline_s: flo
     return outcome
 
 
-def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tuple[str, ...]:
+def _shown(planned: ReplicaPlan, options: RunOptions, *, on_terminal: bool) -> tuple[str, ...]:
     """Return the containers whose lines are shown: all, or the trainer if it cannot draw."""
     if options.verbose:
         pod = planned.job["spec"]["template"]["spec"]
@@ -148,7 +148,7 @@ def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tupl
     return () if on_terminal else (TRAINER,)
 
 
-def _tell(outcome: Outcome, path: Path) -> None:
+def _tell(outcome: RunOutcome, path: Path) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
         place = "before it trained" if outcome.steps is None else f"at step {outcome.steps}"
         after = "there" if outcome.saved in {None, outcome.steps} else f"step {outcome.saved}"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from palaestra.local.files import make_folder, storage, write
-from palaestra.local.spec import Pod
+from palaestra.local.pod_spec import Pod
 
 
 def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:

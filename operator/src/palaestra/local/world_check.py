@@ -24,7 +24,7 @@ _TIMED_OUT: Final = 124
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class WorldCheckResult:
     """The answer of one simulator.
 
     Attributes:
@@ -38,7 +38,7 @@ class Answer:
     text: str
 
 
-def check_world(world: Path, options: Sequence[str] = ()) -> tuple[Answer, ...]:
+def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
     """Return the answer of each simulator that can check a world; without an answer it cannot start it.
 
     The stub is always asked, others if they are installed; each gets the options of its start.
@@ -47,7 +47,7 @@ def check_world(world: Path, options: Sequence[str] = ()) -> tuple[Answer, ...]:
     return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)
 
 
-async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> Answer:
+async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> WorldCheckResult:
     program = PROGRAMS[driver]
     with tempfile.TemporaryFile() as output:
         code = await _run([program, "--check", *options, str(world)], output.fileno())
@@ -57,7 +57,7 @@ async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> Answer:
         text = f"{program} is not installed on this machine"
     elif code == _TIMED_OUT:
         text = f"{program} did not answer within {_DEADLINE_S:.0f} s"
-    return Answer(driver=driver.value, starts=code == 0, text=text)
+    return WorldCheckResult(driver=driver.value, starts=code == 0, text=text)
 
 
 async def _run(command: list[str], output: int) -> int:

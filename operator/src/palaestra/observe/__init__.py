@@ -8,50 +8,50 @@ that cannot be read counts as absent.
         observed = replace(observed, sources={each: lookup(each) for each in references(job)}, kueue=...)
 """
 
-from palaestra.observe.observing import last_hindrance, observe
-from palaestra.observe.pods import was_signalled
-from palaestra.observe.shortening import Lacking, lacking
-from palaestra.observe.sources import references
-from palaestra.observe.trim import trimmed, whole
-from palaestra.observe.views import (
+from palaestra.observe.cache_trim import trimmed, whole
+from palaestra.observe.cached_job import Lacking, lacking
+from palaestra.observe.kueue import why_not_admitted
+from palaestra.observe.models import (
+    ContainerExit,
     ContainerKind,
     ContainerView,
     CreateFailure,
-    Exit,
+    ForeignJob,
     JobEnd,
     JobView,
     Objects,
     Observed,
-    Obstacle,
     PodView,
     Polled,
     Raw,
+    ReferencedObject,
+    ReferenceKind,
     Replaced,
     ReplicaObserved,
-    Source,
-    SourceKind,
     Suspended,
 )
-from palaestra.observe.workloads import why_not_admitted
+from palaestra.observe.observe import last_hindrance, observe
+from palaestra.observe.pods import was_signalled
+from palaestra.observe.references import references
 
 __all__ = [
+    "ContainerExit",
     "ContainerKind",
     "ContainerView",
     "CreateFailure",
-    "Exit",
+    "ForeignJob",
     "JobEnd",
     "JobView",
     "Lacking",
     "Objects",
     "Observed",
-    "Obstacle",
     "PodView",
     "Polled",
     "Raw",
+    "ReferenceKind",
+    "ReferencedObject",
     "Replaced",
     "ReplicaObserved",
-    "Source",
-    "SourceKind",
     "Suspended",
     "lacking",
     "last_hindrance",

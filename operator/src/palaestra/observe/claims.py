@@ -1,7 +1,7 @@
 """Claims that were never bound to a volume, so that nothing is lost with them."""
 
-from palaestra.observe.reading import part, text
-from palaestra.observe.views import Raw
+from palaestra.observe.json_access import part, text
+from palaestra.observe.models import Raw
 
 MANAGED = "app.kubernetes.io/managed-by"
 FIELDS = ("volumeName", "dataSource", "dataSourceRef")  # of a claim's spec, which are read here

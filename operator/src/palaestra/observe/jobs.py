@@ -2,8 +2,8 @@
 
 import re
 
-from palaestra.observe.reading import condition, count, holds, part, parts, text, time
-from palaestra.observe.views import JobEnd, JobView, Raw, Replaced, Suspended
+from palaestra.observe.json_access import condition, count, holds, part, parts, text, time
+from palaestra.observe.models import JobEnd, JobView, Raw, Replaced, Suspended
 from palaestra.plan.job import QUEUE_LABEL, SUSPEND_SET
 
 # The fields of a Job's spec, besides `suspend`, that other clients can change.

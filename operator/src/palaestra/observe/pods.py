@@ -3,8 +3,8 @@
 from datetime import UTC, datetime
 from typing import Any
 
-from palaestra.observe.reading import condition, count, holds, part, parts, text, time
-from palaestra.observe.views import ContainerKind, ContainerView, Exit, PodView, Raw
+from palaestra.observe.json_access import condition, count, holds, part, parts, text, time
+from palaestra.observe.models import ContainerExit, ContainerKind, ContainerView, PodView, Raw
 from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import ExitCode
 
@@ -114,9 +114,9 @@ def _container(planned: dict[str, Any], kind: ContainerKind, states: dict[Any, A
     )
 
 
-def _exit(ended: dict[str, Any]) -> Exit:
+def _exit(ended: dict[str, Any]) -> ContainerExit:
     message = ended.get("message")
-    return Exit(
+    return ContainerExit(
         code=count(ended, "exitCode"),
         reason=text(ended, "reason", 60),
         message=message[:MOST_MESSAGE] if isinstance(message, str) else "",

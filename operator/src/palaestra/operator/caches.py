@@ -20,10 +20,10 @@ from palaestra.cluster.resources import (
 )
 from palaestra.objects import Key, Object
 from palaestra.observe import trimmed
-from palaestra.operator.following import Followed
-from palaestra.operator.schedule import Target
-from palaestra.operator.trainers import Trainers
-from palaestra.operator.waiting import waits
+from palaestra.operator.informer import Informer
+from palaestra.operator.poll_schedule import PollTarget
+from palaestra.operator.poll_targets import PollTargets
+from palaestra.operator.waiting_metric import waits
 from palaestra.plan.replica import JOB_LABEL
 
 Changed = Callable[[Key], None]
@@ -44,12 +44,12 @@ class Caches:
         self._changed = changed
         self._phases: dict[Key, str] = {}
         self._waits: dict[Key, tuple[str, ...]] = {}
-        self._trainers = Trainers()
-        self._jobs = Followed(
+        self._trainers = PollTargets()
+        self._jobs = Informer(
             api, TRAINING_JOBS, namespaces=namespaces, keep=trimmed, changed=self._job_changed
         )
         self._children = {
-            resource.plural: Followed(
+            resource.plural: Informer(
                 api,
                 resource,
                 namespaces=namespaces,
@@ -103,11 +103,11 @@ class Caches:
         waiting = tuple(self._waits.items())
         return tuple((namespace, reason) for (namespace, _), reasons in waiting for reason in reasons)
 
-    def trainers(self) -> Collection[Target]:
+    def trainers(self) -> Collection[PollTarget]:
         """Return the trainers that run now."""
         return self._trainers.targets()
 
-    def _all(self) -> tuple[Followed, ...]:
+    def _all(self) -> tuple[Informer, ...]:
         return (self._jobs, *self._children.values())
 
     def _job_changed(self, obj: Object) -> None:

@@ -16,9 +16,9 @@ from palaestra.api import TrainingJob
 from palaestra.cluster import NamespaceTerminating
 from palaestra.decide import (
     Decision,
+    JobRefused,
     Prepared,
-    Record,
-    Refused,
+    ReconcileRecord,
     Times,
     accept,
     decide,
@@ -30,18 +30,18 @@ from palaestra.decide import (
 )
 from palaestra.objects import Key, Object
 from palaestra.observe import lacking, trimmed
-from palaestra.observe.reading import part
-from palaestra.operator.acting import Acting
+from palaestra.observe.json_access import part
 from palaestra.operator.caches import Caches
-from palaestra.operator.looking import Looking, Seen, earliest
-from palaestra.operator.records import Records
-from palaestra.operator.reporting import Reporting, StatusWrite
+from palaestra.operator.executor import Executor
+from palaestra.operator.observer import JobObserver, Seen, earliest
+from palaestra.operator.reconcile_state import ReconcileRecords
+from palaestra.operator.status_writer import StatusWrite, StatusWriter
 from palaestra.plan import ClusterLayout
 
 log = structlog.get_logger(__name__)
 
 
-def now(record: Record) -> Times:
+def now(record: ReconcileRecord) -> Times:
     """Return the current time by both clocks; `record` is that of the last reconcile."""
     return Times(now=datetime.now(UTC), clock_s=time.monotonic(), record=record)
 
@@ -61,11 +61,11 @@ class Controller:
     def __init__(
         self,
         caches: Caches,
-        looking: Looking,
-        acting: Acting,
-        reporting: Reporting,
+        looking: JobObserver,
+        acting: Executor,
+        reporting: StatusWriter,
         layout: ClusterLayout,
-        times: Callable[[Record], Times] = now,
+        times: Callable[[ReconcileRecord], Times] = now,
     ) -> None:
         self._caches = caches
         self._looking = looking
@@ -73,7 +73,7 @@ class Controller:
         self._reporting = reporting
         self._layout = layout
         self._times = times
-        self._records = Records()
+        self._records = ReconcileRecords()
         self._terminating: set[Key] = set()  # jobs for which this was logged
 
     def begin_anew(self) -> None:
@@ -118,7 +118,7 @@ class Controller:
         """Return the observation of a job, and the decision on it."""
         try:
             job, seen = self._observe(raw)
-        except Refused as refused:
+        except JobRefused as refused:
             return _Look(decision=reject(raw, refused, times.now))
         seen = self._looking.with_verdicts(job, seen, worlds_to_check(job, seen.observed, self._layout))
         prepared = prepare(job, seen.observed, self._layout)

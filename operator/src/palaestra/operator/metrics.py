@@ -1,4 +1,4 @@
-"""The operator's metrics about itself and its jobs; the names are in `palaestra.operator.families`."""
+"""The operator's metrics about itself and its jobs, with the names of `metric_definitions`."""
 
 from collections import Counter as Count
 from collections.abc import Callable, Iterable, Iterator
@@ -20,7 +20,7 @@ from prometheus_client.registry import Collector
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, ConditionType, Phase
 from palaestra.objects import Object
-from palaestra.operator import families
+from palaestra.operator import metric_definitions
 from palaestra_protocol.metrics import Family, Values
 
 Counted = TypeVar("Counted", Counter, Histogram)
@@ -34,13 +34,13 @@ class Metrics:
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
-        self.reconciled = self._histogram(families.RECONCILED)
-        self._requests = self._counter(families.REQUESTS)
-        self._request_seconds = self._histogram(families.REQUEST_DURATION)
-        self._queued = self._histogram(families.QUEUE_WAIT)
-        self._time_to_running = self._histogram(families.TIME_TO_RUNNING)
-        self._restarts = self._counter(families.RESTARTS)
-        self._ends = self._counter(families.REPLICA_ENDS)
+        self.reconciled = self._histogram(metric_definitions.RECONCILED)
+        self._requests = self._counter(metric_definitions.REQUESTS)
+        self._request_seconds = self._histogram(metric_definitions.REQUEST_DURATION)
+        self._queued = self._histogram(metric_definitions.QUEUE_WAIT)
+        self._time_to_running = self._histogram(metric_definitions.TIME_TO_RUNNING)
+        self._restarts = self._counter(metric_definitions.RESTARTS)
+        self._ends = self._counter(metric_definitions.REPLICA_ENDS)
         ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
@@ -88,7 +88,7 @@ class Metrics:
             self._restarts.labels(cause).inc(max(times - before.get(cause, 0), 0))
         if new["phase"] in TERMINAL and old.get("phase") not in TERMINAL:
             reason = new.get("reason")
-            self._ends.labels(reason if reason in families.ENDS else Reason.JOB_FAILED).inc()
+            self._ends.labels(reason if reason in metric_definitions.ENDS else Reason.JOB_FAILED).inc()
 
     def _histogram(self, family: Family) -> Histogram:
         made = Histogram(
@@ -121,13 +121,13 @@ class _Now(Collector):
     def collect(self) -> Iterator[Metric]:
         """Yield each family; only the leader exports those of jobs, so that each job is counted once."""
         leads = self._leads()
-        yield families.JOBS.metric(_by_phase(self._phases()) if leads else {})
-        yield families.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
-        yield families.QUEUE_DEPTH.metric({(): self._depth()})
-        yield families.LEADER.metric({(): leads})
+        yield metric_definitions.JOBS.metric(_by_phase(self._phases()) if leads else {})
+        yield metric_definitions.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
+        yield metric_definitions.QUEUE_DEPTH.metric({(): self._depth()})
+        yield metric_definitions.LEADER.metric({(): leads})
         outdated = self._outdated()
-        yield families.CRD_OUTDATED.metric({} if outdated is None else {(): outdated})
-        yield families.BUILD.metric({(version("palaestra"),): 1})
+        yield metric_definitions.CRD_OUTDATED.metric({} if outdated is None else {(): outdated})
+        yield metric_definitions.BUILD.metric({(version("palaestra"),): 1})
 
 
 def _from_zero(made: Counted, family: Family) -> Counted:

@@ -15,7 +15,7 @@ METRICS_ADDRESS = Address("0.0.0.0", 8080)  # noqa: S104 - the pod's address, fo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
+class OperatorOptions:
     """The options of the command line.
 
     Attributes:

@@ -18,7 +18,7 @@ import structlog
 
 from palaestra.objects import Key
 from palaestra.observe import Polled
-from palaestra.operator.schedule import Entry, Schedule, Standing, Target
+from palaestra.operator.poll_schedule import PollSchedule, PollState, PollStatus, PollTarget
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
@@ -44,7 +44,7 @@ class Poller:
 
     def __init__(
         self,
-        targets: Callable[[], Collection[Target]],
+        targets: Callable[[], Collection[PollTarget]],
         changed: Callable[[Key], None],
         *,
         period_s: float = PERIOD_S,
@@ -54,7 +54,7 @@ class Poller:
         self._changed = changed
         self._deadline_s = deadline_s
         self._follow_s = min(FOLLOW_S, period_s)
-        self._schedule = Schedule(period_s, deadline_s * PROMPT_SHARE, random.random)
+        self._schedule = PollSchedule(period_s, deadline_s * PROMPT_SHARE, random.random)
         self._known: dict[str, Polled] = {}
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="poller", daemon=True)
@@ -94,22 +94,22 @@ class Poller:
         for target in self._schedule.follow(self._targets(), time.monotonic()):
             self._take(target, None)
 
-    async def _ask_and_take(self, entry: Entry, freed: asyncio.Event) -> None:
+    async def _ask_and_take(self, entry: PollState, freed: asyncio.Event) -> None:
         answer = await self._ask(entry)
         if self._schedule.done(entry, time.monotonic()):
             self._take(entry.target, answer)
         freed.set()
 
-    def _take(self, target: Target, answer: Polled | None) -> None:
+    def _take(self, target: PollTarget, answer: Polled | None) -> None:
         before = self._known.pop(target.uid, None) if answer is None else self._known.get(target.uid)
         if answer is not None:
             self._known[target.uid] = answer
         if _word(before) != _word(answer):
             self._changed(target.key)
 
-    async def _ask(self, entry: Entry) -> Polled | None:
+    async def _ask(self, entry: PollState) -> Polled | None:
         target = entry.target
-        share = PROMPT_SHARE if entry.standing is Standing.NEW else 1.0
+        share = PROMPT_SHARE if entry.standing is PollStatus.NEW else 1.0
         try:
             async with asyncio.timeout(self._deadline_s * share):
                 body = await _get_status(target)
@@ -127,7 +127,7 @@ class Poller:
         return None
 
 
-async def _get_status(target: Target) -> bytes:
+async def _get_status(target: PollTarget) -> bytes:
     """Return the body of a trainer's answer.
 
     Raises:

@@ -15,24 +15,24 @@ import structlog
 from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
 from palaestra.objects import Key
 from palaestra.operator import health
-from palaestra.operator.acting import Acting
-from palaestra.operator.apart import Apart
 from palaestra.operator.caches import Caches
-from palaestra.operator.checking import Checking
 from palaestra.operator.controller import Controller
-from palaestra.operator.definition import Definition
-from palaestra.operator.denials import Denials
+from palaestra.operator.crd_check import CrdCheck
+from palaestra.operator.executor import Executor
+from palaestra.operator.fenced_client import FencedClient
+from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.logs import configure_logs
-from palaestra.operator.looking import Looking
 from palaestra.operator.metrics import Metrics
-from palaestra.operator.options import NAME, Options
+from palaestra.operator.observer import JobObserver
+from palaestra.operator.options import NAME, OperatorOptions
+from palaestra.operator.poll_schedule import PollTarget
 from palaestra.operator.poller import Poller
-from palaestra.operator.reporting import Reporting
-from palaestra.operator.schedule import Target
-from palaestra.operator.strangers import Strangers
-from palaestra.operator.tidying import Tidying
+from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.status_writer import StatusWriter
+from palaestra.operator.unused_claims import UnusedClaims
 from palaestra.operator.workers import Workers
-from palaestra.operator.writing import Writer
+from palaestra.operator.world_check_process import WorldCheckProcess
+from palaestra.operator.world_verdicts import WorldChecker
 from palaestra.plan import ClusterLayout
 from palaestra.plan.layout import USER
 
@@ -54,28 +54,30 @@ class Operator:
         metrics: its metrics.
     """
 
-    def __init__(self, api: Api, options: Options, metrics: Metrics) -> None:
+    def __init__(self, api: Api, options: OperatorOptions, metrics: Metrics) -> None:
         self._options = options
         self._gate = threading.Event()
         api.on_request = metrics.request
         self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited, lane=_namespace)
         self._caches = Caches(api, options.namespaces, self._changed)
-        self._definition = Definition(api, self._look_at_all)
+        self._definition = CrdCheck(api, self._look_at_all)
         self._poller = Poller(self._trainers, self._queue.add)
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
-        self._writer = writer = Writer(api, self._term)
-        strangers, denials = Strangers(api), Denials()
-        self._apart = Apart()
-        self._checking = Checking(self._apart.check, self._queue.add)
+        self._writer = writer = FencedClient(api, self._term)
+        strangers, denials = ForeignJobs(api), RejectedCreations()
+        self._apart = WorldCheckProcess()
+        self._checking = WorldChecker(self._apart.check, self._queue.add)
         self._controller = Controller(
             self._caches,
-            Looking(api, self._caches, strangers, denials, self._poller.known, self._checking),
-            Acting(api, writer, strangers, denials),
-            Reporting(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
+            JobObserver(api, self._caches, strangers, denials, self._poller.known, self._checking),
+            Executor(api, writer, strangers, denials),
+            StatusWriter(
+                writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted
+            ),
             _layout(options),
         )
-        self._tidying = Tidying(api, self._caches, writer)
+        self._tidying = UnusedClaims(api, self._caches, writer)
         self._workers = Workers(
             self._queue,
             self._reconcile,
@@ -144,7 +146,7 @@ class Operator:
         for key in self._caches.known():
             self._queue.add(key)
 
-    def _trainers(self) -> Collection[Target]:
+    def _trainers(self) -> Collection[PollTarget]:
         return self._caches.trainers() if self._gate.is_set() else ()
 
     def _unhealthy(self) -> str | None:
@@ -166,7 +168,7 @@ class Operator:
         log.info("ended")
 
 
-def run(options: Options, metrics: Metrics | None = None) -> int:
+def run(options: OperatorOptions, metrics: Metrics | None = None) -> int:
     """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a thread failed.
 
     Raises:
@@ -194,7 +196,7 @@ def _namespace(key: Key) -> str:
     return key[0]
 
 
-def _layout(options: Options) -> ClusterLayout:
+def _layout(options: OperatorOptions) -> ClusterLayout:
     return ClusterLayout(
         images=options.images,
         operator_namespace=options.operator_namespace,

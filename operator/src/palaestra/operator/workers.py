@@ -13,8 +13,8 @@ from prometheus_client import Histogram
 
 from palaestra.cluster import ApiError, Conflict, WorkQueue
 from palaestra.objects import Key
-from palaestra.operator.confirming import Outdated
-from palaestra.operator.writing import NotLeading
+from palaestra.operator.fenced_client import NotLeading
+from palaestra.operator.preconditions import Outdated
 
 IDLE_S = 1.0  # between two checks whether to stop
 REPEATS = 4  # conflicts in a row before the first log line; then each power of two is logged

@@ -15,28 +15,28 @@ from palaestra.objects import Object
 from palaestra.plan.claim import claim, claim_of
 from palaestra.plan.config_map import config_map
 from palaestra.plan.job import job as replica_job
-from palaestra.plan.layout import Allowed, ClusterLayout, Images, Layout, LocalLayout, Places, Ports
+from palaestra.plan.layout import Allowed, ClusterLayout, ContainerPaths, Images, Layout, LocalLayout, Ports
 from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
-from palaestra.plan.verdicts import GivenWorld, Verdict, Verdicts
+from palaestra.plan.world_verdicts import GivenWorld, Verdicts, WorldVerdict
 from palaestra.plan.worlds import ConfigMaps, Files, given_worlds, named_files, source_files
 
 __all__ = [
     "Allowed",
     "ClusterLayout",
     "ConfigMaps",
+    "ContainerPaths",
     "GivenWorld",
     "Images",
     "Layout",
     "LocalLayout",
-    "Places",
     "Plan",
     "PlanError",
     "Ports",
     "ReplicaPlan",
-    "Verdict",
     "Verdicts",
+    "WorldVerdict",
     "given_worlds",
     "identified",
     "plan",

@@ -8,11 +8,11 @@ from palaestra.api import Driver
 from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
 from palaestra.plan.claim import INITIAL, initial_volume
-from palaestra.plan.layout import Places
+from palaestra.plan.layout import ContainerPaths
 from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, TRAINER, PlannedSimulator, Replica
-from palaestra.plan.text import literal
 from palaestra.plan.training import FILE, LOOPBACK
 from palaestra.plan.worlds import world_path
+from palaestra.plan.yaml_text import literal
 
 Container = dict[str, Any]
 
@@ -181,7 +181,7 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
     }
 
 
-def _mounts(replica: Replica, container: str, places: Places) -> list[dict[str, Any]]:
+def _mounts(replica: Replica, container: str, places: ContainerPaths) -> list[dict[str, Any]]:
     mounts: list[dict[str, Any]] = [
         {"name": "config", "mountPath": places.config, "readOnly": True},
         {"name": f"scratch-{container}", "mountPath": places.scratch},

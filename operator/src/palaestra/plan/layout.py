@@ -52,7 +52,7 @@ class Images:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Places:
+class ContainerPaths:
     """Where things lie for the containers of one replica; absolute paths.
 
     `volume` is where the claim is mounted and `run` the run directory on it. `home` is given where
@@ -154,7 +154,7 @@ class Layout(Protocol):
         """The user and group of a pod; None: the cluster chooses them, as OpenShift does."""
         ...
 
-    def places(self, uid: str, replica: int, container: str) -> Places:
+    def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
 
@@ -184,9 +184,9 @@ class ClusterLayout:
     resources: Defaults = NO_DEFAULTS
     user: int | None = USER
 
-    def places(self, uid: str, replica: int, container: str) -> Places:
+    def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
         """Return the same places for every container; runs are kept apart by the job's uid."""
-        return Places(
+        return ContainerPaths(
             config="/etc/palaestra",
             volume="/var/lib/palaestra",
             run=self.another_run(uid, replica),
@@ -223,10 +223,10 @@ class LocalLayout:
     resources: Defaults = NO_DEFAULTS
     user: int = USER
 
-    def places(self, uid: str, replica: int, container: str) -> Places:
+    def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
         """Return the places of one container, all below `<job_directory>/<replica>`."""
         run = f"{self.job_directory}/{replica}"
-        return Places(
+        return ContainerPaths(
             config=run,
             volume=run,
             run=run,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from palaestra.api import SimulatorGroup, TrainingJob
 from palaestra.errors import PlanError
-from palaestra.plan.layout import Layout, Places
+from palaestra.plan.layout import ContainerPaths, Layout
 from palaestra_sim.world import RunIdentity
 
 JOB_LABEL = "palaestra.dev/job"
@@ -100,7 +100,7 @@ class Replica:
             for place, (group, i) in enumerate(members)
         )
 
-    def places(self, container: str) -> Places:
+    def places(self, container: str) -> ContainerPaths:
         """Return where things lie for one of its containers."""
         return self.layout.places(self.uid, self.index, container)
 

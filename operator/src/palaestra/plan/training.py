@@ -7,8 +7,8 @@ from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
 from palaestra.plan.claim import initial_path
 from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
-from palaestra.plan.text import as_yaml
 from palaestra.plan.worlds import world_path
+from palaestra.plan.yaml_text import as_yaml
 from palaestra_sim.world import name_prefix
 
 FILE = "training.yaml"

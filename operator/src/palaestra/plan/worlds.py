@@ -7,10 +7,10 @@ names of a simulator into a world. Sources of `file` are in the image, and only 
 
 from collections.abc import Mapping
 
-from palaestra.api import Driver, SimulatorGroup, TrainingJob, World
+from palaestra.api import Driver, SimulatorGroup, TrainingJob, WorldSource
 from palaestra.errors import PlanError
 from palaestra.plan.replica import PlannedSimulator, Replica
-from palaestra.plan.verdicts import GivenWorld, Verdicts, require_fine
+from palaestra.plan.world_verdicts import GivenWorld, Verdicts, require_fine
 from palaestra_sim.world import MJCF, WBT, builtin, check, generate, suffix
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
@@ -146,11 +146,11 @@ def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> 
 def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes | None:
     """Return the text of a group's world; None: it lies in the image."""
     match group.world:
-        case World(inline=str(text)):
+        case WorldSource(inline=str(text)):
             return text.encode()
-        case World(builtin=str(name)):
+        case WorldSource(builtin=str(name)):
             return builtin(name)
-        case World(config_map=reference) if reference is not None:
+        case WorldSource(config_map=reference) if reference is not None:
             content = config_maps.get((reference.name, reference.key))
             if content is None:
                 raise PlanError(
@@ -162,7 +162,7 @@ def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes
             return None
 
 
-def _kind(world: World) -> str:
+def _kind(world: WorldSource) -> str:
     """Return the field that a world is given by."""
     given = {"inline": world.inline, "configMap": world.config_map, "builtin": world.builtin}
     return next((name for name, value in given.items() if value is not None), "file")

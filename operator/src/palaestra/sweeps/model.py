@@ -13,13 +13,13 @@ from pydantic import Field, ValidationError
 from palaestra.api.fields import JobName
 from palaestra.api.job import API_VERSION
 from palaestra.api.model import ApiModel, Rule, RulesBroken
+from palaestra.api.model_walk import fields_of, model_at
 from palaestra.api.paths import shown
-from palaestra.api.sentences import sentence
-from palaestra.api.tree import fields_of, model_at
-from palaestra.api.yaml_text import NotYaml, read
+from palaestra.api.validation_messages import sentence
+from palaestra.api.yaml_io import NotYaml, read
+from palaestra.bounded_read import MOST_JOB_BYTES, read_bounded
 from palaestra.errors import SpecErrors
-from palaestra.given import data_of, full_path
-from palaestra.reading import MOST_JOB_BYTES, read_bounded
+from palaestra.job_input import data_of, full_path
 
 LABEL = "palaestra.dev/sweep"
 MOST_TRIALS = 1000

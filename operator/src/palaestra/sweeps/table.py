@@ -5,23 +5,23 @@ from dataclasses import dataclass
 from statistics import quantiles
 from typing import Any
 
-from palaestra.sweeps.expanding import short
+from palaestra.sweeps.grid import short
 from palaestra.sweeps.model import Objective
-from palaestra.sweeps.trial import Figures, State
+from palaestra.sweeps.trial import TrialFigures, TrialProgress
 
 WORDS = {Objective.SUCCESS_RATE: "success rate", Objective.MEAN_RETURN: "mean return"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class TrialRow:
     """One trial of the result."""
 
     name: str
     changes: Mapping[str, Any]
-    figures: Figures
+    figures: TrialFigures
 
 
-def lines(rows: Sequence[Row], objective: Objective) -> Iterator[str]:
+def lines(rows: Sequence[TrialRow], objective: Objective) -> Iterator[str]:
     """Yield the table, and a line about the best complete trial."""
     fields = short(dict.fromkeys(field for row in rows for field in row.changes))
     heading = ("trial", *fields.values(), "state", "seeds", WORDS[objective], "quartiles")
@@ -35,9 +35,11 @@ def lines(rows: Sequence[Row], objective: Objective) -> Iterator[str]:
         yield ", ".join((f"best: {top.name}", *(f"{key} = {_text(top.changes[key])}" for key in top.changes)))
 
 
-def best(rows: Iterable[Row], objective: Objective) -> Row | None:
+def best(rows: Iterable[TrialRow], objective: Objective) -> TrialRow | None:
     """Return the complete trial with the highest median; of equal ones the first."""
-    complete = [row for row in rows if row.figures.state is State.COMPLETE and row.figures.values(objective)]
+    complete = [
+        row for row in rows if row.figures.state is TrialProgress.COMPLETE and row.figures.values(objective)
+    ]
     return max(complete, key=lambda row: row.figures.median(objective) or 0.0, default=None)
 
 
@@ -49,7 +51,7 @@ def quartiles(values: Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
-def _result(row: Row, objective: Objective) -> Iterator[str]:
+def _result(row: TrialRow, objective: Objective) -> Iterator[str]:
     values = row.figures.values(objective)
     yield row.figures.state.value
     yield (

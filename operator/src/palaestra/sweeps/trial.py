@@ -64,7 +64,7 @@ class RunFigures:
         return self.curve[-1].value(objective) if self.curve else None
 
 
-class State(StrEnum):
+class TrialProgress(StrEnum):
     """How far a trial has come."""
 
     WAITING = "waiting"
@@ -75,19 +75,19 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Figures:
+class TrialFigures:
     """The runs of a trial, by seed, and its state."""
 
-    state: State
+    state: TrialProgress
     runs: tuple[RunFigures, ...] = ()
 
     @classmethod
     def of(cls, runs: tuple[RunFigures, ...]) -> Self:
         """Return the figures of runs that were not pruned."""
         if not all(run.ended for run in runs):
-            return cls(state=State.RUNNING, runs=runs)
+            return cls(state=TrialProgress.RUNNING, runs=runs)
         done = all(run.succeeded for run in runs)
-        return cls(state=State.COMPLETE if done else State.FAILED, runs=runs)
+        return cls(state=TrialProgress.COMPLETE if done else TrialProgress.FAILED, runs=runs)
 
     def reasons(self) -> tuple[str, ...]:
         """Return why runs failed, each reason once."""

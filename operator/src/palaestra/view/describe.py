@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 
 from palaestra.api import Role, TrainingJob
-from palaestra.api.history import Goodput, LastAttempt
+from palaestra.api.attempt_status import Goodput, LastAttempt
 from palaestra.api.status import Condition, LostPart, LostRun, ReplicaStatus, SuccessInterval
-from palaestra.client import Happening
+from palaestra.client import Event
 from palaestra.view.durations import ago, short
 from palaestra.view.tables import NOTHING, lines_of
 
@@ -25,7 +25,7 @@ def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
     return lines
 
 
-def happened(happenings: Sequence[Happening], now: datetime) -> list[str]:
+def happened(happenings: Sequence[Event], now: datetime) -> list[str]:
     """Return the lines about events: age, type, reason, object with container, message."""
     if not happenings:
         return ["none that the cluster still has"]

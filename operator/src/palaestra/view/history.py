@@ -10,7 +10,7 @@ MOST = 40  # Values of each figure; as many as fit into one line.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Figures:
+class ReplicaFigures:
     """The figures of a replica at one step; None: unknown at that step."""
 
     step: int
@@ -19,7 +19,7 @@ class Figures:
     mean_return: float | None
 
     @classmethod
-    def of(cls, replica: ReplicaStatus) -> "Figures | None":
+    def of(cls, replica: ReplicaStatus) -> "ReplicaFigures | None":
         """Return the figures of a replica, None before its first step."""
         if replica.step is None:
             return None
@@ -35,15 +35,15 @@ class History:
     """The last figures of each replica of one job."""
 
     def __init__(self) -> None:
-        self._figures: defaultdict[int, deque[Figures]] = defaultdict(lambda: deque(maxlen=MOST))
+        self._figures: defaultdict[int, deque[ReplicaFigures]] = defaultdict(lambda: deque(maxlen=MOST))
 
     def add(self, status: Status) -> None:
         """Add the figures of a status; a replica without a change is skipped."""
         for replica in status.replicas:
-            figures, known = Figures.of(replica), self._figures[replica.index]
+            figures, known = ReplicaFigures.of(replica), self._figures[replica.index]
             if figures is not None and (not known or known[-1] != figures):
                 known.append(figures)
 
-    def of(self, replica: int) -> tuple[Figures, ...]:
+    def of(self, replica: int) -> tuple[ReplicaFigures, ...]:
         """Return the figures of a replica, oldest first."""
         return tuple(self._figures[replica])

@@ -12,7 +12,7 @@ from palaestra.api.status import Phase, ReplicaStatus
 from palaestra.client import why
 from palaestra.view.describe import progress
 from palaestra.view.durations import ago
-from palaestra.view.history import Figures, History
+from palaestra.view.history import History, ReplicaFigures
 from palaestra.view.sparkline import sparkline
 
 COLOURS = {
@@ -38,7 +38,9 @@ def live(job: TrainingJob, history: History, now: datetime) -> Group:
     return Group(*parts)
 
 
-def _replica(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> list[RenderableType]:
+def _replica(
+    replica: ReplicaStatus, figures: tuple[ReplicaFigures, ...], now: datetime
+) -> list[RenderableType]:
     heading = Text.assemble(f"replica {replica.index}  ", (replica.phase, _color(replica.phase)))
     heading.append(f"  attempt {replica.attempt}" if replica.attempt else "")
     why = ": ".join(part for part in (replica.reason, replica.message) if part)
@@ -58,7 +60,7 @@ def _bar(step: int, target: int | None) -> Table:
     return line
 
 
-def _figures(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> Table:
+def _figures(replica: ReplicaStatus, figures: tuple[ReplicaFigures, ...], now: datetime) -> Table:
     grid = Table.grid(padding=(0, 2))
     rates = sparkline([figure.steps_per_second for figure in figures], lowest=0.0)
     success = sparkline([figure.success_rate for figure in figures], lowest=0.0, highest=1.0)

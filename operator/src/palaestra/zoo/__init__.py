@@ -9,7 +9,7 @@ Pure: text in, text out. Whatever a TrainingJob cannot hold exactly becomes a no
 - `words`: the place of each word in a TrainingJob
 """
 
-from palaestra.zoo.converting import Converted, convert
-from palaestra.zoo.reading import ZooError
+from palaestra.zoo.conversion import Converted, convert
+from palaestra.zoo.hyperparameter_file import ZooError
 
 __all__ = ["Converted", "ZooError", "convert"]

@@ -23,7 +23,7 @@ from palaestra_protocol.fields import (
     enumerated,
     known,
 )
-from palaestra_protocol.pod.terms import Cause, ExitCode, FaultKind, Role, StandbyState
+from palaestra_protocol.pod.enums import Cause, ExitCode, FaultKind, Role, StandbyState
 
 __all__ = [
     "Cause",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 
-from palaestra_protocol.ros.syntax import BUILT_IN, Field, Message
+from palaestra_protocol.ros.syntax import BUILT_IN, Message, MessageField
 
 _LINE = "=" * 80
 
@@ -43,7 +43,7 @@ def _covered(find: Callable[[str], Message], message: Message) -> Iterator[str]:
         yield f"{_covered_type(find, field)} {field.name}"
 
 
-def _covered_type(find: Callable[[str], Message], field: Field) -> str:
+def _covered_type(find: Callable[[str], Message], field: MessageField) -> str:
     return f"{field.type}{field.array}" if field.type in BUILT_IN else md5(find, find(field.type))
 
 

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import accumulate
 from typing import Any, Protocol
 
-from palaestra_protocol.ros.syntax import NUMBERS, Field, Message, parse
+from palaestra_protocol.ros.syntax import NUMBERS, Message, MessageField, parse
 
 TIMES = {
     "time": parse("time", "uint32 secs\nuint32 nsecs"),
@@ -27,7 +27,7 @@ UNFIT = (AttributeError, OverflowError, TypeError, ValueError, struct.error)
 Find = Callable[[str], Message]
 
 
-class Part(Protocol):
+class FixedPart(Protocol):
     """A field of fixed size that is more than one number."""
 
     @property
@@ -64,8 +64,8 @@ class Record:
     """
 
     names: tuple[str, ...]
-    parts: tuple[Part | None, ...]
-    placed: tuple[tuple[Part | None, int], ...]
+    parts: tuple[FixedPart | None, ...]
+    placed: tuple[tuple[FixedPart | None, int], ...]
     empties: tuple[Any, ...]
     codes: str
     make: Callable[[Iterable[Any]], Any]
@@ -114,7 +114,7 @@ class Record:
 class _Array:
     """An array of fixed length, of numbers or of messages of fixed size."""
 
-    def __init__(self, field: Field, length: int, element: Part | None) -> None:
+    def __init__(self, field: MessageField, length: int, element: FixedPart | None) -> None:
         self._element = element
         self._length = length
         self._collect = collection(field.type)
@@ -149,12 +149,12 @@ def check_length(value: Sequence[Any], length: int) -> None:
         raise ValueError(f"{len(value)} elements for {length}")
 
 
-def attribute(field: Field) -> str:
+def attribute(field: MessageField) -> str:
     """Return the attribute of a field: as in genpy, that of a field called `from` is `from_`."""
     return field.name + "_" * keyword.iskeyword(field.name)
 
 
-def maker(message: Message, fields: Sequence[Field]) -> Callable[[Iterable[Any]], Any]:
+def maker(message: Message, fields: Sequence[MessageField]) -> Callable[[Iterable[Any]], Any]:
     """Return what makes a named tuple of the values of these fields."""
     name = message.name.rpartition("/")[2]
     names = tuple(map(attribute, fields))
@@ -167,7 +167,7 @@ def message_of(type_: str, find: Find) -> Message:
     return TIMES.get(type_) or find(type_)
 
 
-def record(message: Message, fields: Sequence[Field], find: Find) -> Record:
+def record(message: Message, fields: Sequence[MessageField], find: Find) -> Record:
     """Return the record of some fields of a message, which all have a fixed size."""
     parts = tuple(_part(field, find) for field in fields)
     codes = [part.codes if part else NUMBERS[field.type] for field, part in zip(fields, parts, strict=True)]
@@ -182,7 +182,7 @@ def record(message: Message, fields: Sequence[Field], find: Find) -> Record:
     )
 
 
-def has_fixed_size(field: Field, find: Find) -> bool:
+def has_fixed_size(field: MessageField, find: Find) -> bool:
     """Return whether all values of a field have the same number of bytes."""
     if field.array == "[]" or field.type == "string":
         return False
@@ -191,8 +191,8 @@ def has_fixed_size(field: Field, find: Find) -> bool:
     )
 
 
-def _part(field: Field, find: Find) -> Part | None:
-    element: Part | None = None
+def _part(field: MessageField, find: Find) -> FixedPart | None:
+    element: FixedPart | None = None
     if field.type not in NUMBERS:
         inside = message_of(field.type, find)
         element = record(inside, inside.fields, find)

@@ -32,7 +32,7 @@ _FIELD = re.compile(r"([A-Za-z][\w/]*)(?:\[(\d*)\])?\s+([A-Za-z]\w*)", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class MessageField:
     """One field of a message.
 
     Attributes:
@@ -65,7 +65,7 @@ class Message:
     name: str
     text: str
     constants: tuple[str, ...]
-    fields: tuple[Field, ...]
+    fields: tuple[MessageField, ...]
 
 
 def parse(name: str, text: str) -> Message:
@@ -95,12 +95,12 @@ def _constant(message: str, line: str, bare: str) -> str:
     return f"{type_} {name}={value.strip()}"
 
 
-def _field(message: str, bare: str) -> Field:
+def _field(message: str, bare: str) -> MessageField:
     found = _FIELD.fullmatch(bare)
     if found is None:
         raise ValueError(f"{message}: {bare!r} is not a field; write a type, a space and a name")
     type_, length, name = found.groups()
-    return Field(_resolved(type_, message), "" if length is None else f"[{length}]", name)
+    return MessageField(_resolved(type_, message), "" if length is None else f"[{length}]", name)
 
 
 def _resolved(type_: str, message: str) -> str:

@@ -25,7 +25,7 @@ from palaestra_protocol.ros.fixed import (
     message_of,
     record,
 )
-from palaestra_protocol.ros.syntax import NUMBERS, Field, Message
+from palaestra_protocol.ros.syntax import NUMBERS, Message, MessageField
 from palaestra_protocol.ros.tcpros import LENGTH
 
 Piece = bytes | memoryview  # of a message that is being written
@@ -244,7 +244,7 @@ def _sections(message: Message, find: Find) -> Iterator[tuple[str, _Layout]]:
             yield from ((attribute(field), _layout(field, find)) for field in fields)
 
 
-def _layout(field: Field, find: Find) -> _Layout:
+def _layout(field: MessageField, find: Find) -> _Layout:
     """Return the layout of a field of variable size."""
     if field.type in NUMBERS:
         return _Octets() if collection(field.type) is bytes else _Numbers(NUMBERS[field.type])

@@ -1,7 +1,7 @@
 """A port that answers XML-RPC: the ROS master's, and that of a node.
 
 Connections stay open for more calls, as the clients of ROS expect. Their number, the length of a request and
-every wait are limited: a new connection takes the place of one without a request, as `places` says.
+every wait are limited: a new connection takes the place of one without a request (`connection_limits`).
 Several calls may come in one request (`system.multicall`); they are made in their order.
 """
 
@@ -20,7 +20,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from typing import Any, cast
 
-from palaestra_protocol.places import Places
+from palaestra_protocol.connection_limits import ConnectionSlots
 from palaestra_protocol.xmlrpc.documents import (
     FAULT,
     UnreadableDocument,
@@ -75,7 +75,7 @@ class Server(socketserver.ThreadingTCPServer):
         idle_s: float = IDLE_S,
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
-        self.places = Places(MOST_CONNECTIONS, MOST_CONNECTIONS)
+        self.places = ConnectionSlots(MOST_CONNECTIONS, MOST_CONNECTIONS)
         self.request_s = request_s
         self.idle_s = idle_s
         self._find = find
@@ -125,7 +125,7 @@ class Server(socketserver.ThreadingTCPServer):
         if not isinstance(error, OSError):
             log.error("XML-RPC: a request failed: %r", error)
 
-    def answer(self, data: bytes) -> bytes:
+    def respond(self, data: bytes) -> bytes:
         """Return the response to a request."""
         try:
             method, parameters = decode_request(data)
@@ -142,7 +142,7 @@ class Server(socketserver.ThreadingTCPServer):
             raise xmlrpc.client.Fault(FAULT, f"{name} is not a method of this server")
         try:
             return method(parameters)
-        except Exception as error:  # of any type: a caller must get an answer, and others go on
+        except Exception as error:  # of any type: the caller must get a response, and others continue
             raise xmlrpc.client.Fault(FAULT, f"{name}: {error!r}") from error
 
     def _several(self, parameters: tuple[Any, ...]) -> list[Any]:
@@ -192,7 +192,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif len(body := self.rfile.read(int(length))) < int(length):
             self.close_connection = True
         else:
-            self._send(self._answered(body))
+            self._send(self._responded(body))
 
     def log_message(self, *_: Any, **__: Any) -> None:
         """Log nothing."""
@@ -201,11 +201,11 @@ class _Handler(BaseHTTPRequestHandler):
     def _server(self) -> Server:
         return cast("Server", self.server)
 
-    def _answered(self, body: bytes) -> bytes:
+    def _responded(self, body: bytes) -> bytes:
         """Return the response; until it is made, the connection keeps its place."""
         self._server.places.answering(self.connection, now=True)
         try:
-            return self._server.answer(body)
+            return self._server.respond(body)
         finally:
             self._server.places.answering(self.connection, now=False)
 

@@ -13,19 +13,19 @@
 A stub without faults has the plain node, and nothing of this package in its way.
 """
 
-from palaestra_sim.faults.course import Course
-from palaestra_sim.faults.effects import Effects
-from palaestra_sim.faults.language import FaultError
+from palaestra_sim.faults.fault_state import FaultState
+from palaestra_sim.faults.faulty_node import Failing, FaultyNode
+from palaestra_sim.faults.known_paths import begin
 from palaestra_sim.faults.options import add_options, read_options
-from palaestra_sim.faults.survey import begin
-from palaestra_sim.faults.wire import Failing, FaultyNode
+from palaestra_sim.faults.parser import FaultError
+from palaestra_sim.faults.process_faults import ProcessFaults
 
 __all__ = [
-    "Course",
-    "Effects",
     "Failing",
     "FaultError",
+    "FaultState",
     "FaultyNode",
+    "ProcessFaults",
     "add_options",
     "begin",
     "read_options",

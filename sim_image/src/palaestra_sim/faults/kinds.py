@@ -13,7 +13,7 @@ RESET_PATHS = frozenset(
 )
 
 
-class Event(StrEnum):
+class FaultEvent(StrEnum):
     """Events that are counted, from 1, in each life of a stub; the program that starts it counts the lives.
 
     - step: a `time_step` request of the robot that asked first, so once a step for any number of robots.
@@ -38,7 +38,7 @@ class Trigger:
         probability: of each.
     """
 
-    event: Event
+    event: FaultEvent
     at: int | None = None
     every: int = 1
     probability: float = 1.0
@@ -51,7 +51,7 @@ class Trigger:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fault:
+class InjectedFault:
     """A fault.
 
     Attributes:
@@ -68,26 +68,26 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Crash(Fault):
+class Crash(InjectedFault):
     """A signal ends the process, without an answer to the request."""
 
     signal: Signals = Signals.SIGSEGV
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Exit(Fault):
+class Exit(InjectedFault):
     """The process closes everything and ends, too early."""
 
     code: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hang(Fault):
+class Hang(InjectedFault):
     """The process stops with its sockets open; or one service never answers again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Delayed(Fault):
+class Delayed(InjectedFault):
     """A delay: the latency, plus up to the jitter."""
 
     latency_s: float = 0.0
@@ -105,24 +105,24 @@ class Late(Delayed):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lost(Fault):
+class Lost(InjectedFault):
     """Messages of a step never come."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WrongValue(Fault):
+class WrongValue(InjectedFault):
     """Floats have another value."""
 
     value: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WrongShape(Fault):
+class WrongShape(InjectedFault):
     """The second half of the bytes is missing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MemoryGrowth(Fault):
+class MemoryGrowth(InjectedFault):
     """Memory is allocated and never freed, up to `most_mib`."""
 
     mib: float = 1.0
@@ -130,7 +130,7 @@ class MemoryGrowth(Fault):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StartRefused(Fault):
+class StartRefused(InjectedFault):
     """The process ends before it has registered any name."""
 
     code: int = 1
@@ -142,10 +142,10 @@ class SlowStart(Delayed):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MasterLost(Fault):
+class MasterLostFault(InjectedFault):
     """The stub ends as if the ROS master were gone; its names stay registered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NamesLost(Fault):
+class NamesLost(InjectedFault):
     """The master forgets the stub, like a restarted master; connections stay open."""

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.faults.kinds import Event, Fault
-from palaestra_sim.faults.language import FaultError, parse
+from palaestra_sim.faults.kinds import FaultEvent, InjectedFault
+from palaestra_sim.faults.parser import FaultError, parse
 
 FAULTS: Final = "PALAESTRA_STUB_FAULTS"
 SEED: Final = "PALAESTRA_STUB_FAULT_SEED"
@@ -28,7 +28,7 @@ class Ordered:
         counted: whether a sidecar or a person counts the lives; otherwise `life` was drawn.
     """
 
-    faults: tuple[Fault, ...]
+    faults: tuple[InjectedFault, ...]
     seed: int
     life: int
     counted: bool
@@ -69,13 +69,13 @@ def read_options(options: argparse.Namespace, environment: Mapping[str, str]) ->
     )
 
 
-def _check(faults: tuple[Fault, ...], *, counted: bool) -> None:
+def _check(faults: tuple[InjectedFault, ...], *, counted: bool) -> None:
     texts = [fault.text for fault in faults]
     for fault in faults:
         if texts.count(fault.text) > 1:
             raise FaultError(f"fault {fault.text}: is there twice; leave one")
         trigger = fault.trigger
-        if not counted and trigger.event is Event.START and (trigger.at or trigger.every > 1):
+        if not counted and trigger.event is FaultEvent.START and (trigger.at or trigger.every > 1):
             raise FaultError(
                 f"fault {fault.text}: nobody counts the starts here;"
                 " give --fault-life N, or start the stub through its sidecar"

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from palaestra_sim.faults.kinds import Delayed, Event, Fault
+from palaestra_sim.faults.kinds import Delayed, FaultEvent, InjectedFault
 
 _DRAW_BYTES = 7  # 56 bits: more than a float's 53
 _DRAWS = float(256**_DRAW_BYTES)
@@ -33,17 +33,17 @@ class Life:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Schedule:
+class FaultSchedule:
     """The faults of one life."""
 
-    faults: Sequence[Fault]
+    faults: Sequence[InjectedFault]
     life: Life
 
-    def happens(self, fault: Fault, number: int) -> bool:
+    def happens(self, fault: InjectedFault, number: int) -> bool:
         """Return whether `fault` happens at the event of that number, counted from 1."""
         return fault.trigger.fires(number, self._draw(fault, number, "happens"))
 
-    def at(self, event: Event, number: int) -> tuple[Fault, ...]:
+    def at(self, event: FaultEvent, number: int) -> tuple[InjectedFault, ...]:
         """Return the faults that happen at the event of that number, in the order they were written."""
         return tuple(
             fault for fault in self.faults if fault.trigger.event is event and self.happens(fault, number)
@@ -53,7 +53,7 @@ class Schedule:
         """Return how long the fault delays the event of that number: latency, and a share of the jitter."""
         return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
 
-    def _draw(self, fault: Fault, number: int, purpose: str) -> float:
+    def _draw(self, fault: InjectedFault, number: int, purpose: str) -> float:
         """Return a number in [0, 1), uniformly distributed."""
         life = self.life
         words = (life.seed, life.simulator, life.number, fault.text, number, purpose)

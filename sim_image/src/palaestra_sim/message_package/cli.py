@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from palaestra_sim.errors import SimError
-from palaestra_sim.message_package.writing import make_importable, write
+from palaestra_sim.message_package.package_writer import make_importable, write
 
 _WRONG = 2
 

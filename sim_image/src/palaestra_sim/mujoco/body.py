@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from operator import add, sub
 from typing import Any, Final
 
-from palaestra_sim.scene.base import ACCELERATIONS
 from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.mobile_base import ACCELERATIONS
 from palaestra_sim.scene.shapes import Shape
 
 X, Y, HEADING = 0, 1, 2  # of the three joints

@@ -6,11 +6,11 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from palaestra_sim.front.backend import Backend
 from palaestra_sim.program import Program
+from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.validation import LeaveOut
 
 # MuJoCo is imported in these functions, so that the program can report its absence as its own error, and
 # `--help` needs no MuJoCo.
@@ -34,7 +34,7 @@ def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut, root: Path | None) 
         WorldError: the world is wrong.
         OSError: it cannot be read.
     """
-    loading = importlib.import_module("palaestra_sim.mujoco.mjcf.loading")
+    loading = importlib.import_module("palaestra_sim.mujoco.mjcf.loader")
     simulation: Backend = loading.load(world_path, mode, leave_out, root=root)
     return simulation
 

@@ -12,14 +12,14 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any, Final
 
-from palaestra_sim.scene.surroundings import Surroundings
+from palaestra_sim.scene.physics_settings import PhysicsSettings
 
 _WORLD: Final = "world"
 _CONTACT: Final = 3  # condim: sliding friction without torsion
 Surface = tuple[Any, str]  # a geom, and its material
 
 
-def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: Surroundings) -> None:
+def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: PhysicsSettings) -> None:
     """Give all geoms of a model that is being made the frictions of their materials."""
     ranks = [material for material, _ in Counter(material for _, material in surfaces).most_common()]
     friction = {material: surroundings.friction(material, ranks[0]) for material in ranks}
@@ -41,7 +41,7 @@ def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: Surround
 
 
 def _exceptions(
-    spec: Any, surfaces: Sequence[Surface], friction: dict[str, float], surroundings: Surroundings
+    spec: Any, surfaces: Sequence[Surface], friction: dict[str, float], surroundings: PhysicsSettings
 ) -> Iterator[tuple[Surface, Surface]]:
     """Yield the pairs of geoms that may touch, and have another friction than the rarer material's."""
     ranks = list(friction)

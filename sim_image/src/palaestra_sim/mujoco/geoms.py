@@ -13,7 +13,7 @@ import numpy as np
 
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.scene.geometry import Pose, to_quaternion
-from palaestra_sim.scene.matter import Matter, volume_m3
+from palaestra_sim.scene.mass import MassProperties, volume_m3
 from palaestra_sim.scene.shapes import Shape
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def add_geom(body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
     return geom
 
 
-def add_matter(body: Any, matter: Matter, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
+def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
     """Give a body the mass of a Solid, whose frame is at `frame` in the body's; `geoms` are its shapes'."""
     if matter.mass_kg <= 0.0:
         return
@@ -106,7 +106,7 @@ def put(position: Any, quaternion: Any, pose: Pose) -> None:
     quaternion[:] = np.array((w, x, y, z))
 
 
-def _inertia(matter: Matter) -> tuple[float, ...]:
+def _inertia(matter: MassProperties) -> tuple[float, ...]:
     """Return the inertia of boxes around its shapes; without shapes, of a ball as dense as water."""
     if not matter.shapes:
         radius_m = (matter.mass_kg / 1000.0 * 0.239) ** (1.0 / 3.0)

@@ -14,10 +14,10 @@ from typing import Any, Final
 from palaestra_sim.mujoco.body import GAIN, MujocoBody
 from palaestra_sim.mujoco.geoms import LOOSE, ROBOTS, STANDING, Marks, Touch, add_geom, add_matter, put
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.links import Link, frames_between, link_around
 from palaestra_sim.scene.motors import Motor
-from palaestra_sim.scene.places import Place
 
 _STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # of friction: with the default a held weight creeps
 _TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)
@@ -49,11 +49,11 @@ class Ground:
     """
 
     spec: Any
-    roots: dict[Place, Any]
-    stands: dict[Place, Any]
+    roots: dict[Frame, Any]
+    stands: dict[Frame, Any]
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
-    def under(self, place: Place | None) -> tuple[Place | None, Any]:
+    def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
         """Return the body around a place, with the place of that body."""
         around = () if place is None else place.chain()
         for outer in around:

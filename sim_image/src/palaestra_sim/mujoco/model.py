@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from palaestra_sim.mujoco.body import MujocoBody, servo
+from palaestra_sim.mujoco.free_bodies import FreeBody
 from palaestra_sim.mujoco.friction import set_frictions
 from palaestra_sim.mujoco.geoms import (
     FRICTION,
@@ -30,14 +31,13 @@ from palaestra_sim.mujoco.geoms import (
 )
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.links import Added, Ground, LinkBody, add_links, bodies
-from palaestra_sim.mujoco.loose import LooseBody
+from palaestra_sim.scene.dynamic_solids import DynamicFrame, DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose, LoosePlace
 from palaestra_sim.scene.physics import Figure, Push
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.scene.surroundings import Surroundings, material_of
 
 MASS_KG: Final = 23.0  # of a robot without physics: a Robotino 3 with its batteries
 STANDING_KG: Final = 1e5  # of one that nothing drives: it stands like a wall
@@ -65,13 +65,13 @@ class Built:
     data: Any
     figures: dict[Figure, tuple[MujocoBody, int]]
     geoms: dict[int, tuple[Shape, MujocoBody | None, int]]
-    stands: dict[Place, int]
-    loose: dict[LoosePlace, LooseBody]
+    stands: dict[Frame, int]
+    loose: dict[DynamicFrame, FreeBody]
     links: dict[Figure | None, tuple[LinkBody, ...]]
     own_geoms: dict[Figure | None, list[int]]
-    fixed: dict[Place, Pose]
+    fixed: dict[Frame, Pose]
     of_robots: Any
-    changed: dict[LoosePlace, None]
+    changed: dict[DynamicFrame, None]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it has none."""
@@ -101,7 +101,7 @@ class Built:
         for figure, (_, number) in self.figures.items():
             self.model.body_pos[number][2] = figure.place.height_m
 
-    def displaced(self) -> frozenset[Place]:
+    def displaced(self) -> frozenset[Frame]:
         """Return the places of the obstacles that are no longer where the model has them."""
         return frozenset(place for place, pose in self.fixed.items() if place.ground_pose != pose)
 
@@ -127,10 +127,10 @@ class Built:
         for links in self.links.values():
             yield from links
 
-    def push(self, target: Figure | Loose, push: Push) -> None:
+    def push(self, target: Figure | DynamicSolid, push: Push) -> None:
         """Let a force act on a robot or a loose thing until the forces are cleared."""
-        found = self.figures.get(target) if not isinstance(target, Loose) else None
-        number = self.loose[target.place].number if isinstance(target, Loose) else -1
+        found = self.figures.get(target) if not isinstance(target, DynamicSolid) else None
+        number = self.loose[target.place].number if isinstance(target, DynamicSolid) else -1
         number = number if found is None else found[1]
         torque = np.array(push.torque)
         if push.point is not None:
@@ -148,7 +148,7 @@ class Contents:
 
     figures: tuple[Figure, ...] = ()
     solids: tuple[Shape, ...] = ()
-    loose: tuple[Loose, ...] = ()
+    loose: tuple[DynamicSolid, ...] = ()
     doors: tuple[Link, ...] = ()
 
     @property
@@ -157,7 +157,7 @@ class Contents:
         return [(it, it.body) for it in self.figures if isinstance(it.body, MujocoBody)]
 
 
-def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place] = frozenset()) -> Built:
+def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Frame] = frozenset()) -> Built:
     """Return the model of robots, obstacles, loose things and links, in their present state.
 
     What touches a body that can be put elsewhere never sleeps. So obstacles cannot, where there are things
@@ -182,7 +182,7 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
         figures={figure: (body, robots[figure].id) for figure, body in moving},
         geoms={geom.id: (shape, body, bit) for geom, shape, body, bit in marks.entries},
         stands={place: added.id for place, added in stands.items()},
-        loose={it.place: LooseBody(it.place, model, data, added.id) for it, added in things.items()},
+        loose={it.place: FreeBody(it.place, model, data, added.id) for it, added in things.items()},
         fixed=fixed,
         of_robots=_of_robots(model.ngeom, marks),
         changed={},
@@ -199,7 +199,7 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     return built
 
 
-def _begin_spec(spec: Any, surroundings: Surroundings) -> list[Any]:
+def _begin_spec(spec: Any, surroundings: PhysicsSettings) -> list[Any]:
     """Set what holds everywhere in a model; return the floors."""
     spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
@@ -258,10 +258,10 @@ def _begin(built: Built) -> None:
 
 
 def _add_obstacles(
-    spec: Any, contents: Contents, moved: frozenset[Place], marks: Marks
-) -> tuple[dict[Place, Any], dict[Place, Pose]]:
+    spec: Any, contents: Contents, moved: frozenset[Frame], marks: Marks
+) -> tuple[dict[Frame, Any], dict[Frame, Pose]]:
     """Add all obstacles; return their bodies, and the poses of those that are fixed."""
-    by_place: dict[Place, list[Shape]] = {}
+    by_place: dict[Frame, list[Shape]] = {}
     for shape in contents.solids:
         by_place.setdefault(shape.place, []).append(shape)
     movable = frozenset(by_place) if not (contents.loose or contents.doors) else moved
@@ -296,7 +296,7 @@ def _add_obstacle(
     return added
 
 
-def _add_loose(spec: Any, thing: Loose, marks: Marks) -> Any:
+def _add_loose(spec: Any, thing: DynamicSolid, marks: Marks) -> Any:
     added = spec.worldbody.add_body(name=f"loose {len(marks.entries)}")
     added.add_freejoint()
     frame = thing.place.ground_pose.inverse

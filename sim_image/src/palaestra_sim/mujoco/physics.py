@@ -11,25 +11,25 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from palaestra_sim.mujoco.body import MujocoBody
-from palaestra_sim.mujoco.eye import MujocoEye
-from palaestra_sim.mujoco.film import MujocoFilm
+from palaestra_sim.mujoco.camera import MujocoCamera
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.lidar_rays import LidarBeams
 from palaestra_sim.mujoco.model import Built, Contents, build
-from palaestra_sim.mujoco.pictures import Pictures
 from palaestra_sim.mujoco.rays import Beams
-from palaestra_sim.mujoco.sight import LidarBeams
-from palaestra_sim.scene.beams import Beam
+from palaestra_sim.mujoco.renderer import Renderer
+from palaestra_sim.mujoco.video import MujocoVideo
 from palaestra_sim.scene.bodies import Build
-from palaestra_sim.scene.drawn import View
-from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.camera_interface import Lens
+from palaestra_sim.scene.dynamic_solids import DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.physics_settings import PhysicsSettings
+from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.scene.surroundings import Surroundings
+from palaestra_sim.scene.visuals import View
 
 LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
 
@@ -40,21 +40,21 @@ class MujocoPhysics:
     abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 
     def __init__(self) -> None:
-        self._surroundings = Surroundings()
+        self._surroundings = PhysicsSettings()
         self._floors = self._surroundings.heights_m()
         self._contents = Contents()
         self._built: Built = build(self._contents, self._surroundings)
-        self._moved: frozenset[Place] = frozenset()  # obstacles that moved since the last reset
+        self._moved: frozenset[Frame] = frozenset()  # obstacles that moved since the last reset
         self._stale = False
         self._settled = True
-        self._pushes: list[tuple[Figure | Loose, Push]] = []
-        self._pictures: Pictures
+        self._pushes: list[tuple[Figure | DynamicSolid, Push]] = []
+        self._pictures: Renderer
 
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
         return MujocoBody(build)
 
-    def begin(self, surroundings: Surroundings) -> None:
+    def begin(self, surroundings: PhysicsSettings) -> None:
         """Take gravity and frictions of the world."""
         self._surroundings = surroundings
         self._stale = True
@@ -63,7 +63,7 @@ class MujocoPhysics:
         self,
         figures: Sequence[Figure],
         solids: Sequence[Shape],
-        loose: Sequence[Loose],
+        loose: Sequence[DynamicSolid],
         doors: Sequence[Link] = (),
     ) -> None:
         """Take these robots, obstacles, loose things and doors as the contents of the world."""
@@ -137,21 +137,21 @@ class MujocoPhysics:
         """Return the same for beams that meet what is visible, and pass the robot itself."""
         return LidarBeams(self._pictures, figure, beams).cast
 
-    def push(self, target: Figure | Loose, push: Push) -> None:
+    def push(self, target: Figure | DynamicSolid, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
         self._pushes.append((target, push))
 
     def show(self, view: View) -> None:
         """Take what cameras see of the world."""
-        self._pictures = Pictures(view)
+        self._pictures = Renderer(view)
 
-    def eye(self, place: Place, lens: Lens) -> MujocoEye | None:
+    def eye(self, place: Frame, lens: Lens) -> MujocoCamera | None:
         """Return a camera; None if its picture would not be flat."""
-        return MujocoEye(self._pictures, place, lens) if lens.flat else None
+        return MujocoCamera(self._pictures, place, lens) if lens.flat else None
 
-    def film(self, movie: Movie) -> MujocoFilm:
+    def film(self, movie: Movie) -> MujocoVideo:
         """Return a film to record a movie on."""
-        return MujocoFilm(movie)
+        return MujocoVideo(movie)
 
     def contacts(self) -> Iterator[ContactPoint]:
         """Yield where robots touch obstacles and each other now."""

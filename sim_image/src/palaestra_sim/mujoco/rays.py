@@ -12,8 +12,8 @@ import numpy as np
 from palaestra_sim.mujoco.geoms import SEEN
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built
-from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.physics import Figure
+from palaestra_sim.scene.sensor_rays import Beam
 
 _GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 

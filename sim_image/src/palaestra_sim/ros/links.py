@@ -58,11 +58,11 @@ class Connection(Protocol):
         ...
 
 
-class Refused(Exception):
+class HeaderRefused(Exception):
     """The header names a service or topic that is not here; the text is sent to the peer."""
 
 
-Greet = Callable[["Link", Mapping[str, str]], Endpoint]
+Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 
 
 class Lingering:
@@ -73,16 +73,16 @@ class Lingering:
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
-        self._new: set[Link] = set()
-        self._old: set[Link] = set()
+        self._new: set[RosLink] = set()
+        self._old: set[RosLink] = set()
 
-    def add(self, link: Link) -> None:
+    def add(self, link: RosLink) -> None:
         """Close `link` in time."""
         if not (self._new or self._old):
             self._loop.later(LINGER_S, self._close_old)
         self._new.add(link)
 
-    def discard(self, link: Link) -> None:
+    def discard(self, link: RosLink) -> None:
         """Forget a link that is closed."""
         self._new.discard(link)
         self._old.discard(link)
@@ -95,7 +95,7 @@ class Lingering:
             self._loop.later(LINGER_S, self._close_old)
 
 
-class Link:
+class RosLink:
     """A connection from accept to close.
 
     Args:
@@ -126,7 +126,7 @@ class Link:
         connection: socket.socket,
         greet: Greet,
         lingering: Lingering,
-        gone: Callable[[Link], None],
+        gone: Callable[[RosLink], None],
     ) -> None:
         connection.setblocking(False)
         for option in sockets.OPTIONS:
@@ -233,6 +233,6 @@ class Link:
                     self._endpoint = self._greet(self, decode_header(payload))
                 elif not (self.closed or self._finished):
                     self._endpoint.receive(payload)
-        except (Refused, FramingError) as error:
+        except (HeaderRefused, FramingError) as error:
             self._write(encode_header({"error": str(error)}))
             self.close()

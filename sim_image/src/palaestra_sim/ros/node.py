@@ -17,10 +17,10 @@ from typing import Any, Final
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
 from palaestra_protocol.ros.tcpros import encode_header, frame
 from palaestra_protocol.xmlrpc.server import bind_address
-from palaestra_sim.ros.links import Connection, Endpoint, Lingering, Link, Refused
+from palaestra_sim.ros.links import Connection, Endpoint, HeaderRefused, Lingering, RosLink
 from palaestra_sim.ros.loop import Loop
 from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, host_name
-from palaestra_sim.ros.topics import Publisher, Topic
+from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 LATER: Final = object()
 Handler = Callable[[Any], Any]
@@ -49,8 +49,8 @@ class RosNode:
         self._ended: Callable[[str], None] = lambda _reason: self.abandon()
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
-        self._topics: dict[str, Topic] = {}
-        self._links: set[Link] = set()
+        self._topics: dict[str, PublishedTopic] = {}
+        self._links: set[RosLink] = set()
         self._lingering = Lingering(loop)
         self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
         self._connected = 0
@@ -102,7 +102,7 @@ class RosNode:
         name = self.resolve(path)
         topic = self._topics.get(name)
         if topic is None:
-            topic = self._topics[name] = Topic(
+            topic = self._topics[name] = PublishedTopic(
                 name, message_type(type_name), latched=latched, reading=reading
             )
             self._master.tell("registerPublisher", name, type_name, self._slave.uri)
@@ -196,7 +196,7 @@ class RosNode:
             connection, _ = self._listener.accept()
         except OSError:
             return  # the peer has disconnected already
-        self._links.add(Link(self._loop, connection, self._greet, self._lingering, self._links.discard))
+        self._links.add(RosLink(self._loop, connection, self._greet, self._lingering, self._links.discard))
 
     def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         if "service" in header:
@@ -206,7 +206,7 @@ class RosNode:
     def _greet_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         known = self._services.get(header["service"])
         if known is None:
-            raise Refused(f"no such service {header['service']}")
+            raise HeaderRefused(f"no such service {header['service']}")
         service, handler = known
         md5 = _agreed_md5(header, service.name, service.md5, service.later_md5)
         link.send(
@@ -225,7 +225,7 @@ class RosNode:
     def _greet_subscriber(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         topic = self._topics.get(header.get("topic", ""))
         if topic is None:
-            raise Refused(f"no such topic {header.get('topic')}")
+            raise HeaderRefused(f"no such topic {header.get('topic')}")
         _agreed_md5(header, topic.type.name, topic.type.md5)
         link.send(
             encode_header(
@@ -249,7 +249,7 @@ def _agreed_md5(header: Mapping[str, str], type_name: str, *known: str) -> str:
     """Return the md5 of a type that both ends know."""
     theirs = header.get("md5sum", "*")
     if theirs not in {"*", *known}:
-        raise Refused(f"client wants md5sum {theirs}, but {type_name} has {known[0]}")
+        raise HeaderRefused(f"client wants md5sum {theirs}, but {type_name} has {known[0]}")
     return known[0] if theirs == "*" else theirs
 
 

@@ -16,7 +16,7 @@ _ONE_NUMBER = len("<d")
 _Pack = Callable[[bytearray, int, Any], None]
 
 
-class Topic:
+class PublishedTopic:
     """A published topic and the connections of its subscribers.
 
     Attributes:
@@ -56,7 +56,9 @@ class _SubscriberEnd:
 
     __slots__ = ("_dropped", "_link", "_topic")
 
-    def __init__(self, topic: Topic, link: Connection, dropped: Callable[[Connection], object]) -> None:
+    def __init__(
+        self, topic: PublishedTopic, link: Connection, dropped: Callable[[Connection], object]
+    ) -> None:
         self._topic = topic
         self._link = link
         self._dropped = dropped
@@ -74,7 +76,7 @@ class Publisher:
 
     __slots__ = ("_frame", "_pack", "_reading_at", "_sequence", "_template", "topic")
 
-    def __init__(self, topic: Topic, template: dict[str, Any]) -> None:
+    def __init__(self, topic: PublishedTopic, template: dict[str, Any]) -> None:
         self.topic = topic
         self._template = template
         self._sequence = 0

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.validation import NodeReader
 
 # They let the controller step by itself or hand the motors to others, which no simulator of ours does.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Arguments:
+class ControllerArguments:
     """The arguments that matter here; like Webots' controller, the stub ignores unknown ones.
 
     Attributes:
@@ -27,7 +27,7 @@ class Arguments:
     auto_publish: bool = False
 
 
-def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
+def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
     Refused: without `--name` two robots collide, without `--synchronize` no client controls the steps.
@@ -43,4 +43,4 @@ def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
         if text in _REFUSED:
             reading.lacks(node, f"{reading.simulator} knows no {text}")
     name = names[-1] if names else ""
-    return Arguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)
+    return ControllerArguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

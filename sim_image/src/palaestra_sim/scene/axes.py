@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from typing import Final
 
+from palaestra_sim.scene.frames import Frame, YUp
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import of_old_axes
-from palaestra_sim.scene.places import Place, YUp
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.validation import NodeReader
 
 _SYSTEMS: Final = ("ENU", "NUE", "EUN")
 
 
-def read_axes(reading: Reading, node: SceneNode) -> Place | None:
+def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
     """Return the frame around a world whose y axis points up, None if it is z; note its system of axes.
 
     `node` is the WorldInfo of the world, or its first node.

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from palaestra_sim.scene.base import Base
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.matter import Matter
+from palaestra_sim.scene.mass import MassProperties
+from palaestra_sim.scene.mobile_base import MobileBase
 from palaestra_sim.scene.shapes import Shape
 
 
@@ -24,11 +24,11 @@ class Build:
         matter: the masses of what is on no link.
     """
 
-    base: Base
+    base: MobileBase
     outline: Sequence[Shape]
     heights: tuple[float, float]
     links: Sequence[Link] = ()
-    matter: Sequence[Matter] = ()
+    matter: Sequence[MassProperties] = ()
 
 
 class Body(Protocol):
@@ -44,7 +44,7 @@ class Body(Protocol):
             it.
     """
 
-    base: Base
+    base: MobileBase
     x: float
     y: float
     heading_rad: float

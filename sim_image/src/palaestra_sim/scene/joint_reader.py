@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.joints import Joint, JointPlace, Rubbing, unit
+from palaestra_sim.scene.joints import Joint, JointFrame, Rubbing, unit
 from palaestra_sim.scene.links import Link, link_around
-from palaestra_sim.scene.matter import read_matter
+from palaestra_sim.scene.mass import read_matter
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.validation import NodeReader
 
 
 def parameters_of(node: SceneNode) -> SceneNode:
@@ -19,7 +19,7 @@ def parameters_of(node: SceneNode) -> SceneNode:
     return next(iter(node.nodes("jointParameters")), node)
 
 
-def read_joint(reading: Reading, node: SceneNode, *, forces: bool) -> Joint | None:
+def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint | None:
     """Return the joint at `node`; None if it is refused. With `forces`, it has stops and what resists it."""
     slides = node.type_name == "SliderJoint"
     parameters = parameters_of(node)
@@ -44,7 +44,7 @@ def read_joint(reading: Reading, node: SceneNode, *, forces: bool) -> Joint | No
     return joint
 
 
-def read_door(reading: Reading, node: SceneNode, parent: Place | None) -> Link | None:
+def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Link | None:
     """Return the link on a joint that is on no robot, without shapes; None if its end has no physics."""
     for end in node.nodes("endPoint"):
         if end.type_name == "Solid" and end.nodes("physics"):
@@ -53,13 +53,13 @@ def read_door(reading: Reading, node: SceneNode, parent: Place | None) -> Link |
             joint = read_joint(reading, node, forces=True)
             if joint is None:
                 return None
-            place = JointPlace(parent, reading.translation(end), reading.rotation(end), joint)
+            place = JointFrame(parent, reading.translation(end), reading.rotation(end), joint)
             end.place = place
             return Link(node=end, place=place, joint=joint)
     return None
 
 
-def fill_door(reading: Reading, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
+def fill_door(reading: NodeReader, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
     """Give a link on no robot its shapes and masses; `inner` are the links on it, `shapes` all inside it."""
     links = [link, *inner]
     link.shapes = tuple(shape for shape in shapes if link_around(shape.place, links) is link)

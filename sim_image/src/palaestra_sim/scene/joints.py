@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle, to_axis_angle, turn
 from palaestra_sim.scene.motors import Motor
-from palaestra_sim.scene.places import Place
 
 
 class Rubbing(NamedTuple):
@@ -110,12 +110,12 @@ class Joint:
         return Pose((ax - tx, ay - ty, az - tz), turned.rotation).after(pose)
 
 
-class JointPlace(Place):
+class JointFrame(Frame):
     """The frame of the end of a joint."""
 
     moves = True
 
-    def __init__(self, parent: Place | None, translation: Vector, rotation: AxisAngle, joint: Joint) -> None:
+    def __init__(self, parent: Frame | None, translation: Vector, rotation: AxisAngle, joint: Joint) -> None:
         super().__init__(parent, translation, rotation)
         self.joint = joint
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
-from palaestra_sim.scene.joints import Joint, JointPlace
-from palaestra_sim.scene.matter import Matter
+from palaestra_sim.scene.joints import Joint, JointFrame
+from palaestra_sim.scene.mass import MassProperties
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
 
 
@@ -31,19 +31,19 @@ class Link:
     """
 
     node: SceneNode
-    place: Place
+    place: Frame
     joint: Joint | None
     shapes: tuple[Shape, ...] = ()
-    matter: tuple[Matter, ...] = ()
+    matter: tuple[MassProperties, ...] = ()
     force: Vector = field(default=(0.0, 0.0, 0.0))
 
     @property
     def start(self) -> Pose:
         """Its frame in the frame around it, at the position of the joint in the world file."""
-        return self.place.start if isinstance(self.place, JointPlace) else self.place.pose
+        return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 
-def frames_between(outer: Place | None, inner: Place | None) -> Pose:
+def frames_between(outer: Frame | None, inner: Frame | None) -> Pose:
     """Return the frame `inner` in the frame `outer` around it, with all joints between as they are now."""
     pose = Pose()
     while inner is not None and inner is not outer:
@@ -52,13 +52,13 @@ def frames_between(outer: Place | None, inner: Place | None) -> Pose:
     return pose
 
 
-def link_around(place: Place | None, links: Sequence[Link]) -> Link | None:
+def link_around(place: Frame | None, links: Sequence[Link]) -> Link | None:
     """Return the innermost link that a place is on; None if it is on none."""
     by_place = {link.place: link for link in links}
-    around: Iterator[Place] = iter(()) if place is None else place.chain()
+    around: Iterator[Frame] = iter(()) if place is None else place.chain()
     return next((by_place[it] for it in around if it in by_place), None)
 
 
-def _scaled(place: Place) -> Pose:
+def _scaled(place: Frame) -> Pose:
     parent, pose = place.parent, place.pose
     return pose if parent is None or parent.scale == 1.0 else pose.scaled(parent.scale)

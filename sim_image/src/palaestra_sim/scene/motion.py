@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector, turn
-from palaestra_sim.scene.joints import JointPlace
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.joints import JointFrame
 
 _REST: Vector = (0.0, 0.0, 0.0)
 
@@ -23,7 +23,7 @@ class Motion(NamedTuple):
     turning: Vector = _REST
 
 
-def motion_of(place: Place, body: Body | None) -> Motion:
+def motion_of(place: Frame, body: Body | None) -> Motion:
     """Return the motion of a place on a robot; `body` is the robot's."""
     point = place.ground_pose.position
     velocity, turning = _REST, _REST
@@ -32,7 +32,7 @@ def motion_of(place: Place, body: Body | None) -> Motion:
         turning = (0.0, 0.0, omega)
         velocity = _sum((vx, vy, 0.0), _cross(turning, (point[0] - body.x, point[1] - body.y, 0.0)))
     for link in place.chain():
-        if isinstance(link, JointPlace) and link.joint.turning:
+        if isinstance(link, JointFrame) and link.joint.turning:
             added = _of_joint(link, link.joint.turning, point)
             velocity, turning = _sum(velocity, added.velocity), _sum(turning, added.turning)
     return Motion(place.from_ground(velocity), place.from_ground(turning))
@@ -43,7 +43,7 @@ class Trail:
 
     __slots__ = ("_before", "_body", "_place", "_step_s")
 
-    def __init__(self, place: Place, body: Body | None) -> None:
+    def __init__(self, place: Frame, body: Body | None) -> None:
         self._place = place
         self._body = body
         self.reset()
@@ -67,7 +67,7 @@ class Trail:
         return x, y, z
 
 
-def _of_joint(end: JointPlace, speed: float, point: Vector) -> Motion:
+def _of_joint(end: JointFrame, speed: float, point: Vector) -> Motion:
     """Return what a motor adds to the motion of a point on the end of its joint, in axes of the ground."""
     around = end.parent.ground_pose if end.parent is not None else None
     axis, anchor = end.joint.axis, end.joint.anchor

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Protocol
 
-from palaestra_sim.scene.eyes import MOST_PIXELS, Eye
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.camera_interface import MOST_PIXELS, CameraInterface
 
 log = logging.getLogger(__name__)
 _FRAME_MS: Final = 40
@@ -41,7 +41,7 @@ class Movie:
     frames_s: Fraction = Fraction(1000, _FRAME_MS)
 
 
-class Film(Protocol):
+class VideoWriter(Protocol):
     """The file of a movie. Until it is finished, nothing is at its path; it is abandoned by dropping it."""
 
     def add(self, pixels: bytes | memoryview) -> None:
@@ -75,15 +75,15 @@ class Movies:
 
     def __init__(
         self,
-        view: Callable[[tuple[int, int]], Eye | None],
-        film: Callable[[Movie], Film | None],
+        view: Callable[[tuple[int, int]], CameraInterface | None],
+        film: Callable[[Movie], VideoWriter | None],
         basic_step_ms: int,
     ) -> None:
         self.failed = False
         self._view = view
         self._new_film = film
         self._basic_step_ms = basic_step_ms
-        self._film: Film | None = None
+        self._film: VideoWriter | None = None
         self._size = (0, 0)
         self._every_ms = 0
         self._elapsed_ms = 0

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.dynamic_solids import DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Push
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reader import Scene
+from palaestra_sim.scene.reader import SceneContents
 from palaestra_sim.scene.robot import Robot
-from palaestra_sim.seam import UnsimulatedError
 
 NOTHING: Final[Vector] = (0.0, 0.0, 0.0)
 
@@ -28,7 +28,7 @@ class NodeMotion:
         robot_of: returns the robot of a Robot node; None for any other node.
     """
 
-    def __init__(self, scene: Scene, robot_of: Callable[[SceneNode], Robot | None]) -> None:
+    def __init__(self, scene: SceneContents, robot_of: Callable[[SceneNode], Robot | None]) -> None:
         self._scene = scene
         self._robot_of = robot_of
 
@@ -90,7 +90,7 @@ class NodeMotion:
         place = self._require_forces(node, "torques")
         self._push(node, Push(torque=_turned(place, torque, relative=relative)))
 
-    def _require_forces(self, node: SceneNode, what: str) -> Place:
+    def _require_forces(self, node: SceneNode, what: str) -> Frame:
         place = _place(node)
         abilities = self._scene.physics.abilities
         if not abilities.forces:
@@ -102,17 +102,17 @@ class NodeMotion:
         if target is not None:
             self._scene.physics.push(target, push)
 
-    def _loose_of(self, node: SceneNode) -> Loose | None:
+    def _loose_of(self, node: SceneNode) -> DynamicSolid | None:
         return next((thing for thing in self._scene.loose if thing.node is node), None)
 
 
-def _place(node: SceneNode) -> Place:
+def _place(node: SceneNode) -> Frame:
     """Return the place of a node; in Webots a node without one crashes the controller."""
     if node.place is None:
         raise UnsimulatedError(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
     return node.place
 
 
-def _turned(place: Place, vector: Vector, *, relative: bool) -> Vector:
+def _turned(place: Frame, vector: Vector, *, relative: bool) -> Vector:
     """Return a vector in the axes of the ground."""
     return place.ground_pose.turned(vector) if relative else place.to_ground(vector)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from palaestra_sim.scene.frames import Y_UP, Frame
 from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, to_axis_angle, transposed, turned
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Y_UP, Place
 
 # Each has the axes of today as columns, in those of the file.
 _LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
@@ -32,12 +32,12 @@ def standing(node: SceneNode, frame: Pose) -> Pose:
     return frame.after(_STANDING)
 
 
-def looking(node: SceneNode, place: Place) -> Place:
+def looking(node: SceneNode, place: Frame) -> Frame:
     """Return the frame of a device that looks along x with z up; in an old file it is -z with y up."""
     return _in_axes(node, place, _LOOKING)
 
 
-def pointing(node: SceneNode, place: Place) -> Place:
+def pointing(node: SceneNode, place: Frame) -> Frame:
     """Return the frame of a device that points along x with z up; in an old file it is z with y up."""
     return _in_axes(node, place, _POINTING)
 
@@ -49,7 +49,7 @@ def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
     return turned(rotation, _LOOKING)
 
 
-def _in_axes(node: SceneNode, place: Place, axes: Matrix) -> Place:
+def _in_axes(node: SceneNode, place: Frame, axes: Matrix) -> Frame:
     if not of_old_axes(node):
         return place
-    return Place(place, (0.0, 0.0, 0.0), to_axis_angle(axes))
+    return Frame(place, (0.0, 0.0, 0.0), to_axis_angle(axes))

@@ -11,18 +11,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body, Build
-from palaestra_sim.scene.drawn import View
-from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
+from palaestra_sim.scene.dynamic_solids import DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose
-from palaestra_sim.scene.movies import Film, Movie
+from palaestra_sim.scene.movies import Movie, VideoWriter
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.physics_settings import PhysicsSettings
+from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.scene.surroundings import Surroundings
+from palaestra_sim.scene.visuals import View
 
 Cast = Callable[[], Sequence[float]]
 
@@ -36,7 +36,7 @@ class Figure(Protocol):
         powered: whether its motors turn.
     """
 
-    place: Place
+    place: Frame
     body: Body | None
     powered: bool
 
@@ -96,7 +96,7 @@ class Physics(Protocol):
         """Return the body of a robot that is being read, at the origin of the world and at rest."""
         ...
 
-    def begin(self, surroundings: Surroundings) -> None:
+    def begin(self, surroundings: PhysicsSettings) -> None:
         """Take what holds everywhere in the world, before anything is arranged in it."""
         ...
 
@@ -104,7 +104,7 @@ class Physics(Protocol):
         self,
         figures: Sequence[Figure],
         solids: Sequence[Shape],
-        loose: Sequence[Loose],
+        loose: Sequence[DynamicSolid],
         doors: Sequence[Link] = (),
     ) -> None:
         """Take these robots, obstacles and loose things as the contents of the world, where they are now.
@@ -129,7 +129,7 @@ class Physics(Protocol):
         """Return the same for beams that meet what is visible, and pass the robot itself."""
         ...
 
-    def push(self, target: Figure | Loose, push: Push) -> None:
+    def push(self, target: Figure | DynamicSolid, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
         ...
 
@@ -137,11 +137,11 @@ class Physics(Protocol):
         """Take what cameras see of the world; a physics that draws nothing ignores it."""
         ...
 
-    def eye(self, place: Place, lens: Lens) -> Eye | None:
+    def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
         """Return a camera; None if this physics draws nothing."""
         ...
 
-    def film(self, movie: Movie) -> Film | None:
+    def film(self, movie: Movie) -> VideoWriter | None:
         """Return a film to record a movie on; None if this physics draws nothing.
 
         Raises:

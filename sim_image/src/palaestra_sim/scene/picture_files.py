@@ -10,9 +10,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene import png
-from palaestra_sim.scene.raster import Raster
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.scene.image_buffer import ImageBuffer
 
 _JPEG: Final = (".jpeg", ".jpg")
 _MOST_PIXELS: Final = 4096 * 4096
@@ -50,7 +50,7 @@ def save(
     return True
 
 
-def load(path: str) -> Raster | None:
+def load(path: str) -> ImageBuffer | None:
     """Return the picture of a PNG or JPEG file; None if it cannot be read.
 
     Raises:
@@ -65,7 +65,7 @@ def load(path: str) -> Raster | None:
             pixels = bytearray(image.convert("RGBA").tobytes("raw", "BGRA"))
     except (OSError, SyntaxError, ValueError, images.DecompressionBombError):
         return None
-    return Raster(width=width, height=height, pixels=pixels)
+    return ImageBuffer(width=width, height=height, pixels=pixels)
 
 
 def pillow(module: str) -> Any:

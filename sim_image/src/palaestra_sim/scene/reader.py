@@ -13,18 +13,18 @@ from typing import Final
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.axes import read_axes
 from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.dynamic_solids import DynamicFrame, DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.joint_reader import fill_door, read_door
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose, LoosePlace
-from palaestra_sim.scene.matter import DENSITY, volume_m3
+from palaestra_sim.scene.mass import DENSITY, volume_m3
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reading import ELSEWHERE, LeaveOut, Reading
+from palaestra_sim.scene.physics_settings import Floor, PhysicsSettings, read_surroundings
 from palaestra_sim.scene.robot_reader import RobotParts, read_robot
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.scene.surroundings import Floor, Surroundings, read_surroundings
 from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader
 
 # Visible to people and cameras only, or read elsewhere (WorldInfo).
 DRAWN_ONLY: Final = frozenset(
@@ -53,7 +53,7 @@ _JOINTS: Final = _ONE_AXIS | frozenset(("BallJoint", "Hinge2Joint"))
 
 
 @dataclass(slots=True, kw_only=True)
-class Scene:
+class SceneContents:
     """The contents of a world.
 
     Attributes:
@@ -75,24 +75,24 @@ class Scene:
     basic_step_ms: int = 32
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
-    loose: list[Loose] = field(default_factory=list)
+    loose: list[DynamicSolid] = field(default_factory=list)
     heavy: list[tuple[SceneNode, Sequence[Shape]]] = field(default_factory=list)
     doors: list[Link] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
-    top: Place | None = None
-    surroundings: Surroundings = field(default_factory=Surroundings)
+    top: Frame | None = None
+    surroundings: PhysicsSettings = field(default_factory=PhysicsSettings)
     left_out: tuple[WorldError, ...] = ()
     leave_out: LeaveOut = field(default_factory=LeaveOut)
 
 
-def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> Scene:
+def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> SceneContents:
     """Return the contents of a world, and give its nodes their places; its robots have bodies of `physics`.
 
     Raises:
         WorldError: it has things that cannot be simulated; the error has all of them.
     """
-    reading = Reading(tree.refused, leave_out, physics.abilities.name)
-    scene = Scene(physics=physics)
+    reading = NodeReader(tree.refused, leave_out, physics.abilities.name)
+    scene = SceneContents(physics=physics)
     # First, because devices read it too, wherever it is in the file.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
@@ -115,7 +115,7 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     return scene
 
 
-def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: Scene) -> Scene:
+def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -> SceneContents:
     """Return what nodes add to a world, all inside one parent, and give them their places.
 
     `to` has the contents of the world so far.
@@ -123,9 +123,9 @@ def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: Scene) -> Scene:
     Raises:
         WorldError: they have things that cannot be simulated.
     """
-    reading = Reading((), to.leave_out, to.physics.abilities.name)
+    reading = NodeReader((), to.leave_out, to.physics.abilities.name)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
-    scene = Scene(physics=to.physics)
+    scene = SceneContents(physics=to.physics)
     for node in nodes:
         places = (around.place for around in node.ancestors() if around.place is not None)
         _read(reading, node, next(places, to.top), scene)
@@ -133,7 +133,7 @@ def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: Scene) -> Scene:
     return scene
 
 
-def _read_world_info(reading: Reading, node: SceneNode, scene: Scene) -> None:
+def _read_world_info(reading: NodeReader, node: SceneNode, scene: SceneContents) -> None:
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
         fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
@@ -142,7 +142,7 @@ def _read_world_info(reading: Reading, node: SceneNode, scene: Scene) -> None:
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
 
 
-def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+def _read(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
     kind = node.type_name
     if kind in DRAWN_ONLY:
         return
@@ -162,7 +162,7 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
         reading.lacks(node, node.unusable or f"{scene.physics.abilities.name} simulates no {kind}")
 
 
-def _read_joint(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+def _read_joint(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
     """Read a joint that is on no robot: without physics nothing moves its end."""
     if scene.physics.abilities.joints and node.type_name in _ONE_AXIS:
         link = read_door(reading, node, parent)
@@ -176,9 +176,9 @@ def _read_joint(reading: Reading, node: SceneNode, parent: Place | None, scene: 
             _read(reading, end, parent, scene)
 
 
-def _read_door_end(reading: Reading, link: Link, scene: Scene) -> None:
+def _read_door_end(reading: NodeReader, link: Link, scene: SceneContents) -> None:
     """Read what is on a joint that swings; Solids without physics are fixed to it."""
-    inside = Scene(physics=scene.physics)
+    inside = SceneContents(physics=scene.physics)
     _read_children(reading, link.node, link.place, inside)
     shapes = [*bounding_shapes(reading, link.node, link.place), *inside.solids]
     if not link.node.left_out:
@@ -189,8 +189,8 @@ def _read_door_end(reading: Reading, link: Link, scene: Scene) -> None:
     scene.robots += inside.robots
 
 
-def _read_frame(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
-    place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
+def _read_frame(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
+    place = Frame(parent, reading.translation(node), reading.rotation(node), reading.size(node))
     node.place = place
     if node.left_out:
         return
@@ -199,7 +199,7 @@ def _read_frame(reading: Reading, node: SceneNode, parent: Place | None, scene: 
     _read_children(reading, node, place, scene)
 
 
-def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+def _read_children(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
     for child in node.nodes():
         _read(reading, child, parent, scene)
 
@@ -224,7 +224,7 @@ def _is_fixed(node: SceneNode) -> bool:
     return False
 
 
-def _densities(reading: Reading, node: SceneNode, shapes: Sequence[Shape]) -> dict[Shape, float]:
+def _densities(reading: NodeReader, node: SceneNode, shapes: Sequence[Shape]) -> dict[Shape, float]:
     """Return the densities of the shapes of a Solid in kg/m3, from its mass or its density."""
     # A stand-in has no physics of its own, but the mass of its PROTO.
     described = next(iter(node.nodes("physics")), node)
@@ -235,11 +235,11 @@ def _densities(reading: Reading, node: SceneNode, shapes: Sequence[Shape]) -> di
     return dict.fromkeys(shapes, density if density > 0.0 else DENSITY)
 
 
-def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+def _read_loose(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
     """Read a Solid that moves when it is pushed, with the Solids that are fixed to it."""
-    place = LoosePlace(parent, reading.translation(node), reading.rotation(node), reading.size(node))
+    place = DynamicFrame(parent, reading.translation(node), reading.rotation(node), reading.size(node))
     node.place = place
-    fixed = Scene(physics=scene.physics)
+    fixed = SceneContents(physics=scene.physics)
     _read_children(reading, node, place, fixed)
     shapes = [*bounding_shapes(reading, node, place), *fixed.solids]
     heavy = {shape for _, some in fixed.heavy for shape in some}
@@ -248,7 +248,7 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
         densities |= _densities(reading, inner, some)
     if shapes and not node.left_out:
         scene.loose.append(
-            Loose(
+            DynamicSolid(
                 node=node,
                 place=place,
                 shapes=tuple(shapes),
@@ -260,7 +260,7 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
     scene.robots += fixed.robots
 
 
-def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
+def _read_solid(reading: NodeReader, node: SceneNode, place: Frame, scene: SceneContents) -> None:
     name = scene.physics.abilities.name
     if node.nodes("physics") and not _is_fixed(node):
         fact = f"a {node.type_name} with physics moves when it is pushed, which {name} does not simulate"
@@ -275,7 +275,7 @@ def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -
         _stand(reading, shapes, scene)
 
 
-def _stand(reading: Reading, shapes: Iterable[Shape], scene: Scene) -> None:
+def _stand(reading: NodeReader, shapes: Iterable[Shape], scene: SceneContents) -> None:
     """Make obstacles of shapes that stand or lie."""
     for shape in shapes:
         if not (shape.upright or scene.physics.abilities.leaning):

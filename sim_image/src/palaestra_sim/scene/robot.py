@@ -14,20 +14,20 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 
 from palaestra_sim.scene.battery import Battery
-from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.devices.kind import Sample, Source
-from palaestra_sim.scene.drawn import View
-from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.devices.device_type import Sample, ValueSource
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motion import Motion, Trail, motion_of
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import FieldContent
 from palaestra_sim.scene.physics import Cast, Physics
-from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.robot_reader import RobotParts
-from palaestra_sim.scene.sight import Glance, Sight
+from palaestra_sim.scene.sensor_rays import Beam
+from palaestra_sim.scene.visual_rays import Glance, VisualRays
+from palaestra_sim.scene.visuals import View
 
 
 class Robot:
@@ -52,8 +52,8 @@ class Robot:
         self._view = view
         self.name = parts.name
         self.motors: dict[str, Motor] = parts.devices.motors
-        self.sensors: Mapping[str, Source] = parts.devices.sensors
-        self.place: Place = parts.place
+        self.sensors: Mapping[str, ValueSource] = parts.devices.sensors
+        self.place: Frame = parts.place
         self.body: Body | None = parts.body
         self.battery = Battery(parts.node)
         self.powered = True
@@ -97,9 +97,9 @@ class Robot:
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
         """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
-        return Sight(self._view, self.place, beams).cast
+        return VisualRays(self._view, self.place, beams).cast
 
-    def eye(self, place: Place, lens: Lens) -> Eye | None:
+    def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
         """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""
         return self._physics.eye(place, lens)
 
@@ -108,11 +108,11 @@ class Robot:
         _, device = self.parts.devices.rows.get(name, (None, None))
         return device
 
-    def motion(self, place: Place) -> Motion:
+    def motion(self, place: Frame) -> Motion:
         """Return how a place on the robot moves in the world; see `Carrier`."""
         return motion_of(place, self.body)
 
-    def follow(self, place: Place) -> Callable[[], Vector]:
+    def follow(self, place: Frame) -> Callable[[], Vector]:
         """Return a function that returns the acceleration of a place; see `Carrier`."""
         trail = Trail(place, self.body)
         self._trails.append(trail)

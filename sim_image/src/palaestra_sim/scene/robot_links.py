@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.joints import JointPlace
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.joints import JointFrame
 from palaestra_sim.scene.links import Link, link_around
-from palaestra_sim.scene.matter import Matter, read_matter
+from palaestra_sim.scene.mass import MassProperties, read_matter
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheels import Driven
 
 _CLEARANCE_M: Final = 0.01  # an end that is lower above the floor rolls on it
@@ -33,23 +33,23 @@ class Parts:
         measured: parts whose force on the robot is measured, so far without shapes and masses.
     """
 
-    nodes: Sequence[tuple[SceneNode, Place]]
+    nodes: Sequence[tuple[SceneNode, Frame]]
     shapes: Sequence[Shape]
     wheels: Sequence[Driven]
     measured: Sequence[Link]
 
     @property
-    def heavy(self) -> list[tuple[SceneNode, Place]]:
+    def heavy(self) -> list[tuple[SceneNode, Frame]]:
         """The nodes with physics."""
         return [(node, place) for node, place in self.nodes if node.nodes("physics")]
 
 
-def links_among(reading: Reading, parts: Parts) -> tuple[tuple[Link, ...], tuple[Matter, ...]]:
+def links_among(reading: NodeReader, parts: Parts) -> tuple[tuple[Link, ...], tuple[MassProperties, ...]]:
     """Return the links of a robot, outer ones first, and the masses of what is on none of them."""
     links = [
         Link(node=node, place=place, joint=place.joint)
         for node, place in parts.nodes
-        if isinstance(place, JointPlace) and _moves(place, parts)
+        if isinstance(place, JointFrame) and _moves(place, parts)
     ]
     links += [link for link in parts.measured if link.node.nodes("physics")]
     links.sort(key=lambda link: sum(1 for _ in link.place.chain()))
@@ -73,8 +73,8 @@ def shapes_on(link: Link | None, links: Sequence[Link], shapes: Sequence[Shape])
 
 
 def _matter_on(
-    link: Link | None, links: Sequence[Link], reading: Reading, parts: Parts
-) -> tuple[Matter, ...]:
+    link: Link | None, links: Sequence[Link], reading: NodeReader, parts: Parts
+) -> tuple[MassProperties, ...]:
     on_it = shapes_on(link, links, parts.shapes)
     return tuple(
         read_matter(reading, node, place, [shape for shape in on_it if shape.place is place])
@@ -83,9 +83,9 @@ def _matter_on(
     )
 
 
-def _moves(end: JointPlace, parts: Parts) -> bool:
+def _moves(end: JointFrame, parts: Parts) -> bool:
     """Return whether forces move the end of a joint."""
-    motors = [place.joint.motor for place in end.chain() if isinstance(place, JointPlace)]
+    motors = [place.joint.motor for place in end.chain() if isinstance(place, JointFrame)]
     rolling = {found.motor for found in parts.wheels}
     if any(motor in rolling for motor in motors if motor is not None):
         return False
@@ -94,7 +94,7 @@ def _moves(end: JointPlace, parts: Parts) -> bool:
     return end.joint.motor is not None or not _rolls(end, parts)
 
 
-def _rolls(end: JointPlace, parts: Parts) -> bool:
+def _rolls(end: JointFrame, parts: Parts) -> bool:
     """Return whether something on a joint reaches the floor on which the robot drives."""
     if not parts.wheels:
         return False

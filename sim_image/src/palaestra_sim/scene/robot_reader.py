@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from palaestra_sim.scene.arguments import Arguments, read_arguments
-from palaestra_sim.scene.base import Base
+from palaestra_sim.scene.arguments import ControllerArguments, read_arguments
 from palaestra_sim.scene.bodies import Body, Build
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.devices.kind import Devices, Kind, Part, Shaft
-from palaestra_sim.scene.drive import find_drive
+from palaestra_sim.scene.devices.device_type import DevicePart, Devices, DeviceType, Shaft
+from palaestra_sim.scene.frames import Y_UP, Frame, YUp
 from palaestra_sim.scene.geometry import (
     IDENTITY,
     AxisAngle,
@@ -28,18 +27,19 @@ from palaestra_sim.scene.geometry import (
     turned,
 )
 from palaestra_sim.scene.joint_reader import parameters_of, read_joint
-from palaestra_sim.scene.joints import Joint, JointPlace, unit
+from palaestra_sim.scene.joints import Joint, JointFrame, unit
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.matter import Matter
+from palaestra_sim.scene.mass import MassProperties
+from palaestra_sim.scene.mobile_base import MobileBase
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Y_UP, Place, YUp
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.robot_frame import RobotFrame, TurnedFrame
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
-from palaestra_sim.scene.robot_place import RobotPlace, TurnedPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.validation import NodeReader
+from palaestra_sim.scene.wheel_kinematics import find_drive
 from palaestra_sim.scene.wheels import Driven, wheels_among
 
 # A SolidReference closes a loop of joints; the solid is read where it is written.
@@ -80,21 +80,21 @@ class RobotParts:
 
     node: SceneNode
     name: str
-    place: Place
+    place: Frame
     devices: Devices
     body: Body | None
     standing: tuple[Shape, ...] = ()
-    arguments: Arguments | None = None
+    arguments: ControllerArguments | None = None
     links: tuple[Link, ...] = ()
 
 
-def read_robot(reading: Reading, node: SceneNode, parent: Place | None, physics: Physics) -> RobotParts:
+def read_robot(reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> RobotParts:
     """Return the robot at `node`, and give it and its parts their places."""
     return _RobotReader(reading, node, parent, physics).read()
 
 
 class _RobotReader:
-    def __init__(self, reading: Reading, node: SceneNode, parent: Place | None, physics: Physics) -> None:
+    def __init__(self, reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> None:
         self._physics = physics
         self._reading = reading
         self._node = node
@@ -103,13 +103,13 @@ class _RobotReader:
         self._devices = Devices()
         # Where the robot stands does not matter to its parts: they are read in its own frame, with z up.
         self._y_points_up = self._has_y_up()
-        self._frame = Place(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
+        self._frame = Frame(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
         self._carried: list[Shape] = []  # of what motors move, if forces matter
         self._measured: list[Link] = []
         self._driven: list[Driven] = []
-        self._parts: list[tuple[SceneNode, Place]] = []
+        self._parts: list[tuple[SceneNode, Frame]] = []
 
     def read(self) -> RobotParts:
         """Return the robot."""
@@ -125,7 +125,7 @@ class _RobotReader:
                 found.motor.kinematic = False
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
         links: tuple[Link, ...] = ()
-        matter: tuple[Matter, ...] = ()
+        matter: tuple[MassProperties, ...] = ()
         if self._forces:
             links, matter = links_among(reading, self._all_parts(shapes, wheels))
             shapes = list(shapes_on(None, links, shapes))
@@ -133,12 +133,12 @@ class _RobotReader:
         heights = self._heights(wheels)
         body = None
         if moves:
-            base = Base([it.motor for it in wheels], drive)
+            base = MobileBase([it.motor for it in wheels], drive)
             body = self._physics.body(
                 Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
             )
         place = self._place(body)
-        own = TurnedPlace(place, Y_UP) if self._y_points_up else place
+        own = TurnedFrame(place, Y_UP) if self._y_points_up else place
         self._settle(own)
         return RobotParts(
             node=node,
@@ -165,11 +165,11 @@ class _RobotReader:
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
         """Return whether a robot without a drive has a body: upright, at the top of the world."""
-        return bool(shapes) and self._at_top and Place(self._parent, *self._start).ground_pose.upright
+        return bool(shapes) and self._at_top and Frame(self._parent, *self._start).ground_pose.upright
 
     def _has_y_up(self) -> bool:
         """Return whether y of the robot points up, as in worlds whose y axis does."""
-        frame = Place(self._parent, *_where(self._reading, self._node))
+        frame = Frame(self._parent, *_where(self._reading, self._node))
         z_up = Pose(rotation=transposed(Y_UP))
         return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(z_up).upright
 
@@ -192,22 +192,22 @@ class _RobotReader:
         floor = min((found.bottom for found in wheels), default=min(ends) - _STEP_M)
         return max(min(ends), floor + _STEP_M), max(ends)
 
-    def _place(self, body: Body | None) -> Place:
+    def _place(self, body: Body | None) -> Frame:
         node = self._node
         translation, rotation = self._start
         if body is None:
-            return Place(self._parent, translation, rotation)
+            return Frame(self._parent, translation, rotation)
         if not self._at_top:
             self._lacks(node, "a robot that drives inside another node")
-        if not Place(self._parent, translation, rotation).ground_pose.upright:
+        if not Frame(self._parent, translation, rotation).ground_pose.upright:
             self._lacks(node, "a robot that drives, but does not stand upright")
-        return RobotPlace(self._parent, translation, rotation, body)
+        return RobotFrame(self._parent, translation, rotation, body)
 
-    def _on(self, place: Place, shape: Shape) -> Shape:
+    def _on(self, place: Frame, shape: Shape) -> Shape:
         """Return a shape that was read in the robot's own frame, on the robot."""
         return replace(shape, place=place) if shape.place is self._frame else shape
 
-    def _settle(self, place: Place) -> None:
+    def _settle(self, place: Frame) -> None:
         """Put the parts, read in a frame of their own, on the robot."""
         self._node.place = place
         for part, part_place in self._parts:
@@ -222,11 +222,11 @@ class _RobotReader:
         else:
             node.left_out = True
 
-    def _read_children(self, node: SceneNode, place: Place) -> None:
+    def _read_children(self, node: SceneNode, place: Frame) -> None:
         for child in (*node.nodes(), *node.nodes("endPoint")):
             self._read_part(child, place)
 
-    def _read_part(self, node: SceneNode, place: Place) -> None:
+    def _read_part(self, node: SceneNode, place: Frame) -> None:
         kind = node.type_name
         if kind in _JOINTS:
             self._read_joint(node, place)
@@ -235,11 +235,11 @@ class _RobotReader:
         elif kind in {"Group", "Slot"}:
             self._read_children(node, place)
         elif kind in _FRAMES:
-            self._read_frame(node, Place(place, *_where(self._reading, node), self._reading.size(node)))
+            self._read_frame(node, Frame(place, *_where(self._reading, node), self._reading.size(node)))
         elif kind not in _INERT:
             self._lacks(node, node.unusable or f"{self._reading.simulator} simulates no {kind} on a robot")
 
-    def _read_frame(self, node: SceneNode, place: Place) -> None:
+    def _read_frame(self, node: SceneNode, place: Frame) -> None:
         self._parts.append((node, place))
         if node.type_name in _MOUNTED:
             self._read_device(_MOUNTED[node.type_name], node, place)
@@ -250,7 +250,7 @@ class _RobotReader:
             self._read_track(node, place)
         self._read_children(node, place)
 
-    def _read_track(self, node: SceneNode, place: Place) -> None:
+    def _read_track(self, node: SceneNode, place: Frame) -> None:
         """Take a track as fixed, with a belt that may drive the robot."""
         shapes = list(bounding_shapes(self._reading, node, place))
         motor = self._read_devices_of(node, node, place, Joint(axis=(1.0, 0.0, 0.0), slides=True))
@@ -265,7 +265,7 @@ class _RobotReader:
                 Driven(motor=motor, axle=axle, anchor=frame.position, shape=lowest, belt=True)
             )
 
-    def _read_joint(self, node: SceneNode, place: Place) -> None:
+    def _read_joint(self, node: SceneNode, place: Frame) -> None:
         """Take the motor and the sensor of a joint, and what is on it."""
         reading = self._reading
         if place.scale != 1.0:
@@ -284,9 +284,9 @@ class _RobotReader:
             else:
                 self._read_part(end, place)
 
-    def _read_end(self, end: SceneNode, place: Place, joint: Joint) -> None:
+    def _read_end(self, end: SceneNode, place: Frame, joint: Joint) -> None:
         reading = self._reading
-        inner = JointPlace(place, reading.translation(end), reading.rotation(end), joint)
+        inner = JointFrame(place, reading.translation(end), reading.rotation(end), joint)
         if end.type_name == "Solid":
             shapes = list(bounding_shapes(reading, end, inner))
             found = self._as_driven(joint, place, shapes, end)
@@ -297,7 +297,7 @@ class _RobotReader:
         self._read_frame(end, inner)
 
     def _as_driven(
-        self, joint: Joint, place: Place, shapes: Sequence[Shape], end: SceneNode
+        self, joint: Joint, place: Frame, shapes: Sequence[Shape], end: SceneNode
     ) -> Driven | None:
         round_ones = [shape for shape in shapes if shape.kind != "box"]
         if joint.motor is None or joint.slides or not round_ones or _moves(place):
@@ -308,10 +308,10 @@ class _RobotReader:
             axle=turn(frame.rotation, joint.axis),
             anchor=frame.carry(joint.anchor),
             shape=max(round_ones, key=lambda shape: shape.size[0]),
-            roller=self._lowest_roller(end, JointPlace(place, *_where(self._reading, end), joint)),
+            roller=self._lowest_roller(end, JointFrame(place, *_where(self._reading, end), joint)),
         )
 
-    def _lowest_roller(self, wheel: SceneNode, place: Place) -> Vector | None:
+    def _lowest_roller(self, wheel: SceneNode, place: Frame) -> Vector | None:
         """Return the axis of the roller of a wheel that is on the floor; None if it has none."""
         lowest: tuple[float, Vector] | None = None
         for node in wheel.nodes():
@@ -325,13 +325,13 @@ class _RobotReader:
                 lowest = height, turn(place.world_pose.rotation, axis)
         return None if lowest is None else lowest[1]
 
-    def _read_loose_joint(self, node: SceneNode, place: Place) -> None:
+    def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
         """Take a joint without motors, such as a caster, as fixed, with all that is on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
             if end.type_name == "Solid":
-                inner = Place(place, *_where(self._reading, end))
+                inner = Frame(place, *_where(self._reading, end))
                 self._on_joints += bounding_shapes(self._reading, end, inner)
                 self._parts.append((end, inner))
                 self._read_children(end, inner)
@@ -339,7 +339,7 @@ class _RobotReader:
                 self._read_part(end, place)
 
     def _read_devices_of(
-        self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
+        self, node: SceneNode, parameters: SceneNode, place: Frame, joint: Joint
     ) -> Motor | None:
         stops = [self._reading.number(parameters, name, 0.0) for name in ("minStop", "maxStop")]
         shaft = Shaft(joint=joint)
@@ -355,11 +355,11 @@ class _RobotReader:
         return shaft.motor
 
     def _read_device(
-        self, kind: Kind[Any], node: SceneNode, place: Place, shaft: Shaft | None = None
+        self, kind: DeviceType[Any], node: SceneNode, place: Frame, shaft: Shaft | None = None
     ) -> object:
         """Return the device at `node`, now one of the robot's."""
         name = node.text("name") or kind.name
-        part = Part(
+        part = DevicePart(
             reading=self._reading,
             lacks=self._lacks,
             node=node,
@@ -384,9 +384,9 @@ class _RobotReader:
         return device
 
 
-def _moves(place: Place) -> bool:
+def _moves(place: Frame) -> bool:
     """Return whether a motor can move a place on its robot."""
-    return any(isinstance(it, JointPlace) and it.joint.motor is not None for it in place.chain())
+    return any(isinstance(it, JointFrame) and it.joint.motor is not None for it in place.chain())
 
 
 def _end_has_physics(joint: SceneNode) -> bool:
@@ -397,7 +397,7 @@ def _end_has_physics(joint: SceneNode) -> bool:
     )
 
 
-def _where(reading: Reading, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:
+def _where(reading: NodeReader, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:
     return reading.translation(node), reading.rotation(node)
 
 

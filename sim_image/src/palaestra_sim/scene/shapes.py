@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import IDENTITY, Matrix, Pose, Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.validation import NodeReader
 
 _ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
@@ -28,7 +28,7 @@ class Shape:
     kind: Literal["box", "cylinder", "ball"]
     size: Vector
     local: Pose
-    place: Place
+    place: Frame
     node: SceneNode
 
     @property
@@ -66,7 +66,7 @@ class Shape:
         return sum(abs(rotation[3 * axis + side]) * self.size[side] for side in range(3)) / 2.0
 
 
-def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
+def bounding_shapes(reading: NodeReader, owner: SceneNode, place: Frame) -> Iterator[Shape]:
     """Yield the shapes of a node's boundingObject that can be simulated; the others are refused."""
     grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
@@ -95,7 +95,7 @@ class _Grown(NamedTuple):
         return self.scale[0] == self.scale[1] == self.scale[2]
 
 
-def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
     match node.type_name:
         case "Shape":
             for inner in node.nodes("geometry"):
@@ -121,7 +121,7 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> I
             yield from _solid(reading, node, place, grown)
 
 
-def _solid(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+def _solid(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
     """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
     kind: Literal["box", "cylinder", "ball"] = "cylinder"
     local = standing(node, grown.frame) if node.type_name in _ALONG_AN_AXIS else grown.frame
@@ -148,7 +148,7 @@ def _solid(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> It
     yield Shape(kind=kind, size=size, local=local, place=place, node=node)
 
 
-def _mesh(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+def _mesh(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
     """Yield the box around the points of a mesh."""
     points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
     if not points or len(points) % 3:

@@ -17,28 +17,28 @@ import math
 from collections.abc import Callable
 
 from palaestra_sim.errors import SimError, WorldError
-from palaestra_sim.scene.air import Air
 from palaestra_sim.scene.devices.connector import Connector
 from palaestra_sim.scene.devices.radar import Radar
-from palaestra_sim.scene.drawn import View
-from palaestra_sim.scene.echoes import echoes_of
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.node_motion import NodeMotion
-from palaestra_sim.scene.nodes.growing import Descriptions
+from palaestra_sim.scene.nodes.instantiate import Descriptions
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reader import Scene, read_added, read_scene
-from palaestra_sim.scene.reading import LeaveOut, Reading
+from palaestra_sim.scene.radar_targets import echoes_of
+from palaestra_sim.scene.radio import Radio
+from palaestra_sim.scene.reader import SceneContents, read_added, read_scene
 from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.saved_states import States, require_joint
 from palaestra_sim.scene.shapes import bounding_shapes
-from palaestra_sim.scene.states import States, require_joint
-from palaestra_sim.scene.tree.effects import require_removable, require_room
-from palaestra_sim.scene.tree.fields import Field
+from palaestra_sim.scene.tree.fields import NodeField
 from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.scene.tree.write_rules import require_removable, require_room
+from palaestra_sim.scene.validation import LeaveOut, NodeReader
 from palaestra_sim.scene.viewpoint import save_view, view
+from palaestra_sim.scene.visuals import View
 from palaestra_sim.world import World, parse
 
 
@@ -55,7 +55,7 @@ class Simulation:
         movies: of what the Viewpoint shows.
     """
 
-    def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
+    def __init__(self, tree: SceneTree, scene: SceneContents, mode: Mode) -> None:
         self.tree = tree
         self.scene = scene
         self._view = View(tree.root)
@@ -206,7 +206,7 @@ class Simulation:
             node.place.rotation = (x, y, z, angle_rad)
         self._moved(node.place)
 
-    def add(self, text: str, field: Field, index: int) -> bool:
+    def add(self, text: str, field: NodeField, index: int) -> bool:
         """Insert the nodes of `text` into a field, at once; False if the field has no place at `index`.
 
         A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
@@ -222,7 +222,11 @@ class Simulation:
         try:
             require_room(field.node, field.name, added)
             read = field.name == "children"  # other fields hold what is drawn
-            fresh = read_added(self.tree, added, self.scene) if read else Scene(physics=self.scene.physics)
+            fresh = (
+                read_added(self.tree, added, self.scene)
+                if read
+                else SceneContents(physics=self.scene.physics)
+            )
         except SimError:
             self.tree.forget(added)
             raise
@@ -307,7 +311,7 @@ class Simulation:
     def _assemble(self) -> None:
         """Connect the devices of all robots."""
         devices = [[it for _, it in robot.parts.devices.rows.values()] for robot in self.robots]
-        self._air = Air(devices)
+        self._air = Radio(devices)
         connectors = tuple(it for robot in devices for it in robot if isinstance(it, Connector))
         for connector in connectors:
             connector.others = connectors
@@ -325,7 +329,7 @@ class Simulation:
         """Read the outline of an obstacle anew, of which a part has another size."""
         owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
         if owner is not None and owner.place is not None:
-            fresh = bounding_shapes(Reading(), owner, owner.place)
+            fresh = bounding_shapes(NodeReader(), owner, owner.place)
             solids = self.scene.solids
             first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
             kept = [shape for shape in solids if shape.place is not owner.place]
@@ -333,7 +337,7 @@ class Simulation:
             self._show_to_radars()
             self._arrange()
 
-    def _moved(self, place: Place) -> None:
+    def _moved(self, place: Frame) -> None:
         """Update the places of the solids, if `place` is part of one of them."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from palaestra_sim.scene import picture_files
-from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Place
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.validation import NodeReader
 
 SIZE: Final = (800, 600)  # Webots has that of its window
 
@@ -25,14 +25,14 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
     return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)
 
 
-def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> Eye | None:
+def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInterface | None:
     """Return a camera where the Viewpoint is now; None if the simulator draws nothing."""
-    reading = Reading()
+    reading = NodeReader()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
     fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # of the longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))
     lens = Lens(size=size, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
-    place = looking(viewpoint, Place(None, (x, y, z), (ax, ay, az, angle_rad)))
+    place = looking(viewpoint, Frame(None, (x, y, z), (ax, ay, az, angle_rad)))
     return physics.eye(place, lens)

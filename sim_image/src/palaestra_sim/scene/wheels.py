@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.drive import Wheel
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.wheel_kinematics import Wheel
 
 _LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
 _OFF_CENTER: Final = 0.2  # of a wheel's radius: how far its center may be off the axle, its rim off the floor

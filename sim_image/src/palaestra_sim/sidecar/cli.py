@@ -15,7 +15,7 @@ from pathlib import Path
 
 from palaestra_protocol.control import LEFT_OUT_FILE, SidecarState, SimulatorState
 from palaestra_sim.errors import SidecarError, SimError
-from palaestra_sim.sidecar import metrics, preparation, project, signals
+from palaestra_sim.sidecar import metrics, project, signals, world_files
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
@@ -100,16 +100,16 @@ def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
         raise SidecarError(f"--driver {driver}: takes no program; use --driver command")
     if given.standby and given.job is None:
         raise SidecarError("--standby: two simulators need different ROS names; give --job and --work")
-    slots = preparation.SLOTS if given.standby else preparation.SLOTS[:1]
+    slots = world_files.SLOTS if given.standby else world_files.SLOTS[:1]
     return tuple(_simulator(given, driver, slot) for slot in slots)
 
 
 def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> SupervisedSimulator:
     """Return the simulator of one slot."""
     world = _world(given, slot)
-    robots = preparation.described(preparation.read(world), str(world))
+    robots = world_files.described(world_files.read(world), str(world))
     unchanged = world == Path(given.world).absolute()
-    root = given.root if unchanged else preparation.root_of_model(given.world, given.root)
+    root = given.root if unchanged else world_files.root_of_model(given.world, given.root)
     launch = Launch(world=world, root=root, options=given.option, program=given.program)
     left_out = _left_out(given, world)
     own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})
@@ -141,7 +141,7 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
     work, as_project = given.work.absolute(), Driver(given.driver) is Driver.WEBOTS
     if given.job is None:
-        return preparation.renamed(given.world, work, given.suffix, as_project=as_project, root=given.root)
+        return world_files.renamed(given.world, work, given.suffix, as_project=as_project, root=given.root)
     identity = RunIdentity(
         job=given.job,
         namespace=given.namespace,
@@ -151,8 +151,8 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         index=given.index,
         slot=slot,
     )
-    clock = given.clock and slot == preparation.SLOTS[0]
-    return preparation.named(given.world, work, identity, clock=clock, as_project=as_project, root=given.root)
+    clock = given.clock and slot == world_files.SLOTS[0]
+    return world_files.named(given.world, work, identity, clock=clock, as_project=as_project, root=given.root)
 
 
 def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
@@ -166,4 +166,4 @@ def _missing_controllers(given: argparse.Namespace) -> str | None:
     """Return a warning about controllers that Webots cannot find; None for other simulators."""
     if Driver(given.driver) is not Driver.WEBOTS:
         return None
-    return project.missing_controllers(given.world, preparation.read(given.world), os.environ)
+    return project.missing_controllers(given.world, world_files.read(given.world), os.environ)

@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from palaestra_sim.errors import SidecarError
-from palaestra_sim.sidecar.process import Command
+from palaestra_sim.sidecar.process import CommandLine
 
 WORLD = "{world}"  # in a command: the path of the world
 _NOT_ROOT = "palaestra"
@@ -42,7 +42,7 @@ class Launch:
     program: Sequence[str] = ()
 
 
-def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> Command:
+def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> CommandLine:
     """Return the command line that starts the simulator, with the full path of its program.
 
     Raises:
@@ -50,7 +50,7 @@ def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> C
     """
     arguments = _ARGUMENTS[driver](launch)
     own = {**environment, **_ENVIRONMENT[driver](environment)}
-    return Command(arguments=(_found(driver, arguments[0], environment), *arguments[1:]), environment=own)
+    return CommandLine(arguments=(_found(driver, arguments[0], environment), *arguments[1:]), environment=own)
 
 
 def _stub(launch: Launch) -> list[str]:

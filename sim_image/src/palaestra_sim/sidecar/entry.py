@@ -7,7 +7,7 @@ its sidecars import would stay for its whole grace period.
 import sys
 from importlib import import_module
 
-from palaestra_sim.sidecar.blocked import hold_back
+from palaestra_sim.sidecar.blocked_signals import hold_back
 
 
 def main() -> int:

@@ -36,7 +36,7 @@ from types import MappingProxyType
 from palaestra_protocol.control import SidecarState
 
 
-class Event(StrEnum):
+class LifecycleEvent(StrEnum):
     """An event: a request of the trainer, of the process, of the clock, or of the container's end."""
 
     START = "start"
@@ -70,27 +70,27 @@ Step = tuple[SidecarState, Action]
 _IDLE, _STARTING, _READY = SidecarState.IDLE, SidecarState.STARTING, SidecarState.READY
 _STOPPING, _FAILED = SidecarState.STOPPING, SidecarState.FAILED
 
-TABLE: MappingProxyType[tuple[SidecarState, Event], Step] = MappingProxyType(
+TABLE: MappingProxyType[tuple[SidecarState, LifecycleEvent], Step] = MappingProxyType(
     {
-        (_IDLE, Event.START): (_STARTING, Action.SPAWN),
-        (_IDLE, Event.SHUTDOWN): (_IDLE, Action.NOTHING),
-        (_STARTING, Event.READY): (_READY, Action.NOTE),
-        (_STARTING, Event.STOP): (_STOPPING, Action.WAIT),
-        (_STARTING, Event.EXITED): (_FAILED, Action.BLAME),
-        (_STARTING, Event.SHUTDOWN): (_STOPPING, Action.TERMINATE),
-        (_READY, Event.STOP): (_STOPPING, Action.WAIT),
-        (_READY, Event.EXITED): (_FAILED, Action.BLAME),
-        (_READY, Event.SHUTDOWN): (_STOPPING, Action.TERMINATE),
-        (_STOPPING, Event.STOP): (_STOPPING, Action.WAIT),
-        (_STOPPING, Event.DEADLINE): (_STOPPING, Action.KILL),
-        (_STOPPING, Event.EXITED): (_IDLE, Action.ACCEPT),
-        (_STOPPING, Event.SHUTDOWN): (_STOPPING, Action.TERMINATE),
-        (_FAILED, Event.START): (_STARTING, Action.SPAWN),
-        (_FAILED, Event.SHUTDOWN): (_FAILED, Action.NOTHING),
+        (_IDLE, LifecycleEvent.START): (_STARTING, Action.SPAWN),
+        (_IDLE, LifecycleEvent.SHUTDOWN): (_IDLE, Action.NOTHING),
+        (_STARTING, LifecycleEvent.READY): (_READY, Action.NOTE),
+        (_STARTING, LifecycleEvent.STOP): (_STOPPING, Action.WAIT),
+        (_STARTING, LifecycleEvent.EXITED): (_FAILED, Action.BLAME),
+        (_STARTING, LifecycleEvent.SHUTDOWN): (_STOPPING, Action.TERMINATE),
+        (_READY, LifecycleEvent.STOP): (_STOPPING, Action.WAIT),
+        (_READY, LifecycleEvent.EXITED): (_FAILED, Action.BLAME),
+        (_READY, LifecycleEvent.SHUTDOWN): (_STOPPING, Action.TERMINATE),
+        (_STOPPING, LifecycleEvent.STOP): (_STOPPING, Action.WAIT),
+        (_STOPPING, LifecycleEvent.DEADLINE): (_STOPPING, Action.KILL),
+        (_STOPPING, LifecycleEvent.EXITED): (_IDLE, Action.ACCEPT),
+        (_STOPPING, LifecycleEvent.SHUTDOWN): (_STOPPING, Action.TERMINATE),
+        (_FAILED, LifecycleEvent.START): (_STARTING, Action.SPAWN),
+        (_FAILED, LifecycleEvent.SHUTDOWN): (_FAILED, Action.NOTHING),
     }
 )
 
 
-def step(state: SidecarState, event: Event) -> Step | None:
+def step(state: SidecarState, event: LifecycleEvent) -> Step | None:
     """Return the next state and the action; None if `state` does not allow `event`."""
     return TABLE.get((state, event))

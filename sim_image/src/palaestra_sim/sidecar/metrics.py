@@ -9,9 +9,9 @@ from prometheus_client.registry import Collector
 
 from palaestra_protocol.control import SidecarState
 from palaestra_protocol.metrics import Family, Values
-from palaestra_sim.sidecar import families
-from palaestra_sim.sidecar.preparation import SLOTS
+from palaestra_sim.sidecar import metric_definitions
 from palaestra_sim.sidecar.simulator import SupervisedSimulator
+from palaestra_sim.sidecar.world_files import SLOTS
 
 
 def registry(simulators: Sequence[SupervisedSimulator]) -> CollectorRegistry:
@@ -30,7 +30,7 @@ class _Simulators(Collector):
 
     def collect(self) -> Iterator[Metric]:
         values = self._values()
-        for family in families.FAMILIES:
+        for family in metric_definitions.FAMILIES:
             yield family.metric(values[family])
 
     def _values(self) -> Mapping[Family, Values]:
@@ -38,15 +38,15 @@ class _Simulators(Collector):
         used = {slot: simulator.usage() for slot, simulator in them}
         states = {slot: simulator.state for slot, simulator in them}  # read once: it may change meanwhile
         return {
-            families.UP: {(slot,): state.pid is not None for slot, state in states.items()},
-            families.STATES: {
+            metric_definitions.UP: {(slot,): state.pid is not None for slot, state in states.items()},
+            metric_definitions.STATES: {
                 (slot, state): it.state is state for slot, it in states.items() for state in SidecarState
             },
-            families.STARTS: {(slot,): state.starts for slot, state in states.items()},
-            families.EXITS: {
+            metric_definitions.STARTS: {(slot,): state.starts for slot, state in states.items()},
+            metric_definitions.EXITS: {
                 (slot, kind): times for slot, simulator in them for kind, times in simulator.faults.items()
             },
-            families.MEMORY: {(slot,): usage.rss_bytes for slot, usage in used.items()},
-            families.PROCESSOR: {(slot,): usage.cpu_s for slot, usage in used.items()},
-            families.BUILD: {(version("palaestra-sim"),): 1},
+            metric_definitions.MEMORY: {(slot,): usage.rss_bytes for slot, usage in used.items()},
+            metric_definitions.PROCESSOR: {(slot,): usage.cpu_s for slot, usage in used.items()},
+            metric_definitions.BUILD: {(version("palaestra-sim"),): 1},
         }

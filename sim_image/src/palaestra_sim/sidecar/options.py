@@ -8,7 +8,7 @@ from typing import NoReturn
 from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import whole
 from palaestra_sim.sidecar.drivers import Driver
-from palaestra_sim.sidecar.preparation import located
+from palaestra_sim.sidecar.world_files import located
 
 EXIT_WRONG = 2
 

@@ -28,7 +28,7 @@ _reapers_lock = threading.Lock()  # a reaper is not in the set until its start r
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class CommandLine:
     """A program with its arguments, its environment, and the prefix of each line that it prints."""
 
     arguments: tuple[str, ...]
@@ -68,7 +68,7 @@ class Usage:
 Report = Callable[[Started | Ended], None]
 
 
-class Process:
+class SimulatorProcess:
     """A simulator's process and all of its descendants.
 
     Attributes:
@@ -81,7 +81,7 @@ class Process:
         self._cpu_s = 0.0
 
     @classmethod
-    def start(cls, command: Command, report: Report) -> Self:
+    def start(cls, command: CommandLine, report: Report) -> Self:
         """Start a simulator; `report` is called from a thread: with Started, and at the end once with Ended.
 
         Raises:
@@ -153,7 +153,7 @@ def _ticks(pid: int, fields: slice) -> int:
     return 0
 
 
-def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
+def _spawn(command: CommandLine, descriptors: Mapping[int, int]) -> int:
     """Start the reaper with these descriptors as its own, detached from the terminal."""
     with _reapers_lock:
         pid = os.posix_spawn(

@@ -21,8 +21,8 @@ from palaestra_protocol.http import (
     probe_response,
 )
 from palaestra_sim.errors import SidecarError
-from palaestra_sim.sidecar.lifecycle import Event
-from palaestra_sim.sidecar.simulator import Answer, NoAnswer, SupervisedSimulator
+from palaestra_sim.sidecar.lifecycle import LifecycleEvent
+from palaestra_sim.sidecar.simulator import CommandResult, NoAnswer, SupervisedSimulator
 
 _ABOVE = ("", STANDBY)  # the paths of the first simulator, and of one that stands by for it
 
@@ -51,8 +51,8 @@ def control_routes(simulators: Sequence[SupervisedSimulator]) -> Routes:
     for above, simulator in zip(_ABOVE, simulators, strict=False):
         routes |= {
             ("GET", f"{above}/state"): _state(simulator),
-            ("POST", f"{above}/start"): _plain(simulator, Event.START),
-            ("POST", f"{above}/ready"): _plain(simulator, Event.READY),
+            ("POST", f"{above}/start"): _plain(simulator, LifecycleEvent.START),
+            ("POST", f"{above}/ready"): _plain(simulator, LifecycleEvent.READY),
             ("POST", f"{above}/stop"): _stop(simulator),
         }
     return routes
@@ -77,7 +77,7 @@ def _state(simulator: SupervisedSimulator) -> Route:
     return lambda _: json_response(HTTPStatus.OK, simulator.as_answered().to_json())
 
 
-def _plain(simulator: SupervisedSimulator, event: Event) -> Route:
+def _plain(simulator: SupervisedSimulator, event: LifecycleEvent) -> Route:
     """Return the route of a request without parameters."""
 
     def route(body: bytes) -> Response:
@@ -98,12 +98,12 @@ def _stop(simulator: SupervisedSimulator) -> Route:
             request = StopRequest.from_json(decoded(body))
         except ProtocolError as error:
             return error_response(HTTPStatus.BAD_REQUEST, str(error))
-        return _asked(lambda: simulator.ask(Event.STOP, request.deadline_s))
+        return _asked(lambda: simulator.ask(LifecycleEvent.STOP, request.deadline_s))
 
     return route
 
 
-def _asked(ask: Callable[[], Answer]) -> Response:
+def _asked(ask: Callable[[], CommandResult]) -> Response:
     """Return the answer of the simulator's owner to a request."""
     try:
         answer = ask()

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from palaestra_sim.sidecar.blocked import ENDS, TAKEN
+from palaestra_sim.sidecar.blocked_signals import ENDS, TAKEN
 from palaestra_sim.sidecar.process import reap
 from palaestra_sim.sidecar.reaper import adopt_orphans
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.left_out import read_left_out
-from palaestra_sim.sidecar.lifecycle import Action, Event
-from palaestra_sim.sidecar.process import Command, Ended, Process, Started, Usage
+from palaestra_sim.sidecar.lifecycle import Action, LifecycleEvent
+from palaestra_sim.sidecar.process import CommandLine, Ended, SimulatorProcess, Started, Usage
 
 SHUTDOWN_GRACE_S = 1.0  # from SIGTERM to SIGKILL; the whole shutdown has 2 s
 _ANSWER_S = 5.0
@@ -31,7 +31,7 @@ class NoAnswer(TimeoutError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class CommandResult:
     """Whether a request was allowed, and the state after it."""
 
     allowed: bool
@@ -40,10 +40,10 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Message:
-    event: Event
+    event: LifecycleEvent
     deadline_s: float = 0.0
     ended: Ended | None = None
-    answers: "queue.SimpleQueue[Answer] | None" = None
+    answers: "queue.SimpleQueue[CommandResult] | None" = None
 
 
 class SupervisedSimulator:
@@ -62,7 +62,7 @@ class SupervisedSimulator:
 
     def __init__(
         self,
-        command: Command,
+        command: CommandLine,
         state: SimulatorState,
         left_out: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
@@ -73,7 +73,7 @@ class SupervisedSimulator:
         self._left_out = left_out
         self._clock = clock
         self._inbox: queue.SimpleQueue[_Message | Started] = queue.SimpleQueue()
-        self._process: Process | None = None
+        self._process: SimulatorProcess | None = None
         self._kill_at: float | None = None
         self._closing = False
         self._actions: Mapping[Action, Callable[[SimulatorState, _Message], SimulatorState]] = {
@@ -87,13 +87,13 @@ class SupervisedSimulator:
             Action.ACCEPT: self._accept,
         }
 
-    def ask(self, event: Event, deadline_s: float = 0.0) -> Answer:
+    def ask(self, event: LifecycleEvent, deadline_s: float = 0.0) -> CommandResult:
         """Return the answer to a request; from any thread but the owner's.
 
         Raises:
             NoAnswer: the owner is stuck, or has ended.
         """
-        answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+        answers: queue.SimpleQueue[CommandResult] = queue.SimpleQueue()
         self._inbox.put(_Message(event=event, deadline_s=deadline_s, answers=answers))
         try:
             return answers.get(timeout=_ANSWER_S)
@@ -102,7 +102,7 @@ class SupervisedSimulator:
 
     def shut_down(self) -> None:
         """End the simulator and make `run` return; from any thread."""
-        self._inbox.put(_Message(event=Event.SHUTDOWN))
+        self._inbox.put(_Message(event=LifecycleEvent.SHUTDOWN))
 
     def as_answered(self) -> SimulatorState:
         """Return the state, with the memory in use if the simulator is ready."""
@@ -129,11 +129,11 @@ class SupervisedSimulator:
         try:
             return self._inbox.get(timeout=wait_s)
         except queue.Empty:
-            return _Message(event=Event.DEADLINE)
+            return _Message(event=LifecycleEvent.DEADLINE)
 
     def _take(self, message: _Message) -> None:
         """Carry out the table's action for one message, and answer it."""
-        self._closing |= message.event is Event.SHUTDOWN
+        self._closing |= message.event is LifecycleEvent.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:
             to, action = step
@@ -142,7 +142,7 @@ class SupervisedSimulator:
             detail = f": {self.state.detail}" if self.state.detail else ""
             log.info("%s%s%s", self._command.mark, self.state.state.value, detail)
         if message.answers is not None:
-            message.answers.put(Answer(allowed=step is not None, state=self.state))
+            message.answers.put(CommandResult(allowed=step is not None, state=self.state))
 
     def _nothing(self, state: SimulatorState, _: _Message) -> SimulatorState:
         return state
@@ -152,7 +152,7 @@ class SupervisedSimulator:
         try:
             if self._left_out is not None:
                 self._left_out.unlink(missing_ok=True)
-            self._process = Process.start(self._numbered(start), self._report)
+            self._process = SimulatorProcess.start(self._numbered(start), self._report)
         except OSError as error:
             self._report(Ended(problem=f"it could not be run: {error.strerror}"))
         return replace(state, starts=start, left_out=())
@@ -160,7 +160,7 @@ class SupervisedSimulator:
     def _note(self, state: SimulatorState, _: _Message) -> SimulatorState:
         return state if self._left_out is None else replace(state, left_out=read_left_out(self._left_out))
 
-    def _numbered(self, start: int) -> Command:
+    def _numbered(self, start: int) -> CommandLine:
         """Return the command with the number of this start, so that random faults differ each time."""
         environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(start)}
         return replace(self._command, environment=environment)
@@ -206,7 +206,7 @@ class SupervisedSimulator:
     def _report(self, report: Started | Ended) -> None:
         """Receive a report from the process's thread."""
         if isinstance(report, Ended):
-            self._inbox.put(_Message(event=Event.EXITED, ended=report))
+            self._inbox.put(_Message(event=LifecycleEvent.EXITED, ended=report))
         else:
             self._inbox.put(report)
 

@@ -10,10 +10,10 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from palaestra_sim.scene.base import Base
-from palaestra_sim.scene.beams import Ray
+from palaestra_sim.scene.mobile_base import MobileBase
+from palaestra_sim.scene.sensor_rays import Ray
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.stub.obstacles import Contact, Disc, Neighborhood, Obstacle
+from palaestra_sim.stub.obstacles import Contact, Disc, FlatObstacle, Neighborhood
 from palaestra_sim.stub.outline import RoundPart
 
 _PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
@@ -60,7 +60,7 @@ class StubBody(Disc):
 
     def __init__(
         self,
-        base: Base,
+        base: MobileBase,
         outline: Sequence[RoundPart] = (),
         rim: Sequence[Shape] = (),
         heights: tuple[float, float] = (0.0, 0.0),
@@ -193,7 +193,7 @@ class StubBody(Disc):
             if clear:
                 return
 
-    def _leave(self, obstacle: Obstacle) -> bool:
+    def _leave(self, obstacle: FlatObstacle) -> bool:
         """Push the robot out of one obstacle; return whether it was clear of it."""
         clear = True
         bit = 1

@@ -12,7 +12,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import ContactPoint, Figure
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
-from palaestra_sim.stub.obstacles import Disc, Obstacle
+from palaestra_sim.stub.obstacles import Disc, FlatObstacle
 from palaestra_sim.stub.outline import obstacle
 
 _TOUCH_M: Final = 1e-6  # a robot rests at the surface that pushed it out, give or take rounding
@@ -42,7 +42,7 @@ def _parts(robot: Figure, body: StubBody) -> Iterator[tuple[Disc, SceneNode, flo
         yield disc, shape.node, low + height, high + height
 
 
-def _touched(disc: Disc, outline: Obstacle) -> tuple[float, float] | None:
+def _touched(disc: Disc, outline: FlatObstacle) -> tuple[float, float] | None:
     contact = outline.contact(disc.x, disc.y, disc.radius + _TOUCH_M)
     if contact is None:
         return None

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from palaestra_sim.scene.beams import Ray
+from palaestra_sim.scene.sensor_rays import Ray
 
 # A contact: x and y of the unit normal that points at the robot, depth in meters.
 Contact = tuple[float, float, float]
@@ -18,7 +18,7 @@ Contact = tuple[float, float, float]
 _SAME_PLACE_M2 = 1e-24  # a square; those of still smaller distances lose their digits
 
 
-class Obstacle(Protocol):
+class FlatObstacle(Protocol):
     """A shape on the floor."""
 
     def gap(self, x: float, y: float) -> float:
@@ -193,12 +193,12 @@ class Neighborhood:
     SIDE_M = 0.125
     LIMIT = 20_000  # squares kept: a robot that escaped to infinity must not fill the memory
 
-    def __init__(self, obstacles: Sequence[Obstacle], reach_m: float) -> None:
+    def __init__(self, obstacles: Sequence[FlatObstacle], reach_m: float) -> None:
         self._obstacles = tuple(obstacles)
         self._margin = reach_m + self.SIDE_M * math.sqrt(0.5)
-        self._squares: dict[int, tuple[Obstacle, ...]] = {}
+        self._squares: dict[int, tuple[FlatObstacle, ...]] = {}
 
-    def near(self, x: float, y: float) -> tuple[Obstacle, ...]:
+    def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
         """Return at least all obstacles that are within reach of x, y, in their order."""
         column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift keeps usual floors positive
         row = int(y * 8.0 + 4096.0)
@@ -206,7 +206,7 @@ class Neighborhood:
         found = self._squares.get(key)
         return self._look(key, column, row) if found is None else found
 
-    def _look(self, key: int, column: int, row: int) -> tuple[Obstacle, ...]:
+    def _look(self, key: int, column: int, row: int) -> tuple[FlatObstacle, ...]:
         x = (column + 0.5) * self.SIDE_M - 512.0
         y = (row + 0.5) * self.SIDE_M - 512.0
         found = tuple(obstacle for obstacle in self._obstacles if obstacle.gap(x, y) <= self._margin)

@@ -8,18 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
-from palaestra_sim.scene.drawn import View
-from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.camera_interface import Lens
+from palaestra_sim.scene.dynamic_solids import DynamicSolid
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.physics_settings import PhysicsSettings
+from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.scene.sight import Sight
-from palaestra_sim.scene.surroundings import Surroundings
+from palaestra_sim.scene.visual_rays import VisualRays
+from palaestra_sim.scene.visuals import View
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
@@ -41,7 +41,7 @@ class StubPhysics:
 
     def __init__(self) -> None:
         self._moving: list[tuple[Figure, StubBody]] = []
-        self._surroundings = Surroundings()
+        self._surroundings = PhysicsSettings()
         self._solids: tuple[Shape, ...] = ()
         self._level: dict[Figure, list[_Level]] = {}
         self._sloped: dict[Figure, list[SlopedBeams]] = {}
@@ -53,7 +53,7 @@ class StubPhysics:
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         return StubBody(build.base, outline, rim, build.heights)
 
-    def begin(self, surroundings: Surroundings) -> None:
+    def begin(self, surroundings: PhysicsSettings) -> None:
         """Take the floors of the world; there are no forces."""
         self._surroundings = surroundings
 
@@ -61,7 +61,7 @@ class StubPhysics:
         self,
         figures: Sequence[Figure],
         solids: Sequence[Shape],
-        loose: Sequence[Loose],
+        loose: Sequence[DynamicSolid],
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
@@ -106,17 +106,17 @@ class StubPhysics:
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return the same for beams that meet what is visible, and pass the robot itself."""
-        sight = Sight(self._view, figure.place, beams)
+        sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 
-    def push(self, target: Figure | Loose, push: Push) -> None:
+    def push(self, target: Figure | DynamicSolid, push: Push) -> None:
         """Do nothing: without masses a force moves nothing; see `abilities`."""
 
     def show(self, view: View) -> None:
         """Take what lidars see of the world; there are no pictures."""
         self._view = view
 
-    def eye(self, place: Place, lens: Lens) -> None:
+    def eye(self, place: Frame, lens: Lens) -> None:
         """Return None: there are no pictures."""
         del place, lens
 

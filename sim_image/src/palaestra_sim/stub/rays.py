@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from palaestra_sim.scene.beams import Beam, Ray
 from palaestra_sim.scene.geometry import Pose
-from palaestra_sim.stub.obstacles import Neighborhood, Obstacle
+from palaestra_sim.scene.sensor_rays import Beam, Ray
+from palaestra_sim.stub.obstacles import FlatObstacle, Neighborhood
 
 _GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame as `Fan.cast` takes it
 
@@ -30,14 +30,14 @@ class Fan:
         farthest = max((x * x + y * y for x, y, _, _ in self.rays), default=0.0)
         self._reach = max(reach_m, default=0.0) + math.sqrt(farthest)
         self._solids = Neighborhood((), 0.0)
-        self._others: tuple[Obstacle, ...] = ()
+        self._others: tuple[FlatObstacle, ...] = ()
 
     @property
     def reach_m(self) -> float:
         """Return the longest distance of a ray's end from the robot's center."""
         return self._reach
 
-    def face(self, solids: Neighborhood, others: Sequence[Obstacle]) -> None:
+    def face(self, solids: Neighborhood, others: Sequence[FlatObstacle]) -> None:
         """Set the obstacles of the rays: standing ones and robots."""
         self._solids = solids
         self._others = tuple(others)
@@ -59,7 +59,7 @@ class Fan:
 class Upright(NamedTuple):
     """An obstacle with its lower and its upper end, in the world."""
 
-    outline: Obstacle
+    outline: FlatObstacle
     low_m: float
     high_m: float
 

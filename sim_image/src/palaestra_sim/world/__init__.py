@@ -21,7 +21,7 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
 
 from palaestra_sim.errors import StandInError, UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
-from palaestra_sim.world.externs import Protos, local_protos
+from palaestra_sim.world.extern_proto import Protos, local_protos
 from palaestra_sim.world.formats import (
     MJCF,
     WBT,
@@ -33,7 +33,7 @@ from palaestra_sim.world.formats import (
     suffix,
 )
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
-from palaestra_sim.world.parts import Part
+from palaestra_sim.world.parts import ShapePart
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
 from palaestra_sim.world.reader import parse, parse_nodes
 from palaestra_sim.world.robots import WorldRobot
@@ -48,11 +48,11 @@ __all__ = [
     "Is",
     "Item",
     "Node",
-    "Part",
     "Proto",
     "ProtoField",
     "Protos",
     "RunIdentity",
+    "ShapePart",
     "StandIn",
     "StandInError",
     "UnknownWorldError",

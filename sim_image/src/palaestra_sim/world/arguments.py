@@ -9,7 +9,7 @@ single argument.
 import re
 from itertools import chain
 
-from palaestra_sim.world.edits import Edit
+from palaestra_sim.world.patches import Patch
 from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
 from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
@@ -24,7 +24,7 @@ def asks_for_clock(robot: Node) -> bool:
     return any(CLOCK in _options(text) for text in robot.texts("controllerArgs"))
 
 
-def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Edit, ...]:
+def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Patch, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
     With `clock`, the first of several `--clock` stays; none is ever added.
@@ -38,7 +38,7 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
     if not strings:
         start = value.span[0] + 1
         texts = _rows([], ros_name, clock=clock)[0]
-        return (Edit(start=start, end=start, text=b" ".join(texts), tokens=texts),)
+        return (Patch(start=start, end=start, text=b" ".join(texts), tokens=texts),)
     rows = _rows(strings, ros_name, clock=clock)
     changed = [pair for pair in zip(strings, rows, strict=True) if pair[1] != (pair[0].text,)]
     gap = _gap_before(world, strings[0])
@@ -83,23 +83,23 @@ def _options(text: str) -> list[str]:
     return words if several else [text]
 
 
-def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Edit:
+def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Patch:
     """Replace one string of a list; if it is removed, the blanks before it are too."""
     start = token.start
     if not row:
         start -= len(_UP_TO_COMMENT.sub(b"", _gap_before(world, token)))
-    return Edit(start=start, end=token.end, text=separator.join(row), tokens=row)
+    return Patch(start=start, end=token.end, text=separator.join(row), tokens=row)
 
 
-def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Edit:
+def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Patch:
     """Replace a bare string by a list; an empty string means that there are no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"
-    return Edit(start=value.span[0], end=value.span[1], text=text, tokens=(b"[", *texts, b"]"))
+    return Patch(start=value.span[0], end=value.span[1], text=text, tokens=(b"[", *texts, b"]"))
 
 
-def _new_field(world: World, robot: Node, ros_name: str) -> Edit:
+def _new_field(world: World, robot: Node, ros_name: str) -> Patch:
     """Add `controllerArgs` behind `controller`, on lines of its own if that has one."""
     start, end = robot.fields["controller"].span
     field = world.index(start) - 1
@@ -110,7 +110,7 @@ def _new_field(world: World, robot: Node, ros_name: str) -> Edit:
     texts = _rows([], ros_name, clock=False)[0]
     items = (inner or b" ").join(texts)
     text = line + b"controllerArgs [" + inner + items + (line if indent else b"") + b"]"
-    return Edit(start=end, end=end, text=text, tokens=(b"controllerArgs", b"[", *texts, b"]"))
+    return Patch(start=end, end=end, text=text, tokens=(b"controllerArgs", b"[", *texts, b"]"))
 
 
 def _gap_before(world: World, token: Token) -> bytes:

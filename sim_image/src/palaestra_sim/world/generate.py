@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 from palaestra_sim.world.arguments import argument_edits, asks_for_clock
 from palaestra_sim.world.checks import Candidate, candidate
-from palaestra_sim.world.edits import edited
 from palaestra_sim.world.names import MAX_NAME_BYTES, RunIdentity, ros_name
+from palaestra_sim.world.patches import edited
 from palaestra_sim.world.robots import described, robot_name
 from palaestra_sim.world.tree import Node
 

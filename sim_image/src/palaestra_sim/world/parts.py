@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, TypeAlias
 
-from palaestra_sim.world.formulas import Formula, Numbers
+from palaestra_sim.world.expressions import Expression, Numbers
 
 Shape: TypeAlias = Literal["box", "cylinder", "sphere", "plane"]
 FormKind: TypeAlias = Literal["box", "cylinder", "sphere", "plane", "ring", "wall"]
@@ -22,7 +22,7 @@ _PIECES_OF_RING = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class ShapePart:
     """One shape, in the frame of its object; lengths in meters, the turn about z in radians.
 
     The size of a box is (x, y, z), of an upright cylinder (radius, height), of a sphere (radius,), of a plane
@@ -46,16 +46,18 @@ class Form:
     """
 
     kind: FormKind
-    lengths: tuple[Formula, ...]
-    at: tuple[Formula, ...] = ()
+    lengths: tuple[Expression, ...]
+    at: tuple[Expression, ...] = ()
     on_base: bool = False
-    turn: Formula | None = None
-    when: Formula | None = None
-    unless: Formula | None = None
+    turn: Expression | None = None
+    when: Expression | None = None
+    unless: Expression | None = None
     path: str = ""
     closed: bool = False
 
-    def parts(self, numbers: Numbers, points: Callable[[str], Sequence[Sequence[float]]]) -> Iterator[Part]:
+    def parts(
+        self, numbers: Numbers, points: Callable[[str], Sequence[Sequence[float]]]
+    ) -> Iterator[ShapePart]:
         """Yield the parts of an object; a length that isn't positive makes none.
 
         `numbers` returns the numbers of a field, `points` the vectors of one that is a list.
@@ -76,18 +78,18 @@ class Form:
             yield from _along([*path, *path[: int(self.closed)]], lengths, (x, y, z))
         else:
             raised = z + _height(self.kind, lengths) / 2 if self.on_base else z
-            yield Part(shape=self.kind, size=lengths, position=(x, y, raised), turn=turn)
+            yield ShapePart(shape=self.kind, size=lengths, position=(x, y, raised), turn=turn)
 
 
 def _along(
     path: Sequence[Sequence[float]], lengths: Sequence[float], at: tuple[float, float, float]
-) -> Iterator[Part]:
+) -> Iterator[ShapePart]:
     """Yield a box for each piece of a path on the ground; `lengths` are thickness and height."""
     thickness, height = lengths
     for start, end in pairwise(path):
         dx, dy = end[0] - start[0], end[1] - start[1]
         middle = [(a + b) / 2 + offset for a, b, offset in zip(start, end, at, strict=True)]
-        yield Part(
+        yield ShapePart(
             shape="box",
             size=(math.hypot(dx, dy) + thickness, thickness, height),
             position=(middle[0], middle[1], middle[2] + height / 2),

@@ -26,8 +26,8 @@ from types import MappingProxyType
 from typing import Any, Literal, NoReturn, TypeAlias
 
 from palaestra_sim.errors import StandInError, WorldError
-from palaestra_sim.world.formulas import Formula, parse_formula
-from palaestra_sim.world.parts import LENGTHS, Form, FormKind, Part
+from palaestra_sim.world.expressions import Expression, parse_formula
+from palaestra_sim.world.parts import LENGTHS, Form, FormKind, ShapePart
 from palaestra_sim.world.proto import ProtoField, parse_fields
 from palaestra_sim.world.tree import Item
 
@@ -59,7 +59,7 @@ class StandIn:
     forms: tuple[Form, ...] = ()
 
 
-def expand(stand_in: StandIn, values: Values) -> tuple[Part, ...]:
+def expand(stand_in: StandIn, values: Values) -> tuple[ShapePart, ...]:
     """Return the parts of an object of the type with these values of its fields."""
 
     def items(name: str) -> Sequence[float]:
@@ -178,7 +178,7 @@ class _Entry:
             closed=closed,
         )
 
-    def _lengths(self, kind: FormKind, written: object, place: str) -> tuple[Formula, ...]:
+    def _lengths(self, kind: FormKind, written: object, place: str) -> tuple[Expression, ...]:
         """Return the lengths of a shape."""
         if kind in _FIELDS_OF_FORM:
             keys = _FIELDS_OF_FORM[kind]
@@ -193,10 +193,10 @@ class _Entry:
             return self._three(written, place)
         return self._vector(written, place, "xy")
 
-    def _three(self, written: object, place: str) -> tuple[Formula, ...]:
+    def _three(self, written: object, place: str) -> tuple[Expression, ...]:
         return self._vector(written, place, "xyz")
 
-    def _vector(self, written: object, place: str, axes: str) -> tuple[Formula, ...]:
+    def _vector(self, written: object, place: str, axes: str) -> tuple[Expression, ...]:
         """Return the formulas of a list of lengths, or of the name of a field with as many."""
         if isinstance(written, str):
             written = [f"{written}.{axis}" for axis in axes]
@@ -221,10 +221,10 @@ class _Entry:
             self._refuse(place, f"{origin!r} is no origin", 'write "center", or "base" for the lower side')
         return origin == "base"
 
-    def _optional(self, table: dict[str, Any], key: str, prefix: str) -> Formula | None:
+    def _optional(self, table: dict[str, Any], key: str, prefix: str) -> Expression | None:
         return self._formula(table[key], prefix + key) if key in table else None
 
-    def _formula(self, written: object, place: str) -> Formula:
+    def _formula(self, written: object, place: str) -> Expression:
         """Return a formula whose fields are declared, and have such numbers."""
         try:
             formula = parse_formula(written)

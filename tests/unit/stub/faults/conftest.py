@@ -2,9 +2,9 @@
 
 import pytest
 
-from palaestra_sim.faults.course import Course
-from palaestra_sim.faults.language import parse
-from palaestra_sim.faults.schedule import Life, Schedule
+from palaestra_sim.faults.fault_state import FaultState
+from palaestra_sim.faults.parser import parse
+from palaestra_sim.faults.schedule import FaultSchedule, Life
 
 
 @pytest.fixture
@@ -12,7 +12,7 @@ def schedule():
     """`schedule("crash:step=3 slow:latency_ms=5", seed=0, simulator="robotino", number=1)`."""
 
     def make(text, **life):
-        return Schedule(faults=parse(text, "test"), life=Life(**{"simulator": "robotino", **life}))
+        return FaultSchedule(faults=parse(text, "test"), life=Life(**{"simulator": "robotino", **life}))
 
     return make
 
@@ -20,4 +20,4 @@ def schedule():
 @pytest.fixture
 def course(schedule):
     """The course of a life: the same arguments as `schedule`."""
-    return lambda text, **life: Course(schedule(text, **life))
+    return lambda text, **life: FaultState(schedule(text, **life))

@@ -5,8 +5,8 @@ import argparse
 import pytest
 
 from palaestra_sim.faults import FaultError, add_options, begin, read_options
-from palaestra_sim.scene.loading import Loader
-from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.loader import Loader
+from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 

@@ -3,14 +3,14 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.faults.kinds import Event, Trigger
-from palaestra_sim.faults.language import parse
-from palaestra_sim.faults.schedule import Life, Schedule
+from palaestra_sim.faults.kinds import FaultEvent, Trigger
+from palaestra_sim.faults.parser import parse
+from palaestra_sim.faults.schedule import FaultSchedule, Life
 
 STEPS = range(1, 4001)
 
 
-def happenings(schedule, event=Event.STEP, numbers=STEPS):
+def happenings(schedule, event=FaultEvent.STEP, numbers=STEPS):
     """Return at which events anything happens."""
     return [number for number in numbers if schedule.at(event, number)]
 
@@ -30,7 +30,7 @@ def test_steps_and_resets_are_counted_apart(schedule):
     both = schedule("crash:step=5 crash:reset=7")
 
     assert happenings(both) == [5]
-    assert happenings(both, Event.RESET) == [7]
+    assert happenings(both, FaultEvent.RESET) == [7]
 
 
 def test_a_probability_is_a_share_of_the_steps(schedule):
@@ -83,13 +83,13 @@ def test_a_fault_that_is_added_changes_no_other(schedule):
     beside = schedule("slow:latency_ms=5,probability=0.5 crash:probability=0.01")
     (crash,) = alone.faults
 
-    assert [it for it in STEPS if crash in beside.at(Event.STEP, it)] == happenings(alone)
+    assert [it for it in STEPS if crash in beside.at(FaultEvent.STEP, it)] == happenings(alone)
 
 
 def test_the_draws_are_the_same_in_every_release():
     """A run can be repeated years later; hash() of Python would differ from process to process."""
     (fault,) = parse("crash:probability=0.05", "test")
-    schedule = Schedule(faults=[fault], life=Life(simulator="robotino", number=1))
+    schedule = FaultSchedule(faults=[fault], life=Life(simulator="robotino", number=1))
 
     assert happenings(schedule, numbers=range(1, 21)) == [7, 12, 20]
 
@@ -98,7 +98,7 @@ def test_the_draws_are_the_same_in_every_release():
 def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
     """Evenly; never negative."""
     (fault,) = parse("slow:latency_ms=50,jitter_ms=20", "test")
-    schedule = Schedule(faults=[fault], life=Life(seed=seed))
+    schedule = FaultSchedule(faults=[fault], life=Life(seed=seed))
 
     assert 0.05 <= schedule.delay_s(fault, number) < 0.07
 
@@ -106,7 +106,7 @@ def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
 @given(st.integers(1, 10**6), st.integers(1, 1000), st.floats(0, 1, exclude_max=True))
 def test_a_trigger_needs_both_its_multiple_and_its_chance(number, every, draw):
     """One that says nothing fires always."""
-    assert Trigger(event=Event.STEP).fires(number, draw)
-    assert Trigger(event=Event.STEP, every=every).fires(number, draw) == (number % every == 0)
-    assert Trigger(event=Event.STEP, at=every).fires(number, draw) == (number == every)
-    assert not Trigger(event=Event.STEP, probability=draw).fires(number, draw)
+    assert Trigger(event=FaultEvent.STEP).fires(number, draw)
+    assert Trigger(event=FaultEvent.STEP, every=every).fires(number, draw) == (number % every == 0)
+    assert Trigger(event=FaultEvent.STEP, at=every).fires(number, draw) == (number == every)
+    assert not Trigger(event=FaultEvent.STEP, probability=draw).fires(number, draw)

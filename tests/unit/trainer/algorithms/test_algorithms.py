@@ -11,13 +11,13 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import explained_variance
 from torch import nn, optim
 
-from palaestra_protocol.elsewhere import ELSEWHERE, OF_ZOO
+from palaestra_protocol.foreign_words import ELSEWHERE, OF_ZOO
 from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, buffer_options, check, make_model
-from palaestra_trainer.algorithms.entries import OURS
+from palaestra_trainer.algorithms.registry import OURS
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}
 HYPERPARAMETERS = {
@@ -38,7 +38,7 @@ def make_env(make_member):
     def make(members=1, faults=()):
         first = make_member("collect-0", steps=faults)
         rest = [make_member(f"collect-{index}") for index in range(1, members)]
-        env = SimulatorsVecEnv([Keeper(member) for member in (first, *rest)], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(member) for member in (first, *rest)], run_seed=1)
         made.append(env)
         return env
 
@@ -382,7 +382,7 @@ def test_sac_learns_a_continuous_action(make_member):
     """The fifth algorithm needs another space."""
     member = make_member()
     member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
-    env = SimulatorsVecEnv([Keeper(member)], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(member)], run_seed=1)
 
     model = model_of("SAC", env).learn(30)
 

@@ -13,10 +13,10 @@ from structlog.testing import capture_logs
 
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
-from palaestra_trainer.checkpoint.generators import Generators
+from palaestra_trainer.checkpoint.rng import Generators
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.run.measuring import measure
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.run.evaluate import measure
+from palaestra_trainer.simulators.restarter import Restarter
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}
 OFF_POLICY = TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200}
@@ -46,7 +46,7 @@ def make(make_member, make_configuration):
             member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
         algorithm = {"name": name, "hyperparameters": ALGORITHMS[name]}
         configuration = make_configuration(algorithm=algorithm, device=device)
-        env = SimulatorsVecEnv([Keeper(member)], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(member)], run_seed=1)
         return make_model(configuration.algorithm, env, 1, configuration.device), env, configuration
 
     return made
@@ -110,7 +110,7 @@ def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, 
     """Its networks, optimizers and noise come to where it goes on, and it learns there."""
     trained, env, configuration = make(name, before)
     trained.learn(40)
-    state = checkpoint.State.of(trained, env.snapshot(), {"returns": [0.0]})
+    state = checkpoint.TrainingState.of(trained, env.snapshot(), {"returns": [0.0]})
     described = checkpoint.describe(configuration, trained.num_timesteps, {})
     checkpoint.Saver(tmp_path / "checkpoints", keep=1).save(trained, state, described)
 

@@ -12,7 +12,7 @@ from palaestra_trainer import algorithms
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 ALL = ("DQN", "PPO", "A2C", "REINFORCE")
 
@@ -22,7 +22,7 @@ def model(job, make_member):
     """Make a model of an algorithm in a corridor, with a logger that writes nowhere."""
 
     def make(name):
-        env = SimulatorsVecEnv([Keeper(make_member())], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(make_member())], run_seed=1)
         made = algorithms.make_model(job(name).algorithm, env, 1)
         made.set_logger(Logger(folder=None, output_formats=[]))
         return made

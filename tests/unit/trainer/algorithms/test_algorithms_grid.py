@@ -15,7 +15,7 @@ import torch
 from palaestra.api.fields import ALGORITHMS as NAMES
 from palaestra_trainer import checkpoint, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory, read_lines
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
@@ -95,7 +95,7 @@ def play(make_member, make_configuration, tmp_path):
             checkpoint={"everySteps": 8, "keep": 1},
         )
         directory = RunDirectory(tmp_path / folder)
-        return training.run(configuration, directory, make_members), directory
+        return attempt.run(configuration, directory, make_members), directory
 
     return run
 

@@ -20,9 +20,9 @@ from palaestra_trainer.algorithms.small_cnn import SmallCnn
 from palaestra_trainer.configuration import Algorithm, Normalize
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory, read_lines
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 ROWS, COLUMNS = 36, 48
 OFF_POLICY = {"learning_starts": 10, "batch_size": 8, "buffer_size": 60, "target_update_interval": 10}
@@ -79,7 +79,7 @@ def play(make_seeing, job, tmp_path):
             algorithm["normalize"] = normalize
         configuration = job(name, algorithm=algorithm, steps=90, collectors=collectors)
         directory = RunDirectory(tmp_path / folder)
-        return training.run(configuration, directory, make_members), directory
+        return attempt.run(configuration, directory, make_members), directory
 
     return run
 
@@ -122,7 +122,7 @@ def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
 @pytest.mark.parametrize("shape", [(ROWS, COLUMNS, 3), (3, ROWS, COLUMNS)], ids=["last", "first"])
 def test_images_get_the_policy_for_images(make_seeing, name, shape):
     """Flattened pixels would be learned from as well, and badly."""
-    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
     model = make_model(Algorithm(name=name, hyperparameters=HYPERPARAMETERS[name]), env, seed=1)
 
     extractors = [part for part in model.policy.modules() if isinstance(part, NatureCNN | FlattenExtractor)]
@@ -136,7 +136,7 @@ def test_images_get_the_policy_for_images(make_seeing, name, shape):
 )
 def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, shape, layers):
     """In every algorithm, for one image or three, and for images that are too small for the large one."""
-    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
     if name == "SAC":
         env.action_space = spaces.Box(-1.0, 1.0, (3,))
     chosen = Algorithm(name=name, hyperparameters=HYPERPARAMETERS.get(name, {"buffer_size": 10}), cnn="small")
@@ -156,7 +156,7 @@ def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, s
 
 def test_hyperparameters_change_the_small_network(make_seeing):
     """`policy_kwargs` are those of the policy, as everywhere."""
-    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0"))], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(make_seeing("collect-0"))], run_seed=1)
     policy_kwargs = {"net_arch": [32], "features_extractor_kwargs": {"features_dim": 64}}
     hyperparameters = {**HYPERPARAMETERS["PPO"], "policy_kwargs": policy_kwargs}
 
@@ -179,7 +179,7 @@ def test_a_run_with_the_small_network_resumes_as_others_do(play):
 
 def test_a_network_for_images_is_refused_where_there_are_none(make_member):
     """It would have no effect, and the job says otherwise."""
-    env = SimulatorsVecEnv([Keeper(make_member("collect-0"))], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(make_member("collect-0"))], run_seed=1)
 
     with pytest.raises(
         ConfigurationError, match=r"algorithm\.cnn: has no effect, since the environment's obs"
@@ -209,7 +209,7 @@ def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):
 )
 def test_images_that_the_policy_cannot_take_are_refused(make_seeing, shape, normalize, fact):
     """Before a simulator starts, and by name."""
-    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+    env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
 
     with pytest.raises(ConfigurationError, match=fact):
         make_model(Algorithm(name="PPO", normalize=normalize), env, seed=1)

@@ -11,14 +11,14 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from palaestra_trainer.algorithms import ALGORITHMS, check, make_model
+from palaestra_trainer.algorithms.constructor_params import types
 from palaestra_trainer.algorithms.divergence import Learner
-from palaestra_trainer.algorithms.entries import entry_of
-from palaestra_trainer.algorithms.signatures import types
-from palaestra_trainer.algorithms.values import policy_class
+from palaestra_trainer.algorithms.hyperparameters import policy_class
+from palaestra_trainer.algorithms.registry import entry_of
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.infos import OURS
-from palaestra_trainer.run.training import use_threads
+from palaestra_trainer.run.attempt import use_threads
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from tests.tables import for_each

@@ -23,10 +23,10 @@ from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, SimulatorHung
-from palaestra_trainer.run import training
-from palaestra_trainer.run.measuring import measure
+from palaestra_trainer.run import attempt
+from palaestra_trainer.run.evaluate import measure
 from palaestra_trainer.run_directory import read_lines
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
@@ -140,7 +140,7 @@ def learn(make_member):
     def make(first, *, held=False):
         members = [with_task(make_member("collect-0", held=held), first)]
         members.append(with_task(make_member("collect-1"), task_of()))
-        env = SimulatorsVecEnv([Keeper(member) for member in members], 1)
+        env = SimulatorsVecEnv([Restarter(member) for member in members], 1)
         wanted = Algorithm(name="MaskablePPO", hyperparameters=ROLLOUTS)
         check(wanted)
         return make_model(wanted, env, seed=1), members, env
@@ -196,7 +196,7 @@ def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member
     """By the same question sb3-contrib asks."""
     answers = []
     for kind in (MaskedTask, FakeTask):
-        env = SimulatorsVecEnv([Keeper(with_task(make_member(), task_of(kind)))], 1)
+        env = SimulatorsVecEnv([Restarter(with_task(make_member(), task_of(kind)))], 1)
         answers.append(env.has_attr("action_masks"))
 
     assert answers == [True, False]
@@ -221,7 +221,7 @@ def run(directory, make_member, make_configuration):
             evaluation={"everySteps": 16, "episodes": 3, "confirmEpisodes": 4},
             **({"steps": 32} | changes),
         )
-        return training.run(configuration, directory, make_members), members, (configuration, make_members)
+        return attempt.run(configuration, directory, make_members), members, (configuration, make_members)
 
     return play
 

@@ -19,8 +19,8 @@ from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.seeds import EVALUATE
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run.measuring import measure
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.run.evaluate import measure
+from palaestra_trainer.simulators.restarter import Restarter
 from tests.pages import blocks
 
 DOCS = Path(__file__).parents[4] / "docs"
@@ -37,7 +37,7 @@ def make_env(make_member):
 
     def make(*faults):
         members = [make_member(f"collect-{row}", **these) for row, these in enumerate(faults or ({}, {}))]
-        return SimulatorsVecEnv([Keeper(member) for member in members], run_seed=1)
+        return SimulatorsVecEnv([Restarter(member) for member in members], run_seed=1)
 
     return make
 
@@ -247,7 +247,7 @@ def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, s
 def test_a_run_is_not_continued_with_another_normalization(make_configuration, tmp_path, saved, wanted):
     """As with any other hyperparameter; a manifest leaves the field out if nothing is normalized."""
     one, other = ({"name": "PPO", "normalize": normalize} for normalize in (saved, wanted))
-    found = checkpoint.Checkpoint(
+    found = checkpoint.SavedCheckpoint(
         path=tmp_path, manifest=checkpoint.describe(make_configuration(algorithm=one), 0, {})
     )
 

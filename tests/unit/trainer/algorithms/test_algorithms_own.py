@@ -14,7 +14,7 @@ from palaestra_trainer.algorithms import ALGORITHMS, check, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 LAB = '''
 import sb3_contrib
@@ -163,7 +163,7 @@ def make(make_member):
 
     def made(algorithm, faults=()):
         members = [make_member("collect-0", steps=faults), make_member("collect-1")]
-        return make_model(algorithm, SimulatorsVecEnv([Keeper(member) for member in members], 1), seed=1)
+        return make_model(algorithm, SimulatorsVecEnv([Restarter(member) for member in members], 1), seed=1)
 
     return made
 
@@ -466,7 +466,9 @@ def test_noise_on_actions_is_each_members_own(make_member):
     wanted = Algorithm(name="TD3", hyperparameters=TINY | noisy)
     check(wanted)
 
-    model = make_model(wanted, SimulatorsVecEnv([Keeper(member) for member in members], 1), seed=1).learn(4)
+    model = make_model(wanted, SimulatorsVecEnv([Restarter(member) for member in members], 1), seed=1).learn(
+        4
+    )
 
     first, second = (noise.noise_prev.item() for noise in model.action_noise.noises)
     assert first != second

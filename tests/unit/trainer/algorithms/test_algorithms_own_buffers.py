@@ -12,7 +12,7 @@ from palaestra_trainer.algorithms import check, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from tests.tables import for_each
 
 LAB = '''
@@ -149,7 +149,7 @@ def make(make_member):
 
     def made(algorithm, faults=()):
         env = SimulatorsVecEnv(
-            [Keeper(make_member("collect-0", steps=faults)), Keeper(make_member("collect-1"))], 1
+            [Restarter(make_member("collect-0", steps=faults)), Restarter(make_member("collect-1"))], 1
         )
         return make_model(algorithm, env, seed=1), env
 
@@ -211,7 +211,7 @@ def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, 
     configuration = make_configuration(algorithm=algorithm.model_dump())
     before, env = make(algorithm)
     before.learn(30)
-    state = checkpoint.State.of(before, env.snapshot(), {})
+    state = checkpoint.TrainingState.of(before, env.snapshot(), {})
     saver = checkpoint.Saver(tmp_path / "checkpoints", keep=1)
     saver.save(before, state, checkpoint.describe(configuration, 30, {}))
     after, _ = make(algorithm)

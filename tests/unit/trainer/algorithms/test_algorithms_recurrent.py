@@ -19,7 +19,7 @@ from palaestra_trainer.algorithms.recurrent import (
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 NUMBER = spaces.Box(-1e6, 1e6, (1,), np.float32)
 HYPERPARAMETERS = {"n_steps": 8, "batch_size": 4, "policy_kwargs": {"net_arch": [4], "lstm_hidden_size": 4}}
@@ -110,7 +110,7 @@ def model(make_member):
     members = [make_member("collect-0", steps=(3, 12)), make_member("collect-1")]
     wanted = Algorithm(name="RecurrentPPO", hyperparameters=HYPERPARAMETERS)
     check(wanted)
-    return make_model(wanted, SimulatorsVecEnv([Keeper(member) for member in members], 1), seed=1)
+    return make_model(wanted, SimulatorsVecEnv([Restarter(member) for member in members], 1), seed=1)
 
 
 def mended(rows):

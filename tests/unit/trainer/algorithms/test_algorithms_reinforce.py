@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from palaestra_trainer.algorithms import REINFORCE
 from palaestra_trainer.algorithms.episodes import EpisodeRecorder, returns_to_go
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def make_model(make_member):
 
     def make(members=1, faults=(), **options):
         made = [make_member(f"collect-{index}", steps=() if index else faults) for index in range(members)]
-        env = SimulatorsVecEnv([Keeper(member) for member in made], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(member) for member in made], run_seed=1)
         options = {"episodes_per_update": 2, "policy_kwargs": {"net_arch": [8]}} | options
         model = REINFORCE("MlpPolicy", env, seed=1, device="cpu", **options)
         batches = []

@@ -18,7 +18,7 @@ from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import ALGORITHMS, make_model, small_cnn
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
@@ -54,7 +54,7 @@ def save(make_member, tmp_path):
         if "n_steps" in hyperparameters and entry.replays:
             del hyperparameters["n_steps"]
         algorithm = Algorithm(name=name, hyperparameters=hyperparameters, **more)
-        env = SimulatorsVecEnv([Keeper(member)], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(member)], run_seed=1)
         checkpoint.save_tensors(tmp_path / "model.zip", make_model(algorithm, env, seed=1).learn(12))
         return tmp_path / "model.zip"
 

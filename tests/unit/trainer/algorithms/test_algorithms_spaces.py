@@ -13,14 +13,14 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run import training
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.telemetry.display import Lines
 from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.testing import FakeTask
-from palaestra_trainer.tolerant.players import Players
-from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
 
 NUMBERS = spaces.Box(-1.0, 1.0, (2,), np.float32)
 FEW = spaces.Discrete(3)
@@ -82,8 +82,8 @@ def play(members, make_configuration, tmp_path):
             return made
 
         simulators = [(entry.name, entry.role) for entry in configuration.simulators]
-        around = training.Surroundings(make_members=make_members, display=Lines(), environment={})
-        attempt = training.Attempt(
+        around = run_attempt.AttemptDependencies(make_members=make_members, display=Lines(), environment={})
+        attempt = run_attempt.Attempt(
             configuration, RunDirectory(tmp_path / "run"), Progress(configuration.steps, simulators), around
         )
         return attempt.play(), made
@@ -107,4 +107,4 @@ def test_a_vector_for_a_loop_of_one_s_own_refuses_it_too(members, seen, acted, t
     [member] = members(["collect-0"], seen, acted)
 
     with pytest.raises(ConfigurationError, match=told):
-        TolerantVecEnv(Players([Keeper(member)], lambda: None))
+        FaultTolerantVecEnv(EnvGroup([Restarter(member)], lambda: None))

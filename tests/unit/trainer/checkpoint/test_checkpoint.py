@@ -22,7 +22,7 @@ from palaestra_trainer.algorithms import buffers, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 HYPERPARAMETERS = {
     "DQN": {
@@ -60,7 +60,7 @@ class Trained:
 
     def save(self, step=None):
         """Save a checkpoint; return whether it was written."""
-        state = checkpoint.State.of(self.model, self._env.snapshot(), {"returns": [1.5]})
+        state = checkpoint.TrainingState.of(self.model, self._env.snapshot(), {"returns": [1.5]})
         step = self.model.num_timesteps if step is None else step
         return self.saver.save(
             self.model, state, checkpoint.describe(self.configuration, step, {"episodes": 4})
@@ -90,7 +90,7 @@ def trained(make_member, make_configuration, tmp_path):
 
     def make(name="DQN", steps=40):
         configuration = make_configuration(algorithm={"name": name, "hyperparameters": HYPERPARAMETERS[name]})
-        env = SimulatorsVecEnv([Keeper(make_member())], run_seed=1)
+        env = SimulatorsVecEnv([Restarter(make_member())], run_seed=1)
         model = make_model(configuration.algorithm, env, seed=1)
         made = Trained(model, env, configuration, tmp_path / "checkpoints")
         return made.learn(steps) if steps else made
@@ -548,7 +548,7 @@ def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member
     wide = Algorithm(
         name="DQN", hyperparameters=HYPERPARAMETERS["DQN"] | {"policy_kwargs": {"net_arch": [9]}}
     )
-    other = make_model(wide, SimulatorsVecEnv([Keeper(make_member())], 1), seed=1)
+    other = make_model(wide, SimulatorsVecEnv([Restarter(make_member())], 1), seed=1)
 
     with pytest.raises(ConfigurationError, match="does not fit DQN as configured"):
         checkpoint.load_tensors(tmp_path / "model.zip", other)

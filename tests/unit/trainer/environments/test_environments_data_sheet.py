@@ -14,12 +14,12 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.environments import MoveToTargetEnv, Options
+from palaestra_trainer.environments import MoveToTargetEnv, MoveToTargetOptions
 from palaestra_trainer.environments.actions import SCALE
 from palaestra_trainer.environments.move_to_target import REACHED_M, STANDING_M_S
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.environments.options import ACTIONS
-from palaestra_trainer.environments.rewards import MARGIN_M, TERMS, WEIGHTS, Outcome, Transition
+from palaestra_trainer.environments.rewards import MARGIN_M, TERMS, WEIGHTS, EpisodeOutcome, Transition
 from palaestra_trainer.robots import Movement
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 from palaestra_trainer.testing import fake_arena
@@ -64,7 +64,7 @@ def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
     """Length, order and bounds, for all the ways to choose and order parts."""
     robot, scene = fake_arena()
     for choice in CHOICES:
-        space = MoveToTargetEnv(robot, scene, Options(observe=choice)).observation_space
+        space = MoveToTargetEnv(robot, scene, MoveToTargetOptions(observe=choice)).observation_space
 
         assert isinstance(space, spaces.Box)
         assert space.low.tolist() == [it for part in choice for it in bounds(part, "min")]
@@ -84,7 +84,7 @@ def test_movements_are_on_the_sheet_with_their_speeds():
 
 def test_the_continuous_action_is_on_the_sheet_with_its_units():
     """1 means what the unit column says."""
-    space = MoveToTargetEnv(*fake_arena(), Options(actions="continuous")).action_space
+    space = MoveToTargetEnv(*fake_arena(), MoveToTargetOptions(actions="continuous")).action_space
 
     assert isinstance(space, spaces.Box)
     assert space.low.tolist() == [float(row["min"]) for row in TWIST]
@@ -102,7 +102,7 @@ def test_rewards_are_on_the_sheet_with_their_weights():
 @given(
     driven_m=st.floats(-0.1, 0.1),
     nearest_m=st.floats(SENSOR_RANGE_M[0], SENSOR_RANGE_M[1]),
-    outcome=st.sampled_from(Outcome),
+    outcome=st.sampled_from(EpisodeOutcome),
 )
 def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
     """A weight is chosen by what a term can be; a step drives a tenth of a meter."""

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from palaestra_trainer.environments import DeliverEnv
 from palaestra_trainer.environments.baselines import straight_to_target
-from palaestra_trainer.environments.tasks import APART_M
+from palaestra_trainer.environments.placement import APART_M
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.entry_point import make_delivering
 from palaestra_trainer.testing import FakeScene, fake_arena

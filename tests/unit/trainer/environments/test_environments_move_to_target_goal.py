@@ -11,7 +11,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
-from palaestra_trainer.environments import GoalOptions, MoveToTargetEnv, MoveToTargetGoalEnv, Options
+from palaestra_trainer.environments import (
+    GoalOptions,
+    MoveToTargetEnv,
+    MoveToTargetGoalEnv,
+    MoveToTargetOptions,
+)
 from palaestra_trainer.environments.move_to_target import REACHED_M
 from palaestra_trainer.environments.move_to_target_goal import FARTHEST_M
 from palaestra_trainer.errors import ConfigurationError
@@ -129,7 +134,7 @@ def test_a_collision_ends_the_episode(make_env):
 
 def test_the_same_seed_is_the_same_episode_as_in_the_task_without_goals(make_env):
     """So policies of both can be compared on the same episodes."""
-    plain = MoveToTargetEnv(*fake_arena(), Options(observe=GoalOptions().observe))
+    plain = MoveToTargetEnv(*fake_arena(), MoveToTargetOptions(observe=GoalOptions().observe))
     env = make_env()
 
     numbers, info = plain.reset(seed=5)

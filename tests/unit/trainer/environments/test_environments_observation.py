@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.environments.observation import PARTS, Situation, observe, space, velocity
+from palaestra_trainer.environments.observation import PARTS, StepState, observe, space, velocity
 from palaestra_trainer.robots import Pose
 
-SITUATION = Situation(
+SITUATION = StepState(
     distances_m=np.full(9, 0.4, np.float32),
     bumped=False,
     pose=Pose(1.0, 0.0, math.pi / 2),

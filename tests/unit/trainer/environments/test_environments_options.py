@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import pytest
 
-from palaestra_trainer.environments.options import Options, SeeOptions, parse, parse_as
+from palaestra_trainer.environments.options import MoveToTargetOptions, SeeOptions, parse, parse_as
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots import Movement
 
 
 def test_nothing_said_gives_the_defaults():
     """An example of two lines has to train."""
-    assert parse({}) == Options()
+    assert parse({}) == MoveToTargetOptions()
 
 
 def test_a_job_file_names_movements_and_parts_as_text():
     """YAML has no enumerations."""
     options = parse({"movements": ["STOP", "FORWARD"], "observe": ["target"], "max_steps": 50})
 
-    assert options == Options(movements=(Movement.STOP, Movement.FORWARD), observe=["target"], max_steps=50)
+    assert options == MoveToTargetOptions(
+        movements=(Movement.STOP, Movement.FORWARD), observe=["target"], max_steps=50
+    )
 
 
 def test_python_may_use_the_enumeration():

@@ -9,15 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_trainer.environments import rewards
-from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, Outcome, Transition, reward_terms
+from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, EpisodeOutcome, Transition, reward_terms
 
-SINGLE = tuple(it for it in Outcome if it is not Outcome.DELIVERED)  # what a task with one target can lead to
+SINGLE = tuple(
+    it for it in EpisodeOutcome if it is not EpisodeOutcome.DELIVERED
+)  # what a task with one target can lead to
 
 
 def transition(
     before_m: float = 1.0,
     after_m: float = 1.0,
-    outcome: Outcome = Outcome.RUNNING,
+    outcome: EpisodeOutcome = EpisodeOutcome.RUNNING,
     nearest_m: float = 0.4,
 ) -> Transition:
     """Return a step in which nothing happened but what is said."""
@@ -54,9 +56,9 @@ def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
 @pytest.mark.parametrize(
     ("term", "outcome"),
     [
-        (rewards.success, Outcome.REACHED),
-        (rewards.collision, Outcome.COLLIDED),
-        (rewards.time_up, Outcome.TIME_UP),
+        (rewards.success, EpisodeOutcome.REACHED),
+        (rewards.collision, EpisodeOutcome.COLLIDED),
+        (rewards.time_up, EpisodeOutcome.TIME_UP),
     ],
 )
 def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
@@ -68,7 +70,7 @@ def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
 
 def test_every_step_has_the_same_duration():
     """Whatever else happens in it."""
-    assert {rewards.duration(transition(outcome=it)) for it in Outcome} == {1.0}
+    assert {rewards.duration(transition(outcome=it)) for it in EpisodeOutcome} == {1.0}
 
 
 @pytest.mark.parametrize("reward", WEIGHTS)
@@ -79,7 +81,7 @@ def test_a_reward_is_made_of_known_terms(reward):
 
 def test_terms_are_reported_weighted():
     """The terms that are plotted add up to the reward that the policy learns from."""
-    step = transition(1.0, 0.9, Outcome.REACHED)
+    step = transition(1.0, 0.9, EpisodeOutcome.REACHED)
 
     terms = reward_terms("Dense", step)
 
@@ -89,20 +91,21 @@ def test_terms_are_reported_weighted():
 def test_sparse_pays_at_the_end_only():
     """A step on the way is worth nothing, however much progress it makes."""
     assert sum(reward_terms("Sparse", transition(2.0, 1.9)).values()) == 0.0
-    assert sum(reward_terms("Sparse", transition(outcome=Outcome.REACHED)).values()) > 0.0
-    assert sum(reward_terms("Sparse", transition(outcome=Outcome.COLLIDED)).values()) < 0.0
-    assert sum(reward_terms("Sparse", transition(outcome=Outcome.TIME_UP)).values()) < 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=EpisodeOutcome.REACHED)).values()) > 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=EpisodeOutcome.COLLIDED)).values()) < 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=EpisodeOutcome.TIME_UP)).values()) < 0.0
 
 
 @pytest.mark.parametrize("reward", WEIGHTS)
 def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
     """The episode goes on after all but the last."""
     delivered, reached = (
-        reward_terms(reward, transition(outcome=it)) for it in (Outcome.DELIVERED, Outcome.REACHED)
+        reward_terms(reward, transition(outcome=it))
+        for it in (EpisodeOutcome.DELIVERED, EpisodeOutcome.REACHED)
     )
 
     assert delivered == reached
-    assert not Outcome.DELIVERED.terminal
+    assert not EpisodeOutcome.DELIVERED.terminal
 
 
 @pytest.mark.parametrize("reward", WEIGHTS)
@@ -110,10 +113,10 @@ def test_reaching_the_target_is_the_best_end(reward):
     """Neither giving up nor running into a cylinder early may pay."""
     worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in SINGLE}
 
-    assert max(worth, key=worth.__getitem__) is Outcome.REACHED
-    assert min(worth, key=worth.__getitem__) is Outcome.COLLIDED
+    assert max(worth, key=worth.__getitem__) is EpisodeOutcome.REACHED
+    assert min(worth, key=worth.__getitem__) is EpisodeOutcome.COLLIDED
 
 
 def test_the_end_of_the_time_is_no_end_of_the_task():
     """So a learner goes on estimating from there."""
-    assert [it for it in Outcome if it.terminal] == [Outcome.REACHED, Outcome.COLLIDED]
+    assert [it for it in EpisodeOutcome if it.terminal] == [EpisodeOutcome.REACHED, EpisodeOutcome.COLLIDED]

@@ -7,12 +7,12 @@ import pytest
 
 from palaestra.api.fields import ROBOTS
 from palaestra_trainer.configuration import Environment
-from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
 from palaestra_trainer.robots import Joints, RobotAbc, SceneWrapper
-from palaestra_trainer.robots.choosing import SHIPPED, robot_class
 from palaestra_trainer.robots.differential import DifferentialDrive, TurtleBot3Burger
 from palaestra_trainer.robots.joints import JointRobot
+from palaestra_trainer.robots.registry import SHIPPED, robot_class
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.testing import fake_arena, fake_court
 

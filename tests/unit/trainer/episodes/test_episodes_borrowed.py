@@ -16,11 +16,11 @@ from gymnasium import spaces
 from palaestra_trainer.copies import copied
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.tolerant.env import TolerantEnv
-from palaestra_trainer.tolerant.players import Players
-from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
-from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
+from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
+from palaestra_trainer.simulators.restarter import Restarter
 
 LENGTH = 3
 STEPS = 8
@@ -105,7 +105,7 @@ def keeper(make_member):
     def make(environment):
         member = make_member("collect-0")
         member.env = environment()
-        return Keeper(member)
+        return Restarter(member)
 
     return make
 
@@ -124,20 +124,20 @@ def collected(keeper):
 
 def tolerated(keeper):
     """Return the rows of Stable-Baselines3's interface."""
-    env = TolerantVecEnv(Players([keeper], lambda: None))
+    env = FaultTolerantVecEnv(EnvGroup([keeper], lambda: None))
     env.seed(1)
     return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
 
 
 def vectorized(keeper):
     """Return the rows of gymnasium's vector interface."""
-    env = TolerantVectorEnv(Players([keeper], lambda: None))
+    env = FaultTolerantVectorEnv(EnvGroup([keeper], lambda: None))
     return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
 
 
 def alone(keeper):
     """Return the rows of a single environment."""
-    env = TolerantEnv(Players([keeper], lambda: None))
+    env = FaultTolerantEnv(EnvGroup([keeper], lambda: None))
     rows = []
     for number, [action] in enumerate(actions()):
         if number % LENGTH == 0:

@@ -8,7 +8,7 @@ from gymnasium import spaces
 
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 
 RIGHT, LEFT = 1, 0
 
@@ -19,7 +19,7 @@ def make_env(make_member):
 
     def make(*faults, run_seed=1):
         members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
-        return SimulatorsVecEnv([Keeper(member) for member in members], run_seed), members
+        return SimulatorsVecEnv([Restarter(member) for member in members], run_seed), members
 
     return make
 

@@ -7,9 +7,9 @@ import pytest
 from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.simulators.budget import Group, RestartLimit
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.member import NullWatcher
-from palaestra_trainer.waiting.interruption import Interrupted
+from palaestra_trainer.simulators.interface import NullWatcher
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.waiting.signals import Interrupted
 
 
 class Losses(NullWatcher):
@@ -61,7 +61,7 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
     """All policies are measured on the same episodes, whatever broke."""
     member, losses = make_member(steps=[5]), Losses()
 
-    evaluation = evaluate(Walker(), Keeper(member, watcher=losses), [10, 20])
+    evaluation = evaluate(Walker(), Restarter(member, watcher=losses), [10, 20])
 
     assert member.env.seeds == [10, 20, 20]
     assert (evaluation.faults, losses.steps) == (1, 1)
@@ -70,7 +70,7 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
 
 def test_a_spent_budget_ends_an_evaluation(make_member):
     """As it ends training."""
-    keeper = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
+    keeper = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
 
     with pytest.raises(FaultBudgetSpent):
         evaluate(Walker(), keeper, [10])
@@ -79,7 +79,7 @@ def test_a_spent_budget_ends_an_evaluation(make_member):
 @pytest.mark.parametrize("evaluators", [1, 2, 3, 5])
 def test_several_simulators_share_the_episodes(make_member, evaluators):
     """The result does not depend on how many there are, nor does its order."""
-    keepers = [Keeper(make_member(f"evaluate-{index}")) for index in range(evaluators)]
+    keepers = [Restarter(make_member(f"evaluate-{index}")) for index in range(evaluators)]
 
     evaluation = evaluate_on_all(Walker(), keepers, [10, 21, 32, 43])
 
@@ -102,9 +102,9 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
 @pytest.mark.parametrize("first", [True, False])
 def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
     """After Ctrl-C the other half of the episodes must not be played."""
-    broken = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
+    broken = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
     other = make_member("evaluate-1")
-    keepers = [broken, Keeper(other)] if first else [Keeper(other), broken]
+    keepers = [broken, Restarter(other)] if first else [Restarter(other), broken]
 
     with pytest.raises(FaultBudgetSpent):
         evaluate_on_all(Walker(), keepers, range(10_000))
@@ -117,7 +117,7 @@ def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
     broken = make_member("evaluate-0", steps=[1], held=True)
     other = make_member("evaluate-1")
 
-    evaluation = evaluate_on_all(Walker(), [Keeper(broken), Keeper(other)], [10, 21, 32, 43])
+    evaluation = evaluate_on_all(Walker(), [Restarter(broken), Restarter(other)], [10, 21, 32, 43])
 
     assert [episode.seed for episode in evaluation.episodes] == [10, 21, 32, 43]
     assert evaluation.faults == 1
@@ -130,8 +130,8 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
     """Also if they have ended all of their own by then."""
     group = Group(2, least=1)
     keepers = [
-        Keeper(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
-        Keeper(make_member("evaluate-1"), group=group),
+        Restarter(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
+        Restarter(make_member("evaluate-1"), group=group),
     ]
 
     for _ in range(2):
@@ -143,7 +143,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
     """It would wait for ever."""
-    keeper = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
+    keeper = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):
         evaluate(Walker(), keeper, [10])

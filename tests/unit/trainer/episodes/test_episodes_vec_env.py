@@ -16,9 +16,9 @@ from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
 from palaestra_trainer.simulators.budget import Group, RestartLimit
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.waiting.interruption import Interrupted
-from palaestra_trainer.waiting.turns import let_others
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.waiting.greenlets import let_others
+from palaestra_trainer.waiting.signals import Interrupted
 
 RIGHT, LEFT = 1, 0
 
@@ -29,7 +29,7 @@ def make_env():
     made = []
 
     def make(*members, limit=None, run_seed=1, **options):
-        keepers = [Keeper(member, limit) for member in members]
+        keepers = [Restarter(member, limit) for member in members]
         env = SimulatorsVecEnv(keepers, run_seed, **options)
         made.append(env)
         return env
@@ -395,7 +395,7 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
     """One fault an hour for a week is no reason to give up."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
-    keeper = Keeper(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
+    keeper = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
 
@@ -413,7 +413,7 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
         make_member("collect-1"),
         make_member("collect-2", steps=range(40, 100)),
     ]
-    keepers = [Keeper(member, RestartLimit(restarts=1), group=group) for member in members]
+    keepers = [Restarter(member, RestartLimit(restarts=1), group=group) for member in members]
     env = SimulatorsVecEnv(keepers, 1)
     env.reset()
     for steps in (1, 2):
@@ -445,7 +445,7 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
 
 def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, clock):
     """A line every few seconds hides those that matter; the first says that the limits work."""
-    keeper = Keeper(make_member(recycle_after=1), clock=clock)
+    keeper = Restarter(make_member(recycle_after=1), clock=clock)
 
     with structlog.testing.capture_logs() as logs:
         keeper.reset(seed=1)

@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory, read_lines
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS
@@ -92,7 +92,7 @@ def train(make_member, make_configuration, tmp_path):
             evaluation={"everySteps": 8, "episodes": 1, "confirmEpisodes": 0},
         )
         directory = RunDirectory(tmp_path / "run")
-        assert training.run(configuration, directory, make_members) == 0
+        assert attempt.run(configuration, directory, make_members) == 0
         return directory
 
     return run

@@ -14,8 +14,8 @@ from palaestra_protocol.pod.status import Cause
 from palaestra_trainer import checkpoint
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, MasterLost
-from palaestra_trainer.run import training
-from palaestra_trainer.run.measuring import measure
+from palaestra_trainer.run import attempt
+from palaestra_trainer.run.evaluate import measure
 from palaestra_trainer.run_directory import RunDirectory, read_lines
 
 
@@ -163,7 +163,7 @@ def test_a_mistake_is_reported_before_a_simulator_is_made(play, job, last_word, 
 
 def test_missing_members_are_reported(job, directory, last_word):
     """The function that makes them left one out."""
-    code = training.run(job(), directory, lambda _: [])
+    code = attempt.run(job(), directory, lambda _: [])
 
     assert code == 2
     assert "collect-0, evaluate-0" in last_word().reason

@@ -11,7 +11,7 @@ import pytest
 from palaestra_trainer.algorithms.replay_size import ReplaySize
 from palaestra_trainer.configuration import Checkpoint
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run.capacity import (
     RESERVE_BYTES,
     Capacity,
@@ -147,7 +147,7 @@ def test_a_run_whose_buffer_does_not_fit_ends_with_2_before_a_simulator_starts(
 ):
     """The largest size in the message is then accepted."""
     room = Capacity(memory_bytes=3000, memory_limit=True, disk_bytes=GB)
-    monkeypatch.setattr(training, "capacity_now", lambda _: room)
+    monkeypatch.setattr(attempt, "capacity_now", lambda _: room)
 
     code, members = play(job())
     reason = last_word().reason

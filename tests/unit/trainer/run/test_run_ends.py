@@ -25,7 +25,7 @@ from palaestra_trainer.run.termination import end_of, write_last_word
 from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.telemetry.logs import configure_logs, last_lines
 from palaestra_trainer.telemetry.progress import Progress
-from palaestra_trainer.waiting.interruption import Interrupted, Interruption
+from palaestra_trainer.waiting.signals import Interrupted, Interruption
 
 
 @pytest.mark.parametrize(

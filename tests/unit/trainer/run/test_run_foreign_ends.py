@@ -16,9 +16,9 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3.common.callbacks import BaseCallback
 
-from palaestra_trainer.run import training
+from palaestra_trainer.run import attempt
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.waiting.leaving import leave_after
+from palaestra_trainer.waiting.exit import leave_after
 
 AT_STEP = 5
 
@@ -110,7 +110,7 @@ def play(make_member, make_configuration, tmp_path, monkeypatch):
             steps=32,
             evaluation={"everySteps": 0},
         )
-        code = training.run(configuration, RunDirectory(tmp_path / "run"), make_members)
+        code = attempt.run(configuration, RunDirectory(tmp_path / "run"), make_members)
         return code, json.loads(word.read_text())["reason"], tasks
 
     return run

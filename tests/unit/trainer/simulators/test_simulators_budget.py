@@ -8,10 +8,10 @@ import pytest
 
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.member import NullWatcher
-from palaestra_trainer.simulators.meter import Pace
-from palaestra_trainer.waiting.turns import let_others, take_turns
+from palaestra_trainer.simulators.interface import NullWatcher
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.simulators.stats import Pace
+from palaestra_trainer.waiting.greenlets import let_others, take_turns
 
 DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("robotino", "does not answer")
 
@@ -94,7 +94,7 @@ def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
     watcher = NullWatcher()
     watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
     members = [make_member("collect-0"), make_member("collect-1")]
-    keepers = [Keeper(member, watcher=watcher) for member in members]
+    keepers = [Restarter(member, watcher=watcher) for member in members]
     for keeper in keepers:
         keeper.reset(1)
 

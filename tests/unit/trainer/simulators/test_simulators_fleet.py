@@ -24,9 +24,9 @@ from palaestra_trainer.errors import (
 )
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.fleet import Fleet, resting
-from palaestra_trainer.simulators.keeper import Keeper, await_one
-from palaestra_trainer.simulators.member import NullWatcher
-from palaestra_trainer.waiting.interruption import Interrupted, Interruption
+from palaestra_trainer.simulators.interface import NullWatcher
+from palaestra_trainer.simulators.restarter import Restarter, await_one
+from palaestra_trainer.waiting.signals import Interrupted, Interruption
 
 DEADLINE_S = 5.0
 
@@ -315,7 +315,7 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
 def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
     """The others collect meanwhile; a member that runs before it rests again would step while paused."""
     member = make_member(recycle_after=1, held=True)
-    keeper = Keeper(member)
+    keeper = Restarter(member)
     keeper.reset(seed=1)
 
     keeper.recycle_resting(episodes=1)
@@ -329,7 +329,7 @@ def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_ru
 def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
     """Its next evaluation is over before it is worn."""
     member = make_member(recycle_after=24)
-    keeper = Keeper(member)
+    keeper = Restarter(member)
     keeper.reset(seed=1)
 
     keeper.recycle_resting(episodes=20)
@@ -341,7 +341,7 @@ def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
 def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make_member):
     """In the background again: another simulator may play its episodes."""
     member = make_member(recycle_after=1, starts=[1])
-    keeper = Keeper(member)
+    keeper = Restarter(member)
     keeper.reset(seed=1)
 
     keeper.recycle_resting(episodes=1)
@@ -370,7 +370,7 @@ def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make
 
 def test_fifty_faults_leave_nothing_behind(make_member):
     """Neither threads nor descriptors: a week of training has many more."""
-    keeper = Keeper(make_member(), RestartLimit(restarts=50))
+    keeper = Restarter(make_member(), RestartLimit(restarts=50))
     threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 
     for number in range(50):

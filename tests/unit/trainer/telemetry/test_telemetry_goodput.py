@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.telemetry.goodput import Goodput, trained_share
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.telemetry.goodput import GoodputLedger, trained_share
 from palaestra_trainer.telemetry.progress import Progress
-from palaestra_trainer.waiting.waits import count_wait, waited_s
+from palaestra_trainer.waiting.wait_time import count_wait, waited_s
 
 
 class Clock:
@@ -32,7 +32,7 @@ class Clock:
 
     def ledger(self):
         """Open a ledger."""
-        return Goodput(lambda: self.now, lambda: self.waited)
+        return GoodputLedger(lambda: self.now, lambda: self.waited)
 
 
 @pytest.fixture
@@ -233,7 +233,7 @@ def steps(clock, make_member):
             clock.pass_(5)
             member.release.set()
 
-        env = SimulatorsVecEnv([Keeper(member, watcher=progress)], run_seed=1, check=check)
+        env = SimulatorsVecEnv([Restarter(member, watcher=progress)], run_seed=1, check=check)
         take_step = member.take_step
         member.take_step = lambda: (clock.pass_(1), take_step())
         env.reset()

@@ -12,16 +12,16 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
-from palaestra_trainer.episodes.evaluation import Episode, Evaluation
+from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
-from palaestra_trainer.families import FAMILIES
-from palaestra_trainer.run.training import Attempt, Surroundings
+from palaestra_trainer.metric_definitions import FAMILIES
+from palaestra_trainer.run.attempt import Attempt, AttemptDependencies
 from palaestra_trainer.simulators.budget import RestartLimit
-from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.telemetry import metrics
 from palaestra_trainer.telemetry.display import Lines
-from palaestra_trainer.telemetry.figures import Logged
+from palaestra_trainer.telemetry.metric_values import Logged
 from palaestra_trainer.telemetry.progress import Progress
 
 
@@ -93,7 +93,7 @@ def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
     """With the number of evaluations."""
     for success in (True, False):
         played = Episode(seed=1, total_reward=2.0, length=3, success=success)
-        progress.evaluated(Evaluation(episodes=(played,), faults=0, seconds=0.1))
+        progress.evaluated(EvaluationResult(episodes=(played,), faults=0, seconds=0.1))
 
     assert values(progress, "palaestra_trainer_evaluations_total") == {(): 2}
     assert values(progress, "palaestra_trainer_evaluation_success_ratio") == {(): 0}
@@ -149,7 +149,7 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
     """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
-    keeper = Keeper(make_member(), RestartLimit(restarts=4), progress, clock)
+    keeper = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
     progress.figures.meters = {"collect-0": keeper.meter}
     keeper.reset(1)
     keeper.step(1)
@@ -167,7 +167,7 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
 
 def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
     """By the same window by which the simulator is given up."""
-    keeper = Keeper(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
+    keeper = Restarter(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
     keeper.begin_mending(SimulatorDead("collect-0", "gone"))
     await_one([keeper])
     before = keeper.meter.budget_spent
@@ -180,7 +180,7 @@ def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
     """The rate of it is the real-time factor."""
     member = make_member()
     member.simulated_s = 1.92
-    progress.figures.meters = {"collect-0": Keeper(member).meter}
+    progress.figures.meters = {"collect-0": Restarter(member).meter}
 
     assert values(progress, "palaestra_simulator_simulated_seconds_total", "simulator") == {
         ("collect-0",): 1.92
@@ -194,7 +194,7 @@ def train(job, directory, make_member):
     def run():
         configuration = job("DQN")
         progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
-        around = Surroundings(
+        around = AttemptDependencies(
             make_members=lambda given: [make_member(it.name) for it in given.simulators],
             display=Lines(),
             environment={},
@@ -227,7 +227,7 @@ def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, 
     with socket.create_server(("127.0.0.1", 0)) as taken:
         configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
         progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
-        around = Surroundings(make_members=lambda _: [], display=Lines(), environment={})
+        around = AttemptDependencies(make_members=lambda _: [], display=Lines(), environment={})
         end = Attempt(configuration, directory, progress, around).play()
 
     assert "is in use" in end.message

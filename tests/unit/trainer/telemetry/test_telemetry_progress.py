@@ -11,7 +11,7 @@ import urllib.request
 import pytest
 
 from palaestra_protocol.pod.status import Cause, TrainerStatus
-from palaestra_trainer.episodes.evaluation import Episode, Evaluation
+from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.status_server import status_server
@@ -32,7 +32,7 @@ def get(server, path):
 def evaluation(*, success):
     """Return an evaluation of one episode."""
     episode = Episode(seed=1, total_reward=1.0, length=3, success=success)
-    return Evaluation(episodes=(episode,), faults=1, seconds=0.1)
+    return EvaluationResult(episodes=(episode,), faults=1, seconds=0.1)
 
 
 def test_at_the_start_nothing_is_known(progress):

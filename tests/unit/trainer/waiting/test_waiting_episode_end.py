@@ -9,7 +9,7 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from palaestra_trainer.waiting import episode_end
@@ -38,7 +38,7 @@ def keeper(make_member):
     """The keeper of a member with the task."""
     member = make_member("collect-0")
     member.env = Endless(OBSERVATIONS["Box"], ACTIONS["Discrete"])
-    return Keeper(member)
+    return Restarter(member)
 
 
 @pytest.fixture(autouse=True)

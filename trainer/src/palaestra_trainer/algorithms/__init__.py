@@ -1,13 +1,13 @@
 """The learning algorithms: Stable-Baselines3's, sb3-contrib's and users' own, made safe against faults."""
 
-from palaestra_trainer.algorithms.entries import ALGORITHMS, entry_of
-from palaestra_trainer.algorithms.fitting import refuse_spaces
-from palaestra_trainer.algorithms.futile import futile
-from palaestra_trainer.algorithms.kept import begin_with, begun_with, keep
+from palaestra_trainer.algorithms.ineffective_settings import futile
+from palaestra_trainer.algorithms.make_model import check, make_model
 from palaestra_trainer.algorithms.masks import is_masked, predict_allowed, refuse_without_masks, takes_masks
 from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of
+from palaestra_trainer.algorithms.registry import ALGORITHMS, entry_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
-from palaestra_trainer.algorithms.table import check, make_model
+from palaestra_trainer.algorithms.saved_hyperparameters import begin_with, begun_with, keep
+from palaestra_trainer.algorithms.space_compat import refuse_spaces
 
 __all__ = [
     "ALGORITHMS",

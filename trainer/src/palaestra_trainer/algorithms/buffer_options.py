@@ -12,16 +12,16 @@ from typing import Any
 from gymnasium import spaces
 from stable_baselines3.common.buffers import BaseBuffer, ReplayBuffer, RolloutBuffer
 
-from palaestra_trainer import own
+from palaestra_trainer import user_imports
 from palaestra_trainer.algorithms import her, own_buffers
-from palaestra_trainer.algorithms.signatures import parameters
-from palaestra_trainer.algorithms.values import FIELD
+from palaestra_trainer.algorithms.constructor_params import parameters
+from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class BufferKind:
     """A kind of buffer, and the two hyperparameters that choose one.
 
     Attributes:
@@ -42,8 +42,8 @@ class Kind:
         return self.chooser, self.options
 
 
-REPLAY = Kind("replay_buffer_class", "replay_buffer_kwargs", ReplayBuffer, (her.NAME,))
-ROLLOUT = Kind("rollout_buffer_class", "rollout_buffer_kwargs", RolloutBuffer)
+REPLAY = BufferKind("replay_buffer_class", "replay_buffer_kwargs", ReplayBuffer, (her.NAME,))
+ROLLOUT = BufferKind("rollout_buffer_class", "rollout_buffer_kwargs", RolloutBuffer)
 KINDS = (REPLAY, ROLLOUT)
 NAMES = (*REPLAY.names, *ROLLOUT.names)
 
@@ -74,9 +74,9 @@ def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[
     return found
 
 
-def _mistakes(kind: Kind, chosen: Any, options: Any) -> Iterator[str]:
+def _mistakes(kind: BufferKind, chosen: Any, options: Any) -> Iterator[str]:
     known: dict[str, object] | None = None
-    if own.names_class(chosen):
+    if user_imports.names_class(chosen):
         try:
             known = _options(_own(kind, chosen))
         except ConfigurationError as error:
@@ -92,7 +92,7 @@ def _mistakes(kind: Kind, chosen: Any, options: Any) -> Iterator[str]:
         yield f"{FIELD}.{kind.options}: {options!r} is refused; give a mapping"
     elif known is not None:
         yield from _unknown(f"{FIELD}.{kind.options}", options, known)
-    elif kind is REPLAY and not own.names_class(chosen):
+    elif kind is REPLAY and not user_imports.names_class(chosen):
         yield from her.mistakes(options, f"{FIELD}.{kind.options}")
 
 
@@ -103,9 +103,9 @@ def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]
             yield f"{field}.{name}: is not an option here; {remedy}"
 
 
-def _own(kind: Kind, name: str) -> type[BaseBuffer]:
+def _own(kind: BufferKind, name: str) -> type[BaseBuffer]:
     """Return the class that `name` names, made to store or sample valid rows only."""
-    return own_buffers.with_valid_rows(own.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
+    return own_buffers.with_valid_rows(user_imports.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
 
 
 def _options(cls: type[BaseBuffer]) -> dict[str, object]:

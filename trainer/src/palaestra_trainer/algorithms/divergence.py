@@ -3,7 +3,7 @@
 After each update, its losses and every learned tensor are checked: one norm per tensor, all in one call.
 That takes 0.05 to 0.2 ms: 0.6 % of an update of DQN, 0.04 % of one of PPO and 2 % of one of A2C, whose
 rollout of five steps takes as long again. No model acts, is evaluated or is saved before this check.
-Observations and rewards are checked where they arise, in `palaestra_trainer.simulators.numbers`.
+Observations and rewards are checked where they arise, in `palaestra_trainer.simulators.finite_check`.
 """
 
 from __future__ import annotations

@@ -15,9 +15,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.preprocessing import is_image_space_channels_first
 from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage, unwrap_vec_wrapper
 
-from palaestra_trainer.algorithms.fitting import images_in
 from palaestra_trainer.algorithms.observations import Observations
 from palaestra_trainer.algorithms.small_cnn import SmallCnn
+from palaestra_trainer.algorithms.space_compat import images_in
 from palaestra_trainer.configuration import Cnn
 
 

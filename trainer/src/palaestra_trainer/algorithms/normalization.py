@@ -20,8 +20,8 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from palaestra_trainer.algorithms.buffers import valid_rows
-from palaestra_trainer.algorithms.fitting import scalable
 from palaestra_trainer.algorithms.observations import Observations, by_name, part
+from palaestra_trainer.algorithms.space_compat import scalable
 from palaestra_trainer.configuration import Normalize
 
 

@@ -31,8 +31,8 @@ from palaestra_trainer.algorithms.buffers import (
     ValidReplayBuffer,
     ValidRolloutBuffer,
 )
+from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
-from palaestra_trainer.algorithms.values import FIELD
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
 # Rollout buffers, and the class for valid rows of each; the classes that extend others come first.

@@ -7,18 +7,18 @@ unpickles nothing: the model is rebuilt from the configuration, tensors are read
 rest is JSON and plain arrays. How a resumed run comes to be the same: docs/decisions/0008-exact-resume.md.
 """
 
-from palaestra_trainer.checkpoint.initial import begin_from
-from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
-from palaestra_trainer.checkpoint.state import State
+from palaestra_trainer.checkpoint.initial_policy import begin_from
+from palaestra_trainer.checkpoint.manifest import Manifest, SavedCheckpoint, describe, refuse_another_run
+from palaestra_trainer.checkpoint.state import TrainingState
 from palaestra_trainer.checkpoint.store import Saver, newest, restore, tidy
 from palaestra_trainer.checkpoint.tensors import Tensors, load_tensors, save_tensors
 
 __all__ = [
-    "Checkpoint",
     "Manifest",
+    "SavedCheckpoint",
     "Saver",
-    "State",
     "Tensors",
+    "TrainingState",
     "begin_from",
     "describe",
     "load_tensors",

@@ -52,7 +52,7 @@ class Manifest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checkpoint:
+class SavedCheckpoint:
     """A checkpoint whose files are what its manifest says.
 
     Attributes:
@@ -80,7 +80,7 @@ def describe(configuration: Configuration, step: int, counters: Mapping[str, Any
     )
 
 
-def read(folder: Path) -> Checkpoint:
+def read(folder: Path) -> SavedCheckpoint:
     """Return the checkpoint in a folder, its files compared with their digests.
 
     Raises:
@@ -92,7 +92,7 @@ def read(folder: Path) -> Checkpoint:
     for name in damaged:
         if not name.startswith(EXPERIENCE):
             raise ValueError(f"{name} is not what the manifest says")
-    return Checkpoint(path=folder, manifest=manifest, lost=frozenset(damaged))
+    return SavedCheckpoint(path=folder, manifest=manifest, lost=frozenset(damaged))
 
 
 def digest_of(path: Path) -> str:
@@ -101,7 +101,7 @@ def digest_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def refuse_another_run(checkpoint: Checkpoint, configuration: Configuration) -> None:
+def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration) -> None:
     """Return if the checkpoint is of a run of this configuration.
 
     Raises:

@@ -18,13 +18,13 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import noise as action_noise
-from palaestra_trainer.algorithms.beside import beside
 from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
 from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.algorithms.observations import Observations, by_name, from_names
-from palaestra_trainer.checkpoint import recollection
-from palaestra_trainer.checkpoint.generators import Generators
+from palaestra_trainer.algorithms.rollout_state import beside
+from palaestra_trainer.checkpoint import recurrent_state
+from palaestra_trainer.checkpoint.rng import Generators
 from palaestra_trainer.episodes.episode_state import EpisodeState
 
 STATE = "state.json"
@@ -35,7 +35,7 @@ _NOISE = ("exploration_mat", "exploration_matrices")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State:
+class TrainingState:
     """A run at a rollout boundary.
 
     Attributes:
@@ -73,7 +73,9 @@ class State:
     running_returns: np.ndarray | None = None
 
     @classmethod
-    def of(cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]) -> State:
+    def of(
+        cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]
+    ) -> TrainingState:
         """Return the state of a model that has begun to learn and is at a rollout boundary."""
         buffer, normalizer = replay_buffer(model), normalizer_of(model)
         seen = normalizer.old_obs if normalizer else model._last_obs
@@ -88,8 +90,8 @@ class State:
             members=members,
             rollout=rollout,
             noise={name: getattr(_noise_of(model), name) for name in _NOISE if model.use_sde},
-            networks=[parameter.detach().clone() for parameter in recollection.networks(model)],
-            memories=recollection.memories(model),
+            networks=[parameter.detach().clone() for parameter in recurrent_state.networks(model)],
+            memories=recurrent_state.memories(model),
             action_noise=action_noise.positions(getattr(model, "action_noise", None)),
             scales=normalizer.scales if normalizer else None,
             running_returns=normalizer.returns if normalizer else None,
@@ -110,10 +112,10 @@ class State:
         for name, matrix in self.noise.items():
             setattr(_noise_of(model), name, matrix.to(model.device))
         with torch.no_grad():
-            for parameter, copy in zip(recollection.networks(model), self.networks, strict=False):
+            for parameter, copy in zip(recurrent_state.networks(model), self.networks, strict=False):
                 parameter.copy_(copy)
         if self.memories:
-            recollection.remember(model, self.memories)
+            recurrent_state.remember(model, self.memories)
         if self.action_noise is not None:
             action_noise.put_back(model.action_noise, self.action_noise)
 
@@ -154,7 +156,7 @@ class State:
         (folder / STATE).write_text(text + "\n", encoding="utf-8")
 
     @classmethod
-    def read(cls, folder: Path) -> State:
+    def read(cls, folder: Path) -> TrainingState:
         """Return what `write` wrote there.
 
         Raises:

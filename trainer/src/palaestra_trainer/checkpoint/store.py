@@ -12,9 +12,9 @@ from pathlib import Path
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.checkpoint import experience, manifest, own_buffer
-from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, digest_of
-from palaestra_trainer.checkpoint.state import State, replay_buffer
+from palaestra_trainer.checkpoint import manifest, own_buffer, replay_store
+from palaestra_trainer.checkpoint.manifest import Manifest, SavedCheckpoint, digest_of
+from palaestra_trainer.checkpoint.state import TrainingState, replay_buffer
 from palaestra_trainer.checkpoint.tensors import load_tensors, save_tensors
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import sync
@@ -35,12 +35,12 @@ class Saver:
         resumed: the checkpoint that the attempt went on from.
     """
 
-    def __init__(self, folder: Path, keep: int, resumed: Checkpoint | None = None) -> None:
+    def __init__(self, folder: Path, keep: int, resumed: SavedCheckpoint | None = None) -> None:
         self._folder = folder
         self._keep = keep
         self._before = resumed
 
-    def save(self, model: BaseAlgorithm, state: State, described: Manifest) -> bool:
+    def save(self, model: BaseAlgorithm, state: TrainingState, described: Manifest) -> bool:
         """Write a checkpoint of the model, which is put back to `state`; remove all but the newest.
 
         Returns whether it was written: a full disk is logged, and leaves those that
@@ -64,7 +64,7 @@ class Saver:
                 raise
             log.error("checkpoint not written: disk full", step=described.step, folder=str(self._folder))
             return False
-        self._before = Checkpoint(path=target, manifest=complete)
+        self._before = SavedCheckpoint(path=target, manifest=complete)
         if buffer := replay_buffer(model):
             buffer.changed.clear()
         self._prune(described.step)
@@ -84,7 +84,9 @@ class Saver:
         except OSError:
             return 0
 
-    def _write(self, draft: Path, model: BaseAlgorithm, state: State, described: Manifest) -> Manifest:
+    def _write(
+        self, draft: Path, model: BaseAlgorithm, state: TrainingState, described: Manifest
+    ) -> Manifest:
         save_tensors(draft / MODEL, model)
         state.write(draft)
         own_buffer.write(model, draft)
@@ -93,7 +95,7 @@ class Saver:
             sync(file)
             files[file.name] = digest_of(file)
         if buffer := replay_buffer(model):
-            files |= experience.write(buffer, draft, self._before)
+            files |= replay_store.write(buffer, draft, self._before)
         complete = dataclasses.replace(described, files=files)
         complete.write(draft)
         sync(draft / manifest.MANIFEST)
@@ -107,7 +109,7 @@ class Saver:
             shutil.rmtree(path, ignore_errors=True)
 
 
-def newest(folder: Path) -> Checkpoint | None:
+def newest(folder: Path) -> SavedCheckpoint | None:
     """Return the newest checkpoint that is undamaged; None if the folder has none. Nothing is changed.
 
     Where chunks of experience are shared, damage to one may be damage to all: then the
@@ -143,7 +145,7 @@ def newest(folder: Path) -> Checkpoint | None:
     return rest
 
 
-def restore(checkpoint: Checkpoint, model: BaseAlgorithm) -> State:
+def restore(checkpoint: SavedCheckpoint, model: BaseAlgorithm) -> TrainingState:
     """Put tensors and experience of a checkpoint into a new model of the same configuration.
 
     Returns the rest, which is to be put back last, when nothing is left to do before learning.
@@ -152,11 +154,11 @@ def restore(checkpoint: Checkpoint, model: BaseAlgorithm) -> State:
         ConfigurationError: the tensors are of another kind of model.
     """
     load_tensors(checkpoint.path / MODEL, model)
-    state = State.read(checkpoint.path)
+    state = TrainingState.read(checkpoint.path)
     buffer = replay_buffer(model)
     if buffer and state.positions:
         buffer.positions = state.positions
-        experience.read(buffer, checkpoint)
+        replay_store.read(buffer, checkpoint)
         state = dataclasses.replace(state, positions=buffer.positions)
     own_buffer.read(model, checkpoint.path)
     return state

@@ -14,8 +14,8 @@ from palaestra_trainer.environments.navigate import NavigateEnv
 from palaestra_trainer.environments.options import (
     DeliverOptions,
     GoalOptions,
+    MoveToTargetOptions,
     NavigateOptions,
-    Options,
     SeeOptions,
 )
 from palaestra_trainer.environments.see_target import SeeTargetEnv
@@ -26,9 +26,9 @@ __all__ = [
     "GoalOptions",
     "MoveToTargetEnv",
     "MoveToTargetGoalEnv",
+    "MoveToTargetOptions",
     "NavigateEnv",
     "NavigateOptions",
-    "Options",
     "SeeOptions",
     "SeeTargetEnv",
 ]

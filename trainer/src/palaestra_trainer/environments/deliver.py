@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.options import DeliverOptions
-from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.environments.placement import FreePlaces
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.geometry import Point
 
@@ -51,7 +51,7 @@ class DeliverEnv(MoveToTargetEnv):
         self._count = chosen.targets
         super().__init__(robot, scene, chosen, on_close)
 
-    def _more_targets(self, places: Places, first: Point) -> Iterable[Point]:
+    def _more_targets(self, places: FreePlaces, first: Point) -> Iterable[Point]:
         target = first
         for _ in range(self._count - 1):
             target = places.draw_from(self.np_random, target)

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
-from palaestra_trainer.environments.observation import Situation
-from palaestra_trainer.environments.options import Options
-from palaestra_trainer.environments.results import result
-from palaestra_trainer.environments.rewards import Outcome, Transition
-from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.environments.observation import StepState
+from palaestra_trainer.environments.options import MoveToTargetOptions
+from palaestra_trainer.environments.placement import FreePlaces
+from palaestra_trainer.environments.rewards import EpisodeOutcome, Transition
+from palaestra_trainer.environments.step_result import result
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.capabilities import require
 from palaestra_trainer.robots.geometry import Point, Twist
@@ -138,23 +138,23 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         self,
         robot: RobotinoAbc,
         scene: Scene,
-        options: Options | None = None,
+        options: MoveToTargetOptions | None = None,
         on_close: Callable[[], None] | None = None,
     ) -> None:
         require(robot, self.needs, type(self).__name__)
-        self.options = options or Options()
+        self.options = options or MoveToTargetOptions()
         self.observation_space = self._numbers = observation.space(self.options.observe)
         self.action_space = action_space(self.options)
         self._robot = robot
         self._scene = scene
         self._on_close = on_close
-        self._situation: Situation | None = None
+        self._situation: StepState | None = None
         self._targets: list[Point] = []
         self._at = 0  # index of the target to which the robot drives
         self._steps = 0
 
     @property
-    def situation(self) -> Situation:
+    def situation(self) -> StepState:
         """The complete state now, including parts that are not observed.
 
         Raises:
@@ -179,7 +179,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
-        places = Places(layout=self._scene.layout(), radius_m=self._robot.radius_m)
+        places = FreePlaces(layout=self._scene.layout(), radius_m=self._robot.radius_m)
         task = places.chosen_task(self.np_random, options or {})
         self._scene.place(task.start, task.target)
         self._targets = [task.target, *self._more_targets(places, task.target)]
@@ -204,7 +204,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         self._situation = after
         outcome = self._outcome(after)
         step = _transition(before, after, outcome)
-        if outcome is Outcome.DELIVERED:
+        if outcome is EpisodeOutcome.DELIVERED:
             self._situation = after = self._next_target(after)
         return self._numbers_of(after), *result(step, self.options, extra_steps)
 
@@ -213,8 +213,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         if self._on_close is not None:
             self._on_close()
 
-    def _look(self, velocity: Twist) -> Situation:
-        return Situation(
+    def _look(self, velocity: Twist) -> StepState:
+        return StepState(
             distances_m=self._robot.distances(),
             bumped=self._robot.bumped(),
             pose=self._robot.pose(),
@@ -224,30 +224,30 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
             to_reach=1.0 - self._at / len(self._targets),
         )
 
-    def _outcome(self, seen: Situation) -> Outcome:
+    def _outcome(self, seen: StepState) -> EpisodeOutcome:
         if seen.bumped:
-            return Outcome.COLLIDED
+            return EpisodeOutcome.COLLIDED
         if seen.target_distance_m < REACHED_M and seen.speed_m_s < STANDING_M_S:
-            return Outcome.REACHED if self._at == len(self._targets) - 1 else Outcome.DELIVERED
-        return Outcome.TIME_UP if self._steps >= self.options.max_steps else Outcome.RUNNING
+            return EpisodeOutcome.REACHED if self._at == len(self._targets) - 1 else EpisodeOutcome.DELIVERED
+        return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
-    def _more_targets(self, places: Places, first: Point) -> Iterable[Point]:
+    def _more_targets(self, places: FreePlaces, first: Point) -> Iterable[Point]:
         """Return the targets after the first; here there are none."""
         del places, first
         return ()
 
-    def _next_target(self, seen: Situation) -> Situation:
+    def _next_target(self, seen: StepState) -> StepState:
         """Let the robot drive to the next target; return what it sees then."""
         self._at += 1
         target = self._targets[self._at]
         self._scene.mark(target)
         return replace(seen, target=target, to_reach=1.0 - self._at / len(self._targets))
 
-    def _numbers_of(self, seen: Situation) -> Observation:
+    def _numbers_of(self, seen: StepState) -> Observation:
         return observation.observe(seen, self.options.observe, self._numbers)
 
 
-def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transition:
+def _transition(before: StepState, after: StepState, outcome: EpisodeOutcome) -> Transition:
     return Transition(
         before_m=before.target_distance_m,
         after_m=after.target_distance_m,

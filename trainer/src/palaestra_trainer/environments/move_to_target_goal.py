@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
 from palaestra_trainer.environments.observation import UNIT_M
 from palaestra_trainer.environments.options import GoalOptions, time_up_terminates
-from palaestra_trainer.environments.rewards import Outcome
+from palaestra_trainer.environments.rewards import EpisodeOutcome
 from palaestra_trainer.infos import OURS
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
@@ -148,7 +148,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         """Return whether a step with this info ends the episode for good."""
         del achieved_goal, desired_goal
         time_up = self._is_time_up(info) and time_up_terminates(self.options)
-        return info["outcome"] == Outcome.COLLIDED.value or time_up
+        return info["outcome"] == EpisodeOutcome.COLLIDED.value or time_up
 
     def compute_truncated(
         self, achieved_goal: Numbers, desired_goal: Numbers, info: Mapping[str, Any]
@@ -161,15 +161,15 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
         self._drive.close()
 
-    def _outcome(self, *, reached: bool) -> Outcome:
+    def _outcome(self, *, reached: bool) -> EpisodeOutcome:
         if self._drive.situation.bumped:
-            return Outcome.COLLIDED
+            return EpisodeOutcome.COLLIDED
         if self._steps < self.options.max_steps:
-            return Outcome.RUNNING
-        return Outcome.REACHED if reached else Outcome.TIME_UP
+            return EpisodeOutcome.RUNNING
+        return EpisodeOutcome.REACHED if reached else EpisodeOutcome.TIME_UP
 
     def _is_time_up(self, info: Mapping[str, Any]) -> bool:
-        return info["outcome"] in {Outcome.REACHED.value, Outcome.TIME_UP.value}
+        return info["outcome"] in {EpisodeOutcome.REACHED.value, EpisodeOutcome.TIME_UP.value}
 
     def _seen(self, numbers: Numbers) -> Observation:
         now = self._drive.situation

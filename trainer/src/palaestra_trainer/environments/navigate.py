@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.environments.observation import in_frame, velocity
 from palaestra_trainer.environments.options import NavigateOptions
-from palaestra_trainer.environments.results import result
-from palaestra_trainer.environments.rewards import Outcome, Transition
-from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.environments.placement import FreePlaces
+from palaestra_trainer.environments.rewards import EpisodeOutcome, Transition
+from palaestra_trainer.environments.step_result import result
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import Localization, Scanner, Steering, require
 from palaestra_trainer.robots.geometry import Point, Pose
@@ -149,7 +149,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         self._scene.begin(int(self.np_random.integers(2**31)))
-        places = Places(layout=self._scene.layout(), radius_m=self._wheels.radius_m)
+        places = FreePlaces(layout=self._scene.layout(), radius_m=self._wheels.radius_m)
         task = places.chosen_task(self.np_random, options or {})
         self._scene.place(task.start, task.target)
         self._target, self._steps = task.target, 0
@@ -195,12 +195,12 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
             raise ResetNeeded("no episode has begun; call reset() first")
         return in_frame(pose.heading_rad, self._target[0] - pose.x_m, self._target[1] - pose.y_m)
 
-    def _outcome(self, target_m: float, nearest_m: float) -> Outcome:
+    def _outcome(self, target_m: float, nearest_m: float) -> EpisodeOutcome:
         if target_m < REACHED_M:
-            return Outcome.REACHED
+            return EpisodeOutcome.REACHED
         if nearest_m < BUMPED_M:
-            return Outcome.COLLIDED
-        return Outcome.TIME_UP if self._steps >= self.options.max_steps else Outcome.RUNNING
+            return EpisodeOutcome.COLLIDED
+        return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _observe(self, pose: Pose, forward: float, turning: float) -> Observation:
         nearest = [part.min() for part in np.array_split(self._scanner.scan(), SECTORS)]

@@ -1,6 +1,6 @@
 """The observation of an environment, in parts that can be chosen.
 
-A `Situation` is the complete state after a step. A `Part` turns some of it into
+A `StepState` is the complete state after a step. A `ObservationPart` turns some of it into
 numbers near [-1, 1], with bounds for each. A list defines which parts exist, and
 in which order.
 """
@@ -22,7 +22,7 @@ UNIT_M = 2.0  # of positions in an observation: half of the arena
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Situation:
+class StepState:
     """The complete state after a step.
 
     Attributes:
@@ -60,10 +60,10 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ObservationPart:
     """Some numbers of an observation: their source, and their bounds."""
 
-    measure: Callable[[Situation], Sequence[float]]
+    measure: Callable[[StepState], Sequence[float]]
     low: tuple[float, ...]
     high: tuple[float, ...]
 
@@ -83,7 +83,7 @@ def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
     return forward_m / elapsed_s, left_m / elapsed_s, turned_rad / elapsed_s
 
 
-def _sensors(seen: Situation) -> Sequence[float]:
+def _sensors(seen: StepState) -> Sequence[float]:
     # Nearness, not distance, because it is 0 in the usual case of nothing in range. A policy learned as much
     # from it in 10,000 steps as in 40,000 from distances, which are 1 most of the time.
     least, most = SENSOR_RANGE_M
@@ -91,36 +91,36 @@ def _sensors(seen: Situation) -> Sequence[float]:
     return [*nearness.tolist(), float(seen.bumped)]
 
 
-def _velocity(seen: Situation) -> Sequence[float]:
+def _velocity(seen: StepState) -> Sequence[float]:
     forward, left, turning = seen.velocity
     return forward / SPEED_M_S, left / SPEED_M_S, turning / TURN_RAD_S
 
 
-def _position(seen: Situation) -> Sequence[float]:
+def _position(seen: StepState) -> Sequence[float]:
     x_m, y_m, heading_rad = seen.pose.x_m, seen.pose.y_m, seen.pose.heading_rad
     return x_m / UNIT_M, y_m / UNIT_M, math.cos(heading_rad), math.sin(heading_rad)
 
 
-def _target(seen: Situation) -> Sequence[float]:
+def _target(seen: StepState) -> Sequence[float]:
     forward_m, left_m = seen.target_ahead
     return forward_m / UNIT_M, left_m / UNIT_M
 
 
-def _time_left(seen: Situation) -> Sequence[float]:
+def _time_left(seen: StepState) -> Sequence[float]:
     return (seen.time_left,)
 
 
-def _to_reach(seen: Situation) -> Sequence[float]:
+def _to_reach(seen: StepState) -> Sequence[float]:
     return (seen.to_reach,)
 
 
-PARTS: dict[str, Part] = {
-    "sensors": Part(_sensors, (0.0,) * (SENSORS + 1), (1.0,) * (SENSORS + 1)),
-    "velocity": Part(_velocity, (-1.5,) * 3, (1.5,) * 3),
-    "position": Part(_position, (-1.0,) * 4, (1.0,) * 4),
-    "target": Part(_target, (-3.0,) * 2, (3.0,) * 2),
-    "time_left": Part(_time_left, (0.0,), (1.0,)),
-    "to_reach": Part(_to_reach, (0.0,), (1.0,)),
+PARTS: dict[str, ObservationPart] = {
+    "sensors": ObservationPart(_sensors, (0.0,) * (SENSORS + 1), (1.0,) * (SENSORS + 1)),
+    "velocity": ObservationPart(_velocity, (-1.5,) * 3, (1.5,) * 3),
+    "position": ObservationPart(_position, (-1.0,) * 4, (1.0,) * 4),
+    "target": ObservationPart(_target, (-3.0,) * 2, (3.0,) * 2),
+    "time_left": ObservationPart(_time_left, (0.0,), (1.0,)),
+    "to_reach": ObservationPart(_to_reach, (0.0,), (1.0,)),
 }
 
 
@@ -131,7 +131,7 @@ def space(parts: Sequence[str]) -> spaces.Box:
     return spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
 
 
-def observe(seen: Situation, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
+def observe(seen: StepState, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
     """Return the numbers of these parts, clipped to the bounds of `within`."""
     numbers = [number for name in parts for number in PARTS[name].measure(seen)]
     # The same as np.clip, in half its time.

@@ -21,7 +21,7 @@ FRAMES = (1, 3)
 
 
 class Episodes(Protocol):
-    """The options of every task that ends at a target; see `Options`."""
+    """The options of every task that ends at a target; see `MoveToTargetOptions`."""
 
     @property
     def reward(self) -> str:
@@ -45,7 +45,7 @@ class Episodes(Protocol):
 
 
 class Driving(Episodes, Protocol):
-    """The options of every task of a robot that drives in all directions; see `Options`."""
+    """The options of every task of a robot that drives in all directions; see `MoveToTargetOptions`."""
 
     @property
     def movements(self) -> Sequence[Movement]:
@@ -54,7 +54,7 @@ class Driving(Episodes, Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
+class MoveToTargetOptions:
     """The options of `MoveToTargetEnv`, checked.
 
     Args:
@@ -81,12 +81,12 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GoalOptions(Options):
-    """The options of `MoveToTargetGoalEnv`, checked: those of `Options` with other defaults.
+class GoalOptions(MoveToTargetOptions):
+    """The options of `MoveToTargetGoalEnv`, checked: those of `MoveToTargetOptions` with other defaults.
 
     Args:
         observe: the parts of `observation`; `target` is refused, because the goal has keys of its own.
-        time_up: see `Options`; `truncated`, because time-up has no reward.
+        time_up: see `MoveToTargetOptions`; `truncated`, because time-up has no reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -101,8 +101,8 @@ class GoalOptions(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DeliverOptions(Options):
-    """The options of `DeliverEnv`, checked: those of `Options`, with defaults for several targets.
+class DeliverOptions(MoveToTargetOptions):
+    """The options of `DeliverEnv`, checked: those of `MoveToTargetOptions`, with defaults for more targets.
 
     Args:
         targets: how many targets an episode has.
@@ -125,11 +125,11 @@ class SeeOptions:
     """The options of `SeeTargetEnv`, checked.
 
     Args:
-        reward: see `Options`.
-        movements: see `Options`.
-        actions: see `Options`.
-        max_steps: see `Options`.
-        time_up: see `Options`.
+        reward: see `MoveToTargetOptions`.
+        movements: see `MoveToTargetOptions`.
+        actions: see `MoveToTargetOptions`.
+        max_steps: see `MoveToTargetOptions`.
+        time_up: see `MoveToTargetOptions`.
         frames: the newest images in an observation, 1 or 3.
         cylinders: whether the arena's four cylinders stand on the floor.
 
@@ -154,10 +154,10 @@ class NavigateOptions:
     """The options of `NavigateEnv`, checked.
 
     Args:
-        reward: see `Options`.
-        actions: see `Options`.
-        max_steps: see `Options`.
-        time_up: see `Options`.
+        reward: see `MoveToTargetOptions`.
+        actions: see `MoveToTargetOptions`.
+        max_steps: see `MoveToTargetOptions`.
+        time_up: see `MoveToTargetOptions`.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -177,16 +177,16 @@ def time_up_terminates(options: Episodes) -> bool:
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 
-def parse(given: Mapping[str, Any]) -> Options:
+def parse(given: Mapping[str, Any]) -> MoveToTargetOptions:
     """Return the options of `MoveToTargetEnv` from the values in a job file.
 
     Raises:
         ConfigurationError: one line for every mistake.
     """
-    return parse_as(Options, given)
+    return parse_as(MoveToTargetOptions, given)
 
 
-_Chosen = TypeVar("_Chosen", bound=Options | SeeOptions | NavigateOptions)
+_Chosen = TypeVar("_Chosen", bound=MoveToTargetOptions | SeeOptions | NavigateOptions)
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:

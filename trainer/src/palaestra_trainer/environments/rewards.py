@@ -16,7 +16,7 @@ from palaestra_trainer.robots.base import SENSOR_RANGE_M
 MARGIN_M = 0.18  # what should be kept free around the robot: it drives half of it in a step
 
 
-class Outcome(Enum):
+class EpisodeOutcome(Enum):
     """How an episode ended, or that it goes on; also with the next of several targets."""
 
     RUNNING = "running"
@@ -28,7 +28,7 @@ class Outcome(Enum):
     @property
     def terminal(self) -> bool:
         """Whether the task itself is over, not only its time."""
-        return self in (Outcome.REACHED, Outcome.COLLIDED)
+        return self in (EpisodeOutcome.REACHED, EpisodeOutcome.COLLIDED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class Transition:
     before_m: float
     after_m: float
     nearest_m: float
-    outcome: Outcome
+    outcome: EpisodeOutcome
 
 
 Term = Callable[[Transition], float]
@@ -61,12 +61,12 @@ def progress(step: Transition) -> float:
 
 def success(step: Transition) -> float:
     """Return 1 when the robot came to stand on the target, or on one of several, else 0."""
-    return float(step.outcome in (Outcome.REACHED, Outcome.DELIVERED))
+    return float(step.outcome in (EpisodeOutcome.REACHED, EpisodeOutcome.DELIVERED))
 
 
 def collision(step: Transition) -> float:
     """Return 1 when the robot ran into something, else 0."""
-    return float(step.outcome is Outcome.COLLIDED)
+    return float(step.outcome is EpisodeOutcome.COLLIDED)
 
 
 def proximity(step: Transition) -> float:
@@ -77,7 +77,7 @@ def proximity(step: Transition) -> float:
 
 def time_up(step: Transition) -> float:
     """Return 1 when the last step was taken and the target not reached, else 0."""
-    return float(step.outcome is Outcome.TIME_UP)
+    return float(step.outcome is EpisodeOutcome.TIME_UP)
 
 
 def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form

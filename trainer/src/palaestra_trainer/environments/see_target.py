@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.options import SeeOptions
-from palaestra_trainer.environments.results import result
-from palaestra_trainer.environments.rewards import Outcome, Transition
-from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.environments.placement import FreePlaces
+from palaestra_trainer.environments.rewards import EpisodeOutcome, Transition
+from palaestra_trainer.environments.step_result import result
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.capabilities import Cameras, require
@@ -149,7 +149,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         self._scene.begin(int(self.np_random.integers(2**31)))
         if self.options.cylinders:
             self._raise_cylinders()
-        places = Places(layout=self._scene.layout(), radius_m=self._robot.radius_m)
+        places = FreePlaces(layout=self._scene.layout(), radius_m=self._robot.radius_m)
         task = places.chosen_task(self.np_random, options or {})
         self._scene.place(task.start, task.target)
         self._target, self._steps = task.target, 0
@@ -187,12 +187,12 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
             if thing.top_m < 0.0:
                 self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))
 
-    def _outcome(self) -> Outcome:
+    def _outcome(self) -> EpisodeOutcome:
         if self._robot.bumped():
-            return Outcome.COLLIDED
+            return EpisodeOutcome.COLLIDED
         if self.target_m < REACHED_M:
-            return Outcome.REACHED
-        return Outcome.TIME_UP if self._steps >= self.options.max_steps else Outcome.RUNNING
+            return EpisodeOutcome.REACHED
+        return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _image(self) -> Observation:
         """Return a copy of the camera's image, which is valid until the next step only."""

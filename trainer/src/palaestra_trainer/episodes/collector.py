@@ -23,18 +23,18 @@ from gymnasium.vector.utils import create_empty_array
 from palaestra_trainer.copies import copied
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
-from palaestra_trainer.episodes.position import reset_options
+from palaestra_trainer.episodes.reset_options import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
 from palaestra_trainer.infos import HIDDEN, OURS, TRUNCATED, of_environment
-from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.member import Environment, Step
-from palaestra_trainer.waiting.interruption import Check, go_on
+from palaestra_trainer.simulators.interface import Environment, Step
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 
 
-class Row(NamedTuple):
+class CollectedRow(NamedTuple):
     """What one member contributes to a vector step.
 
     Attributes:
@@ -63,7 +63,7 @@ class Collector:
         reset_info: what the environment reported at the last reset; not `valid` if no episode began.
     """
 
-    def __init__(self, keeper: Keeper, run_seed: int, index: int, check: Check = go_on) -> None:
+    def __init__(self, keeper: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
         self.keeper = keeper
         self.run_seed = run_seed
         self.index = index
@@ -150,7 +150,7 @@ class Collector:
                 return self.begin()
         return self._observation
 
-    def step(self, action: Any) -> Row:
+    def step(self, action: Any) -> CollectedRow:
         """Return the row of one step.
 
         A fault ends the episode; the member is mended in the background, and until it is up again every
@@ -170,8 +170,8 @@ class Collector:
         if terminated or truncated:
             info["terminal_observation"] = observation
             info["episode"] = self._summary()
-            return Row(self.begin(), float(reward), True, info)
-        return Row(observation, float(reward), False, info)
+            return CollectedRow(self.begin(), float(reward), True, info)
+        return CollectedRow(observation, float(reward), False, info)
 
     def _reset(self, options: dict[str, Any] | None) -> None:
         seed = self.next_seed()
@@ -225,18 +225,18 @@ class Collector:
         self._actions = self._found_broken = None
         self.keeper.begin_mending(fault, self._length)
 
-    def _recover(self) -> Row:
+    def _recover(self) -> CollectedRow:
         """Return the row of a step that no episode is under way for."""
         seen = self._observation
         self.begin()
         return self._invalid(seen, done=self._actions is not None, recovering=not self.keeper.lost)
 
-    def _invalid(self, seen: Any, *, done: bool, **words: Any) -> Row:
+    def _invalid(self, seen: Any, *, done: bool, **words: Any) -> CollectedRow:
         """Return a row that nothing is learned from; the first one after a fault has its `sim_fault`."""
         words = {"valid": False} | words | self._news
         self._news = {}
         info = {OURS: words, TRUNCATED: done, "terminal_observation": copied(seen)}
-        return Row(self._observation, 0.0, done, info)
+        return CollectedRow(self._observation, 0.0, done, info)
 
     def _summary(self) -> dict[str, float]:
         seconds = time.monotonic() - self._started

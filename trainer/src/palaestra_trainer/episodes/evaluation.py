@@ -20,16 +20,16 @@ import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
 from palaestra_trainer.algorithms import predict_allowed, takes_masks
-from palaestra_trainer.episodes.intervals import wilson
-from palaestra_trainer.episodes.position import EVALUATING, reset_options
+from palaestra_trainer.episodes.reset_options import EVALUATING, reset_options
+from palaestra_trainer.episodes.wilson import wilson
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
-from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
-from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.simulators.interface import Member
+from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.waiting.episode_end import EpisodeEnd
-from palaestra_trainer.waiting.interruption import Check, go_on
+from palaestra_trainer.waiting.signals import Check, go_on
 
 
-class Policy(Protocol):
+class ActingPolicy(Protocol):
     """Anything that chooses an action for an observation; every Stable-Baselines3 model does."""
 
     def predict(
@@ -70,7 +70,7 @@ class Episode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evaluation:
+class EvaluationResult:
     """The episodes of one evaluation, at least one, and the faults and time that they took.
 
     Attributes:
@@ -136,8 +136,8 @@ class Evaluation:
 
 
 def evaluate(
-    policy: Policy, member: Member | Keeper, seeds: Iterable[int], check: Check = go_on
-) -> Evaluation:
+    policy: ActingPolicy, member: Member | Restarter, seeds: Iterable[int], check: Check = go_on
+) -> EvaluationResult:
     """Return the evaluation of `policy`, deterministic, in one episode for each of `seeds`.
 
     Args:
@@ -149,13 +149,13 @@ def evaluate(
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
     """
-    keeper = member if isinstance(member, Keeper) else Keeper(member)
+    keeper = member if isinstance(member, Restarter) else Restarter(member)
     return evaluate_on_all(policy, [keeper], seeds, check)
 
 
 def evaluate_on_all(
-    policy: Policy, keepers: Sequence[Keeper], seeds: Iterable[int], check: Check = go_on
-) -> Evaluation:
+    policy: ActingPolicy, keepers: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
+) -> EvaluationResult:
     """Return the same as `evaluate`, with the episodes distributed over several simulators at once.
 
     If a simulator breaks, another one plays its episode, during the repair and if the simulator is given up.
@@ -170,7 +170,7 @@ def evaluate_on_all(
             games.play_on(left[0], check)
         else:
             _play_at_once(games, left[: games.missing], check)
-    return Evaluation(
+    return EvaluationResult(
         episodes=games.in_order(),
         faults=games.faults,
         seconds=time.monotonic() - started,
@@ -187,7 +187,7 @@ class _Games:
         faults: number of episodes that were cut.
     """
 
-    def __init__(self, policy: Policy, seeds: Iterable[int]) -> None:
+    def __init__(self, policy: ActingPolicy, seeds: Iterable[int]) -> None:
         self.faults = 0
         self._policy = policy
         self._waiting = deque(enumerate(seeds))
@@ -204,7 +204,7 @@ class _Games:
         """Return the episodes in the order of their seeds."""
         return tuple(self._played[place] for place in sorted(self._played))
 
-    def play_on(self, keeper: Keeper, check: Check) -> None:
+    def play_on(self, keeper: Restarter, check: Check) -> None:
         """Play until all episodes are complete, or the simulator is given up."""
         while self.missing and not keeper.lost:
             check()
@@ -213,7 +213,7 @@ class _Games:
             elif keeper.up():
                 self._play_next(keeper, check)
 
-    def _play_next(self, keeper: Keeper, check: Check) -> None:
+    def _play_next(self, keeper: Restarter, check: Check) -> None:
         with self._changed:
             if not self._waiting:
                 self._changed.wait(LOOK_EVERY_S)
@@ -234,7 +234,7 @@ class _Games:
                 self._changed.notify_all()
 
 
-def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> None:
+def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> None:
     over = threading.Event()
 
     def check_all() -> None:
@@ -255,7 +255,7 @@ def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> Non
 
 
 def _play(
-    policy: Policy, keeper: Keeper, game: tuple[int, int], check: Check, rewards: list[float]
+    policy: ActingPolicy, keeper: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
 ) -> Episode:
     """Play an episode, number and seed, to its end.
 

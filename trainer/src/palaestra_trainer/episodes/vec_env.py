@@ -20,15 +20,15 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.copies import copied
 from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
-from palaestra_trainer.episodes.collector import Collector, Row
+from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
+from palaestra_trainer.episodes.collector import CollectedRow, Collector
 from palaestra_trainer.episodes.episode_state import EpisodeState
-from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
 from palaestra_trainer.errors import fact_of
 from palaestra_trainer.infos import is_valid
-from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
-from palaestra_trainer.simulators.member import Environment
-from palaestra_trainer.waiting.interruption import Check, go_on
-from palaestra_trainer.waiting.turns import take_turns
+from palaestra_trainer.simulators.interface import Environment
+from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
+from palaestra_trainer.waiting.greenlets import take_turns
+from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 
@@ -47,7 +47,7 @@ class SimulatorsVecEnv(MembersVecEnv):
 
     def __init__(
         self,
-        keepers: Sequence[Keeper],
+        keepers: Sequence[Restarter],
         run_seed: int,
         *,
         check: Check = go_on,
@@ -119,7 +119,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         """
         self._await_somebody()
         with self._watcher.spending(Cause.TRANSPORT):
-            rows: list[Row] = take_turns(
+            rows: list[CollectedRow] = take_turns(
                 partial(collector.step, action)
                 for collector, action in zip(self._collectors, self._actions, strict=True)
             )
@@ -179,7 +179,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         self.reset_infos = [collector.reset_info for collector in self._collectors]
 
 
-def _close(keeper: Keeper) -> None:
+def _close(keeper: Restarter) -> None:
     try:
         keeper.member.env.close()
     except (Exception, SystemExit) as error:  # code of the job's author may raise anything

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 from palaestra_trainer.configuration import load
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.exporting.acting import Acting
-from palaestra_trainer.exporting.comparing import OBSERVATIONS, Run, compare
-from palaestra_trainer.exporting.data_sheet import data_sheet
+from palaestra_trainer.exporting.metadata import data_sheet
+from palaestra_trainer.exporting.policy_module import PolicyModule
+from palaestra_trainer.exporting.verify import OBSERVATIONS, Run, compare
 from palaestra_trainer.run.policies import load_policy
 from palaestra_trainer.run_directory import RunDirectory, replace_file
 
@@ -22,11 +22,11 @@ FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_f
 class Format(Protocol):
     """A module of this package that knows one format."""
 
-    def content(self, acting: Acting, sheet: Mapping[str, Any]) -> bytes:
+    def content(self, acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
         """Return the bytes of a file."""
         ...
 
-    def runner(self, file: bytes, acting: Acting) -> Run:
+    def runner(self, file: bytes, acting: PolicyModule) -> Run:
         """Return a function that acts as the file says."""
         ...
 
@@ -57,11 +57,11 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     known = _format(to)
     directory = RunDirectory(run)
     loaded = load_policy(run)
-    acting = Acting(loaded)
+    acting = PolicyModule(loaded)
     sheet = data_sheet(acting, load(directory.configuration), directory)
     content = known.content(acting, sheet)
 
-    def converted(module: Acting) -> Run:
+    def converted(module: PolicyModule) -> Run:
         file = content if module is acting else known.content(module, sheet)
         return known.runner(file, module)
 

@@ -16,10 +16,10 @@ import torch
 
 from palaestra_trainer.environments.masks import ACTION_MASKS
 from palaestra_trainer.errors import ExportError, fact_of
-from palaestra_trainer.exporting.acting import STATE, Acting
-from palaestra_trainer.exporting.comparing import Arrays, Run
-from palaestra_trainer.exporting.data_sheet import KEY
-from palaestra_trainer.exporting.sampling import drawn, drawn_masks
+from palaestra_trainer.exporting.metadata import KEY
+from palaestra_trainer.exporting.policy_module import STATE, PolicyModule
+from palaestra_trainer.exporting.sample_observations import drawn, drawn_masks
+from palaestra_trainer.exporting.verify import Arrays, Run
 
 OPSET = 17  # of ONNX 1.12, of 2022
 # Types that PyTorch's exporter does not take, and a larger one that it takes.
@@ -27,7 +27,7 @@ _UNTAKEN = {"uint16": "int32", "uint32": "int64", "uint64": "int64"}
 _BATCH = 3  # not 1, which the exporter could take for a constant
 
 
-def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
+def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
     """Return the file with the data sheet in its metadata; any number of observations is one batch.
 
     PyTorch leaves inputs out that do not reach an output. The sheet names them as `unused`.
@@ -57,7 +57,7 @@ def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
     return text
 
 
-def _converted(acting: Acting) -> onnx.ModelProto:
+def _converted(acting: PolicyModule) -> onnx.ModelProto:
     parts = [*drawn(acting, _BATCH).values(), *([drawn_masks(acting, _BATCH)] if acting.choices else [])]
     examples = [torch.from_numpy(part) for part in parts]
     axes = {name: {0: "batch"} for name in (*acting.spaces, ACTION_MASKS, "action")}
@@ -79,7 +79,7 @@ def _converted(acting: Acting) -> onnx.ModelProto:
         return onnx.load_model(written)
 
 
-def runner(file: bytes, acting: Acting) -> Run:
+def runner(file: bytes, acting: PolicyModule) -> Run:
     """Return a function that runs the file; it takes unused inputs too."""
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
     used = {value.name for value in session.get_inputs()}

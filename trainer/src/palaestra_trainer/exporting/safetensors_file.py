@@ -15,19 +15,19 @@ import numpy as np
 import safetensors.torch
 import torch
 
-from palaestra_trainer.exporting.acting import Acting
-from palaestra_trainer.exporting.comparing import Arrays, Run
-from palaestra_trainer.exporting.data_sheet import KEY
+from palaestra_trainer.exporting.metadata import KEY
+from palaestra_trainer.exporting.policy_module import PolicyModule
+from palaestra_trainer.exporting.verify import Arrays, Run
 
 
-def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
+def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
     """Return the file with the data sheet in its metadata."""
     # Some policies have one network under two names, and the format refuses shared memory.
     tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
     return safetensors.torch.save(tensors, {KEY: json.dumps(sheet)})
 
 
-def runner(file: bytes, acting: Acting) -> Run:
+def runner(file: bytes, acting: PolicyModule) -> Run:
     """Return a function that runs a copy of the policy, all of whose tensors are the file's."""
     copy = deepcopy(acting)
     with torch.no_grad():

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 from palaestra_trainer.errors import MasterLost
-from palaestra_trainer.launching.child import first_line, start_child
+from palaestra_trainer.launching.subprocesses import first_line, start_child
 from palaestra_trainer.ros import Master
 
 
@@ -19,7 +19,7 @@ def ensure_master() -> None:
     try:
         Master("/palaestra").ping()
     except MasterLost:
-        module = [sys.executable, "-P", "-m", "palaestra_trainer.launching.own_master"]
+        module = [sys.executable, "-P", "-m", "palaestra_trainer.launching.master_process"]
         uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start palaestra-ros-master") from None

@@ -15,16 +15,16 @@ from palaestra_trainer.robots.capabilities import (
     require,
 )
 from palaestra_trainer.robots.geometry import Movement, Pose
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
 __all__ = [
     "Bumper",
     "Cameras",
     "Distances",
+    "FloorLayout",
     "Forklift",
     "Gripper",
     "Joints",
-    "Layout",
     "Localization",
     "Movement",
     "Obstacle",

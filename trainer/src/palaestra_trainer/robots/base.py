@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from palaestra_trainer.robots.capabilities import Bumper, Distances, Localization, Omnidrive
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose
-from palaestra_trainer.robots.layout import Layout
+from palaestra_trainer.robots.layout import FloorLayout
 
 RADIUS_M = 0.2266  # of the body's cylinder, as in Webots' model of the Robotino 3
 OUTLINE_M = 0.2286  # of the body with its bumper
@@ -77,7 +77,7 @@ class Scene(ABC):
         """
 
     @abstractmethod
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """Return the floor, and what stands on it now; what `put` moved is at its new place."""
 
     @abstractmethod
@@ -120,7 +120,7 @@ class SceneWrapper(Scene):
         """Begin anew; override it to change the world in every episode."""
         self.scene.begin(seed)
 
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """Return the layout of the scene inside."""
         return self.scene.layout()
 

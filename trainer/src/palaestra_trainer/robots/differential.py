@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.robots.capabilities import Distances, Scanner, Steering
-from palaestra_trainer.robots.scanning import scan_of
+from palaestra_trainer.robots.lidar_scan import scan_of
 from palaestra_trainer.robots.simulated import MobileRobot
 from palaestra_trainer.webots import DistanceSensor, Lidar, Motor, set_velocities
 

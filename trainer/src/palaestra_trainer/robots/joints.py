@@ -12,8 +12,8 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.capabilities import Joints
 from palaestra_trainer.robots.simulated import SimulatedRobot
 from palaestra_trainer.ros import call_together
-from palaestra_trainer.waiting.turns import let_others
-from palaestra_trainer.webots import Command, Lever, PositionSensor
+from palaestra_trainer.waiting.greenlets import let_others
+from palaestra_trainer.webots import Command, JointMotor, PositionSensor
 
 
 class JointRobot(SimulatedRobot, Joints):
@@ -49,7 +49,7 @@ class JointRobot(SimulatedRobot, Joints):
 
     def equip(self) -> None:
         """Add the motors and sensors."""
-        self._motors = tuple(Lever(self.node_name, motor, self.commanded) for motor in self.motors)
+        self._motors = tuple(JointMotor(self.node_name, motor, self.commanded) for motor in self.motors)
         self._sensors = tuple(PositionSensor(self.node_name, sensor) for sensor in self.sensors)
         self.simulation.add(self._sensors, self._motors)
 

@@ -68,7 +68,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Layout:
+class FloorLayout:
     """A floor and the things on it.
 
     Attributes:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, RobotinoAbc
 from palaestra_trainer.robots.capabilities import Cameras, Forklift, Gripper, Scanner
-from palaestra_trainer.robots.scanning import scan_of
+from palaestra_trainer.robots.lidar_scan import scan_of
 from palaestra_trainer.robots.simulated import MobileRobot
 from palaestra_trainer.webots import (
     Camera,
     DistanceSensor,
-    Lever,
+    JointMotor,
     Lidar,
     Motor,
     RangeFinder,
@@ -77,8 +77,8 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._camera = Camera(name, self.color_camera)
         self._depth_camera = RangeFinder(name, self.depth_camera)
         self._laser = Lidar(name, self.laser)
-        self._fingers = tuple(Lever(name, finger, "position") for finger in self.fingers)
-        self._fork = Lever(name, self.fork, "position")
+        self._fingers = tuple(JointMotor(name, finger, "position") for finger in self.fingers)
+        self._fork = JointMotor(name, self.fork, "position")
         self.simulation.add((*self._infrared, self._bumper), self._wheels)
 
     def distances(self) -> NDArray[np.float32]:

@@ -14,12 +14,12 @@ from palaestra_trainer.errors import MissingCapability, NoReading, NoSuchSensor,
 from palaestra_trainer.robots.base import JointScene, RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import Localization
 from palaestra_trainer.robots.geometry import Point, Pose
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 from palaestra_trainer.webots import (
     FLOOR,
     Actuator,
     Sensor,
-    Simulation,
+    Stepper,
     Thing,
     Webots,
     require_node,
@@ -68,7 +68,7 @@ class SimulatedRobot(RobotAbc):
         self._in_use: set[str] = set()  # optional devices
         others = map(webots.name_of, robots)
         together = dict.fromkeys((name, webots.robot_name, *others))
-        self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, self.period_ms)
+        self.simulation = Stepper(tuple(together), webots.supervisor, webots.observer, self.period_ms)
         if self.definition:
             self.simulation.track(self.definition)
         self.equip()
@@ -100,7 +100,7 @@ class SimulatedRobot(RobotAbc):
 
         Raises:
             Paused: time stands; nothing was sent.
-            SimulatorDead, SimulatorHung, WrongData: as `Simulation.step`.
+            SimulatorDead, SimulatorHung, WrongData: as `Stepper.step`.
         """
         return self.simulation.step()
 
@@ -181,7 +181,7 @@ class SimulatedScene(Scene, JointScene):
         self._put.clear()
         self._robot.simulation.reset(seed)
 
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """Return the floor, and what stands on it now; see `webots.surroundings` for what is seen.
 
         Raises:
@@ -195,7 +195,7 @@ class SimulatedScene(Scene, JointScene):
                 low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
             else:
                 obstacles += _obstacles(thing._replace(place=self._put.get(thing.name, thing.place)))
-        return Layout(low=low, high=high, obstacles=tuple(obstacles))
+        return FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
 
     def place(self, start: Pose, target: Point) -> None:
         """Put the robot at rest at `start` and the mark at `target` (x, y in meters); fresh readings.

@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from palaestra_trainer.errors import MasterLost, UnreadableAnswer
-from palaestra_trainer.ros.calls import OK, Answer, call
+from palaestra_trainer.ros.xmlrpc import OK, RpcResponse, call
 
 DEFAULT_URI = "http://localhost:11311"
 _TIMEOUT_S = 5.0
@@ -82,17 +82,17 @@ class Master:
             return True
         return True
 
-    def _call(self, method: str, *arguments: Any) -> Answer:
+    def _call(self, method: str, *arguments: Any) -> RpcResponse:
         answer = self._answer(method, *arguments)
         if answer.code != OK:
             raise MasterLost(f"the ROS master refused {method}: {answer.text}")
         return answer
 
-    def _answer(self, method: str, *arguments: Any) -> Answer:
+    def _answer(self, method: str, *arguments: Any) -> RpcResponse:
         try:
             return call(self.uri, self._timeout_s, method, self._caller, *arguments)
         except OSError as error:
             raise MasterLost(f"no ROS master answers at {self.uri} ({error}); is it running?") from error
 
-    def _unreadable(self, wanted: str, answer: Answer) -> UnreadableAnswer:
+    def _unreadable(self, wanted: str, answer: RpcResponse) -> UnreadableAnswer:
         return UnreadableAnswer(f"the ROS master answered with {answer.value!r} instead of {wanted}")

@@ -10,7 +10,7 @@ from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_trainer.errors import SimulatorDead, UnreadableAnswer, WrongData
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
-from palaestra_trainer.ros.wire import Wire
+from palaestra_trainer.ros.tcpros_client import TcprosClient
 
 DEADLINE_S = 5.0
 _OK_BYTE = 1
@@ -32,7 +32,7 @@ class RosService:
         self.simulator = name.split("/")[1]
         self._type = service_type(type_name)
         self._deadline_s = deadline_s
-        self._wire: Wire | None = None
+        self._wire: TcprosClient | None = None
 
     def __call__(self, **fields: Any) -> Any:
         """Return the response, an object with the fields of the type.
@@ -85,12 +85,12 @@ class RosService:
             self._wire.close()
             self._wire = None
 
-    def _asked(self) -> Wire:
+    def _asked(self) -> TcprosClient:
         if self._wire is None:
             raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
         return self._wire
 
-    def _read_answer(self, wire: Wire) -> Any:
+    def _read_answer(self, wire: TcprosClient) -> Any:
         answer = wire.receive(ahead=1)
         payload = answer[1 + LENGTH.size :]
         if answer[0] != _OK_BYTE:
@@ -101,7 +101,7 @@ class RosService:
         except ValueError as error:
             raise WrongData(self.simulator, f"{self.name} answered with {error}") from error
 
-    def _connect(self) -> Wire:
+    def _connect(self) -> TcprosClient:
         node = ensure_node()
         try:
             address = Master(node).service_address(self.name)
@@ -116,7 +116,7 @@ class RosService:
             "service": self.name,
             "type": self._type.name,
         }
-        self._wire = Wire(address, header, self.simulator, self._deadline_s)
+        self._wire = TcprosClient(address, header, self.simulator, self._deadline_s)
         return self._wire
 
 

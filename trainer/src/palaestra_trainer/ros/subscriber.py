@@ -16,10 +16,10 @@ from palaestra_trainer.errors import (
     UnreadableAnswer,
     WrongData,
 )
-from palaestra_trainer.ros.calls import OK, call
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node, node_uri
-from palaestra_trainer.ros.wire import Wire
+from palaestra_trainer.ros.tcpros_client import TcprosClient
+from palaestra_trainer.ros.xmlrpc import OK, call
 
 DEADLINE_S = 0.5
 _CONNECT_S = 5.0
@@ -49,7 +49,7 @@ class RosSubscriber:
         self._type = message_type(type_name)
         self._decode = decode or self._type.codec.decode
         self._deadline_s = deadline_s
-        self._wire: Wire | None = None
+        self._wire: TcprosClient | None = None
         self._registered = False
 
     @property
@@ -83,7 +83,7 @@ class RosSubscriber:
             "topic": self.name,
             "type": self._type.name,
         }
-        self._wire = Wire(address, header, self.simulator, self._deadline_s)
+        self._wire = TcprosClient(address, header, self.simulator, self._deadline_s)
         self._wire.acknowledge_late()
 
     def next(self) -> Any:

@@ -60,10 +60,10 @@ class RosMaster:
 
     def _called(self, method: str, arguments: tuple[Any, ...]) -> Any:
         with self._lock:
-            answer, updates = self._api.call(method, arguments)
+            response, updates = self._api.call(method, arguments)
             if updates:
                 self._updates.add(updates)  # before the next call, whose updates must come after these
-        return tuple(answer)  # XML-RPC has no named tuples
+        return tuple(response)  # XML-RPC has no named tuples
 
     def _stop_updates(self, update: Update) -> None:
         with self._lock:

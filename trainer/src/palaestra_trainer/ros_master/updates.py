@@ -15,8 +15,8 @@ from typing import Any
 
 from palaestra_protocol.xmlrpc.client import call
 from palaestra_protocol.xmlrpc.documents import UnreadableDocument
-from palaestra_trainer.ros_master.answers import WRONG
 from palaestra_trainer.ros_master.api import MASTER, Update
+from palaestra_trainer.ros_master.responses import WRONG
 
 DEADLINE_S = 5.0
 MOST_THREADS = 128  # nodes beyond these wait for their turn
@@ -81,11 +81,11 @@ class Updates:
 
     def _send(self, update: Update) -> None:
         try:
-            answer: Any = call(update.uri, self._deadline_s, update.method, MASTER, *_arguments(update))
+            response: Any = call(update.uri, self._deadline_s, update.method, MASTER, *_arguments(update))
         except (OSError, UnreadableDocument, xmlrpc.client.Fault, TypeError, OverflowError) as error:
             log.info("%s does not take %s of %s: %s", update.uri, update.method, update.subject, error)
             return
-        match answer:
+        match response:
             case [int(code), *_] if code == WRONG and update.method == "paramUpdate":
                 self._refused(update)
 

@@ -22,10 +22,10 @@ from stable_baselines3.common.callbacks import (
     StopTrainingOnRewardThreshold,
 )
 
-from palaestra_trainer import own
-from palaestra_trainer.arguments import Arguments
+from palaestra_trainer import user_imports
 from palaestra_trainer.configuration import Callback
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError, fact_of
+from palaestra_trainer.kwargs_check import AcceptedArguments
 
 log = structlog.get_logger(__name__)
 
@@ -171,16 +171,16 @@ def _refuse(mistakes: Iterable[str]) -> None:
 
 
 def _about_arguments(field: str, cls: type[BaseCallback], callback: Callback) -> Iterator[str]:
-    found = list(Arguments(cls, callback.name).mistakes(f"{field}.options", callback.options))
+    found = list(AcceptedArguments(cls, callback.name).mistakes(f"{field}.options", callback.options))
     if found and cls is CheckpointCallback:
         yield f"{field}.name: {_CHECKPOINTS}"
     yield from found
 
 
 def _class(field: str, name: str) -> type[BaseCallback]:
-    if not own.names_class(name):
+    if not user_imports.names_class(name):
         raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
-    cls = own.class_named(name, field, BaseCallback)
+    cls = user_imports.class_named(name, field, BaseCallback)
     if cls in _OF_EVALUATION:
         raise ConfigurationError(f"{field}: {name} is refused: {_OF_EVALUATION[cls]}")
     if inspect.isabstract(cls):

@@ -14,11 +14,11 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
-from palaestra_trainer.algorithms.kept import begun_with
-from palaestra_trainer.algorithms.values import arguments
+from palaestra_trainer.algorithms.hyperparameters import arguments
+from palaestra_trainer.algorithms.saved_hyperparameters import begun_with
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.configuration import Configuration, Environment, load
-from palaestra_trainer.environments.making import keywords, make_environment
+from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
@@ -36,7 +36,7 @@ class Scale(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Policy:
+class TrainedPolicy:
     """A policy with its normalizer.
 
     Attributes:
@@ -113,7 +113,7 @@ class Policy:
         return np.asarray(np.clip(scaled, -clip, clip), np.float32)
 
 
-def load_policy(run_or_zip: str | Path) -> Policy:
+def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
     """Return the policy of a run directory, or of a model zip inside one.
 
     Stable-Baselines3 unpickles the zip, so load only files that you trust.
@@ -128,7 +128,7 @@ def load_policy(run_or_zip: str | Path) -> Policy:
         raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
     configuration = load(RunDirectory(model.parent).configuration)
     environment = configuration.environment
-    return Policy(
+    return TrainedPolicy(
         model=_load(model, configuration),
         environment_id=environment.id,
         environment_options=keywords(environment),

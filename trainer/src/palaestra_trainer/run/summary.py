@@ -9,7 +9,7 @@ from typing import Any
 
 from palaestra_protocol.pod.status import SuccessInterval, Termination
 from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.run.selection import best_of, confirmation_of
+from palaestra_trainer.run.best_model import best_of, confirmation_of
 from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_file
 from palaestra_trainer.telemetry.goodput import trained_share
 from palaestra_trainer.telemetry.progress import Progress

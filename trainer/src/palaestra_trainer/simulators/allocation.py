@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.locks import FileLock

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from palaestra_trainer.copies import copied
-from palaestra_trainer.simulators.member import Environment
+from palaestra_trainer.simulators.interface import Environment
 
 
 class Attributes:

@@ -10,13 +10,13 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.connect import OwnSimulator, connect
-from palaestra_trainer.simulators.offered import offered_simulator
+from palaestra_trainer.simulators.notebook_simulator import offered_simulator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,19 +18,19 @@ from palaestra_trainer.configuration import (
     SimulatorConfiguration,
     load,
 )
-from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.robots.choosing import robot_class
+from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import limit_of
-from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.offers import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
@@ -115,7 +115,7 @@ class OwnSimulator:
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
         supervisor, robot = _WORLDS[world]
         self.webots = Webots(supervisor, world, driver=driver)
-        withdraw(self.webots)
+        open_facades.withdraw(self.webots)
         self.robot = robot_class(robot)(self.webots)
         self.scene = SimulatedScene(self.webots, self.robot)
         try:

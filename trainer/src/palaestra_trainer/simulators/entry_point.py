@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.environments.deliver import DeliverEnv
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv

@@ -10,15 +10,15 @@ from contextlib import contextmanager
 
 import structlog
 
-from palaestra_protocol.pod.terms import Role
+from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Group, RestartLimit
-from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
-from palaestra_trainer.simulators.member import Member, Watcher
-from palaestra_trainer.simulators.meter import Meter
-from palaestra_trainer.waiting.interruption import Check, go_on
+from palaestra_trainer.simulators.interface import Member, Watcher
+from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
+from palaestra_trainer.simulators.stats import SimulatorStats
+from palaestra_trainer.simulators.threads import in_background
+from palaestra_trainer.waiting.signals import Check, go_on
 
 LONG_S = 5.0  # a start longer than this is logged with the missing simulators, again after each doubling
 
@@ -45,14 +45,16 @@ class Fleet:
             raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
         groups = groups_of(configuration)
         keepers = {
-            wanted.name: Keeper(by_name[wanted.name], limit_of(wanted), watcher, group=groups[wanted.group])
+            wanted.name: Restarter(
+                by_name[wanted.name], limit_of(wanted), watcher, group=groups[wanted.group]
+            )
             for wanted in configuration.simulators
         }
         self.collecting = [keepers[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
         self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
         self._all = [*self.collecting, *self.evaluating]
 
-    def meters(self) -> dict[str, Meter]:
+    def meters(self) -> dict[str, SimulatorStats]:
         """Return the counts of each member, by its name."""
         return {keeper.name: keeper.meter for keeper in self._all}
 
@@ -110,7 +112,7 @@ class Fleet:
 
 
 @contextmanager
-def running(keepers: Sequence[Keeper], check: Check = go_on) -> Iterator[None]:
+def running(keepers: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
     """Run the members inside the context, once their recycling is over; pause them outside."""
     for keeper in keepers:
         keeper.unpause(check)
@@ -121,7 +123,7 @@ def running(keepers: Sequence[Keeper], check: Check = go_on) -> Iterator[None]:
 
 
 @contextmanager
-def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
+def resting(keepers: Sequence[Restarter]) -> Iterator[None]:
     """Pause the members inside the context, run them outside."""
     rest(keepers)
     try:
@@ -131,7 +133,7 @@ def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
             keeper.unpause()
 
 
-def rest(keepers: Sequence[Keeper]) -> None:
+def rest(keepers: Sequence[Restarter]) -> None:
     """Pause the members."""
     for keeper in keepers:
         keeper.pause()

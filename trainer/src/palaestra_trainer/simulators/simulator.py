@@ -17,9 +17,9 @@ from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
-from palaestra_trainer.simulators.recycling import Wear
+from palaestra_trainer.simulators.recycle_policy import RecyclePolicy
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.offers import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 _POLL_S = 0.1
 
@@ -65,7 +65,7 @@ class Simulator:
         self.name = name
         self.sidecar = sidecar
         self.start_deadline_s = start_deadline_s
-        self.wear = Wear(recycle, self._memory)
+        self.wear = RecyclePolicy(recycle, self._memory)
         self._abandoned = threading.Event()
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((each for each in state.robots if each.supervisor), None)
@@ -75,7 +75,7 @@ class Simulator:
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )
-        withdraw(self.webots)
+        open_facades.withdraw(self.webots)
         self.robot = robot(self.webots, driven.ros_name, robots=[each.ros_name for each in state.robots])
         self.scene = SimulatedScene(self.webots, self.robot)
         self.env = make_environment(self.robot, self.scene)

@@ -26,10 +26,10 @@ from palaestra_trainer.errors import (
     SimulatorHung,
     WorldMisfit,
 )
-from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import RestartBudget, RestartLimit
-from palaestra_trainer.simulators.member import Environment
+from palaestra_trainer.simulators.interface import Environment
 from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.simulators.threads import in_background
 
 log = structlog.get_logger(__name__)
 

@@ -14,7 +14,7 @@ from palaestra_protocol.pod.status import TrainerStatus
 log = structlog.get_logger(__name__)
 
 
-class Display(Protocol):
+class ProgressDisplay(Protocol):
     """Shows a run while it is entered."""
 
     def __enter__(self) -> Self:
@@ -131,7 +131,7 @@ class Bar(_Paced):
         self._shown()
 
 
-def for_stream(stream: TextIO) -> Display:
+def for_stream(stream: TextIO) -> ProgressDisplay:
     """Return a bar for a terminal, lines for anything else."""
     return Bar(stream) if stream.isatty() else Lines()
 

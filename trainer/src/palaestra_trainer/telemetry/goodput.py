@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer.waiting.waits import waited_s
+from palaestra_trainer.waiting.wait_time import waited_s
 
 TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)
 
 
-class Goodput:
+class GoodputLedger:
     """The ledger of one attempt; it begins with the cause `starting`.
 
     A vector step is booked on transport, except the time that the thread waited for simulators, which is

@@ -18,13 +18,13 @@ from prometheus_client.registry import Collector
 
 from palaestra_protocol.metrics import Family, Values
 from palaestra_protocol.pod.status import SimulatorStatus, SuccessInterval, TrainerStatus
-from palaestra_trainer import families
+from palaestra_trainer import metric_definitions
 from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.telemetry.figures import Figures
+from palaestra_trainer.telemetry.metric_values import MetricValues
 from palaestra_trainer.telemetry.progress import Counters, Progress
 
 # For each value of the label, the name under which Stable-Baselines3 logs it.
-LOSSES = MappingProxyType({name: f"train/{name}" for name in families.LOSSES})
+LOSSES = MappingProxyType({name: f"train/{name}" for name in metric_definitions.LOSSES})
 MEASURES = MappingProxyType(
     {"exploration_rate": "rollout/exploration_rate", "ent_coef": "train/ent_coef", "std": "train/std"}
 )
@@ -34,8 +34,8 @@ LEARNING_RATE = "train/learning_rate"
 def constants(configuration: Configuration) -> dict[Family, Values]:
     """Return the metrics that do not change during a run."""
     return {
-        families.CHECKPOINT_INTERVAL: _one(configuration.checkpoint.every_steps),
-        families.STALL_DEADLINE: _one(configuration.stall_deadline_seconds),
+        metric_definitions.CHECKPOINT_INTERVAL: _one(configuration.checkpoint.every_steps),
+        metric_definitions.STALL_DEADLINE: _one(configuration.stall_deadline_seconds),
     }
 
 
@@ -67,50 +67,50 @@ class _RunCollector(Collector):
             **_learning(progress.figures.logged),
             **_checkpoints(progress.figures),
             **_simulators(progress.figures),
-            families.IDLE: _one(progress.idle_s()),
-            families.FAULTS: progress.faults_by_kind(),
-            families.RESTARTS: progress.restarts_by_cause(),
-            families.BUILD: {(version("palaestra-trainer"),): 1},
+            metric_definitions.IDLE: _one(progress.idle_s()),
+            metric_definitions.FAULTS: progress.faults_by_kind(),
+            metric_definitions.RESTARTS: progress.restarts_by_cause(),
+            metric_definitions.BUILD: {(version("palaestra-trainer"),): 1},
         }
-        for family in families.FAMILIES:
+        for family in metric_definitions.FAMILIES:
             yield family.metric(values.get(family, {}))
 
 
 def _steps(status: TrainerStatus, counters: Counters) -> dict[Family, Values]:
     checkpoint = status.last_checkpoint
     return {
-        families.STEPS: _one(status.step),
-        families.TARGET_STEPS: _one(status.target),
-        families.STEPS_PER_SECOND: _one(status.steps_per_second),
-        families.STEPS_LOST: _one(counters.steps_lost),
-        families.EXTRA_STEPS: _one(counters.extra_steps),
-        families.EPISODES: _one(counters.episodes),
-        families.SECONDS: {(cause,): seconds for cause, seconds in counters.goodput.items()},
-        families.CHECKPOINT_STEPS: _one(checkpoint.step if checkpoint else None),
-        families.SIMULATORS: _by_state(status.simulators),
+        metric_definitions.STEPS: _one(status.step),
+        metric_definitions.TARGET_STEPS: _one(status.target),
+        metric_definitions.STEPS_PER_SECOND: _one(status.steps_per_second),
+        metric_definitions.STEPS_LOST: _one(counters.steps_lost),
+        metric_definitions.EXTRA_STEPS: _one(counters.extra_steps),
+        metric_definitions.EPISODES: _one(counters.episodes),
+        metric_definitions.SECONDS: {(cause,): seconds for cause, seconds in counters.goodput.items()},
+        metric_definitions.CHECKPOINT_STEPS: _one(checkpoint.step if checkpoint else None),
+        metric_definitions.SIMULATORS: _by_state(status.simulators),
     }
 
 
-def _episodes(figures: Figures, returns: Sequence[float]) -> dict[Family, Values]:
+def _episodes(figures: MetricValues, returns: Sequence[float]) -> dict[Family, Values]:
     successes = tuple(figures.successes)
     return {
-        families.RETURN: {(): figures.returns},
-        families.LENGTH: {(): figures.lengths},
-        families.RETURN_MEAN: _one(fmean(returns) if returns else None),
-        families.RETURN_QUANTILE: _quantiles(returns),
-        families.SUCCESS: _one(fmean(successes) if successes else None),
+        metric_definitions.RETURN: {(): figures.returns},
+        metric_definitions.LENGTH: {(): figures.lengths},
+        metric_definitions.RETURN_MEAN: _one(fmean(returns) if returns else None),
+        metric_definitions.RETURN_QUANTILE: _quantiles(returns),
+        metric_definitions.SUCCESS: _one(fmean(successes) if successes else None),
     }
 
 
-def _evaluations(figures: Figures) -> dict[Family, Values]:
+def _evaluations(figures: MetricValues) -> dict[Family, Values]:
     last = figures.evaluation
     return {
-        families.EVALUATIONS: _one(figures.evaluations),
-        families.EVALUATION_SUCCESS: _one(last.success_rate if last else None),
-        families.EVALUATION_BOUND: _bounds(last.success_interval if last else None),
-        families.EVALUATION_EPISODES: _one(len(last.episodes) if last else None),
-        families.EVALUATION_RETURN: _one(last.mean_return if last else None),
-        families.EVALUATION_LENGTH: _one(last.mean_length if last else None),
+        metric_definitions.EVALUATIONS: _one(figures.evaluations),
+        metric_definitions.EVALUATION_SUCCESS: _one(last.success_rate if last else None),
+        metric_definitions.EVALUATION_BOUND: _bounds(last.success_interval if last else None),
+        metric_definitions.EVALUATION_EPISODES: _one(len(last.episodes) if last else None),
+        metric_definitions.EVALUATION_RETURN: _one(last.mean_return if last else None),
+        metric_definitions.EVALUATION_LENGTH: _one(last.mean_length if last else None),
     }
 
 
@@ -120,29 +120,29 @@ def _bounds(interval: SuccessInterval | None) -> Values:
 
 def _learning(logged: Mapping[str, float]) -> dict[Family, Values]:
     return {
-        families.LOSS: _logged(logged, LOSSES),
-        families.EXPLORATION: _logged(logged, MEASURES),
-        families.LEARNING_RATE: _one(logged.get(LEARNING_RATE)),
+        metric_definitions.LOSS: _logged(logged, LOSSES),
+        metric_definitions.EXPLORATION: _logged(logged, MEASURES),
+        metric_definitions.LEARNING_RATE: _one(logged.get(LEARNING_RATE)),
     }
 
 
-def _checkpoints(figures: Figures) -> dict[Family, Values]:
+def _checkpoints(figures: MetricValues) -> dict[Family, Values]:
     return {
-        families.CHECKPOINT_TIME: _one(figures.saved_at),
-        families.CHECKPOINT_DURATION: {(): figures.saves},
-        families.CHECKPOINT_SIZE: _one(figures.saved_bytes),
-        families.CHECKPOINT_FAILURES: _one(figures.saves_refused),
+        metric_definitions.CHECKPOINT_TIME: _one(figures.saved_at),
+        metric_definitions.CHECKPOINT_DURATION: {(): figures.saves},
+        metric_definitions.CHECKPOINT_SIZE: _one(figures.saved_bytes),
+        metric_definitions.CHECKPOINT_FAILURES: _one(figures.saves_refused),
     }
 
 
-def _simulators(figures: Figures) -> dict[Family, Values]:
+def _simulators(figures: MetricValues) -> dict[Family, Values]:
     meters = figures.meters
     simulated = {name: meter.simulated_s for name, meter in meters.items()}
     return {
-        families.RESETS: {(name,): meter.resets for name, meter in meters.items()},
-        families.STEP_DURATION: {(name,): meter.steps for name, meter in meters.items()},
-        families.BUDGET: {(name,): meter.budget_spent for name, meter in meters.items()},
-        families.SIMULATED: {(name,): it for name, it in simulated.items() if it is not None},
+        metric_definitions.RESETS: {(name,): meter.resets for name, meter in meters.items()},
+        metric_definitions.STEP_DURATION: {(name,): meter.steps for name, meter in meters.items()},
+        metric_definitions.BUDGET: {(name,): meter.budget_spent for name, meter in meters.items()},
+        metric_definitions.SIMULATED: {(name,): it for name, it in simulated.items() if it is not None},
     }
 
 
@@ -159,12 +159,16 @@ def _quantiles(values: Sequence[float]) -> Values:
     """Return the value nearest to each of `QUANTILES`."""
     ordered = sorted(values)
     last = len(ordered) - 1
-    return {(f"{share:g}",): ordered[round(share * last)] for share in families.QUANTILES if ordered}
+    return {
+        (f"{share:g}",): ordered[round(share * last)] for share in metric_definitions.QUANTILES if ordered
+    }
 
 
 def _by_state(simulators: Sequence[SimulatorStatus]) -> Values:
     counted = Counter(
-        (simulator.role, families.GIVEN_UP if simulator.given_up else simulator.state)
+        (simulator.role, metric_definitions.GIVEN_UP if simulator.given_up else simulator.state)
         for simulator in simulators
     )
-    return {(role, state): counted[role, state] for role, state in families.SIMULATORS.combinations()}
+    return {
+        (role, state): counted[role, state] for role, state in metric_definitions.SIMULATORS.combinations()
+    }

@@ -16,6 +16,7 @@ from statistics import fmean
 from types import MappingProxyType
 from typing import Any
 
+from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
@@ -24,13 +25,12 @@ from palaestra_protocol.pod.status import (
     SuccessInterval,
     TrainerStatus,
 )
-from palaestra_protocol.pod.terms import Role
-from palaestra_trainer.episodes.evaluation import Evaluation
+from palaestra_trainer.episodes.evaluation import EvaluationResult
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.infos import extra_steps
-from palaestra_trainer.telemetry.figures import EPISODES_IN_MEAN, Figures
-from palaestra_trainer.telemetry.goodput import Goodput
-from palaestra_trainer.telemetry.standings import AskLeftOut, AskStandby, Standings
+from palaestra_trainer.telemetry.goodput import GoodputLedger
+from palaestra_trainer.telemetry.metric_values import EPISODES_IN_MEAN, MetricValues
+from palaestra_trainer.telemetry.simulator_status import AskLeftOut, AskStandby, SimulatorStatuses
 
 SPEED_WINDOW_S = 30.0
 PHASES: Mapping[Cause, str] = MappingProxyType(
@@ -119,11 +119,11 @@ class Progress:
         self.success_interval: SuccessInterval | None = None
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
-        self.figures = Figures()
+        self.figures = MetricValues()
         self._clock = clock
         self._lock = threading.Lock()
-        self._standings = Standings(simulators, clock)
-        self._goodput = Goodput(clock)
+        self._standings = SimulatorStatuses(simulators, clock)
+        self._goodput = GoodputLedger(clock)
         self._returns: deque[float] = deque(maxlen=EPISODES_IN_MEAN)
         self._samples: deque[tuple[float, int]] = deque()
         self._moved = clock()
@@ -140,7 +140,7 @@ class Progress:
         return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING, Cause.RECYCLING}
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Book the time inside the context on `cause`, see `Goodput`."""
+        """Book the time inside the context on `cause`, see `GoodputLedger`."""
         return self._goodput.spending(cause)
 
     def stepped(self, steps: int) -> None:
@@ -247,7 +247,7 @@ class Progress:
                 while now - self._samples[0][0] > SPEED_WINDOW_S:
                     self._samples.popleft()
 
-    def evaluated(self, evaluation: Evaluation) -> None:
+    def evaluated(self, evaluation: EvaluationResult) -> None:
         """Record an evaluation of the policy."""
         with self._lock:
             self.success_rate = evaluation.success_rate

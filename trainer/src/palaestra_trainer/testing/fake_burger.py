@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.errors import NoSuchSensor
 from palaestra_trainer.robots.capabilities import Scanner
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 from palaestra_trainer.testing.fake_scene import FakeScene
 from palaestra_trainer.testing.fake_wheels import FakeWheels
 from palaestra_trainer.testing.rays import nearest
@@ -26,7 +26,7 @@ NOISE_M = 0.015  # 0.0043 of the greatest distance. Source: RobotisLds01 of Webo
 ROWS = (np.arange(RAYS) + 0.5) * (2.0 * math.pi / RAYS) - math.pi
 TOP_M = 0.3
 
-COURT = Layout(
+COURT = FloorLayout(
     low=(-1.5, -1.5),
     high=(1.5, 1.5),
     obstacles=(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.robots.capabilities import Distances
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 from palaestra_trainer.testing.fake_scene import FakeScene
 from palaestra_trainer.testing.fake_wheels import FakeWheels
 from palaestra_trainer.testing.rays import nearest
@@ -35,7 +35,7 @@ SENSORS_M = np.array(
 NOISE_M = 0.001  # the mean over the range. Source: E-puckDistanceSensor of Webots
 TOP_M = 0.1
 
-PEN = Layout(
+PEN = FloorLayout(
     low=(-0.6, -0.4),
     high=(0.6, 0.4),
     obstacles=tuple(

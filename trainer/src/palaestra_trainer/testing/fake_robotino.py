@@ -20,7 +20,8 @@ from palaestra_trainer.errors import NoSuchSensor
 from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, SENSORS, RobotinoAbc
 from palaestra_trainer.robots.capabilities import Cameras
 from palaestra_trainer.robots.geometry import Point, Pose, Twist
-from palaestra_trainer.robots.layout import Layout
+from palaestra_trainer.robots.layout import FloorLayout
+from palaestra_trainer.testing.crashing import Crashing
 from palaestra_trainer.testing.fake_camera import look
 from palaestra_trainer.testing.fake_scene import (
     CYLINDER_RADIUS_M,
@@ -30,7 +31,6 @@ from palaestra_trainer.testing.fake_scene import (
     FakeScene,
     arena,
 )
-from palaestra_trainer.testing.mortal import Mortal
 
 BASIC_STEP_S = 0.032
 BASIC_STEPS = 6  # in one control period
@@ -38,7 +38,7 @@ ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotin
 NOISE = 0.005  # of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
 
 
-class FakeRobotino(Mortal, RobotinoAbc):
+class FakeRobotino(Crashing, RobotinoAbc):
     """A Robotino on the arena's floor, computed here.
 
     Args:
@@ -66,12 +66,12 @@ class FakeRobotino(Mortal, RobotinoAbc):
         return BASIC_STEP_S * BASIC_STEPS
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """The arena with what stands in it; only its cylinders are simulated."""
         return self._layout
 
     @layout.setter
-    def layout(self, layout: Layout) -> None:
+    def layout(self, layout: FloorLayout) -> None:
         self._layout = layout
         self.cylinders = tuple((thing.x_m, thing.y_m) for thing in layout.obstacles if thing.standing)
 

@@ -8,7 +8,7 @@ from typing import Protocol
 from palaestra_trainer.errors import WrongData
 from palaestra_trainer.robots.base import Scene
 from palaestra_trainer.robots.geometry import Point, Pose
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
 HALF_SIDE_M = 2.0  # of the arena, from the center to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
@@ -17,10 +17,10 @@ CYLINDER_HEIGHT_M = 0.4
 STORED_M = -0.7  # height of a cylinder that waits under the floor of the world `seeing`
 
 
-def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLINDER_HEIGHT_M) -> Layout:
+def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLINDER_HEIGHT_M) -> FloorLayout:
     """Return the arena of the shipped world with cylinders at these places, their centers at `height_m`."""
     half = 0.5 * CYLINDER_HEIGHT_M
-    return Layout(
+    return FloorLayout(
         low=(-HALF_SIDE_M, -HALF_SIDE_M),
         high=(HALF_SIDE_M, HALF_SIDE_M),
         obstacles=tuple(
@@ -43,12 +43,12 @@ class Placed(Protocol):
     target: Point
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """The floor, and what stands on it."""
         ...
 
     @layout.setter
-    def layout(self, layout: Layout) -> None: ...
+    def layout(self, layout: FloorLayout) -> None: ...
 
     def place(self, pose: Pose, seed: int) -> None:
         """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
@@ -63,7 +63,7 @@ class FakeScene(Scene):
         layout: what stands on the floor when an episode begins.
     """
 
-    def __init__(self, robot: Placed, layout: Layout | None = None) -> None:
+    def __init__(self, robot: Placed, layout: FloorLayout | None = None) -> None:
         self._robot = robot
         self._first = layout or arena()
         self._seed = 0
@@ -81,7 +81,7 @@ class FakeScene(Scene):
         self._things = {thing.name: thing for thing in self._first.obstacles}
         self._robot.layout = self._first
 
-    def layout(self) -> Layout:
+    def layout(self) -> FloorLayout:
         """Return the floor, and what stands on it now."""
         return self._robot.layout
 
@@ -104,4 +104,4 @@ class FakeScene(Scene):
             raise WrongData("fake", f"the world has no node DEF {name}")
         self._things[name] = self._things[name].moved(*place)
         low, high = self._first.low, self._first.high
-        self._robot.layout = Layout(low=low, high=high, obstacles=tuple(self._things.values()))
+        self._robot.layout = FloorLayout(low=low, high=high, obstacles=tuple(self._things.values()))

@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium import spaces
 
 from palaestra_trainer.environments.masks import allows, choices_of
-from palaestra_trainer.testing.mortal import Mortal
+from palaestra_trainer.testing.crashing import Crashing
 
 _IMAGE = spaces.Box(0, 255, (36, 36, 3), np.uint8)
 _NUMBERS = spaces.Box(-1.0, 1.0, (3,), np.float32)
@@ -43,7 +43,7 @@ ACTIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
 )
 
 
-class FakeTask(Mortal, gymnasium.Env[Any, Any]):
+class FakeTask(Crashing, gymnasium.Env[Any, Any]):
     """Episodes of at most `max_steps` steps whose observations are drawn anew at each step.
 
     Args:

@@ -15,14 +15,14 @@ import numpy as np
 from palaestra_trainer.robots.base import RobotAbc
 from palaestra_trainer.robots.capabilities import Localization, Steering
 from palaestra_trainer.robots.geometry import Point, Pose
-from palaestra_trainer.robots.layout import Layout
+from palaestra_trainer.robots.layout import FloorLayout
+from palaestra_trainer.testing.crashing import Crashing
 from palaestra_trainer.testing.fake_robotino import wrapped
-from palaestra_trainer.testing.mortal import Mortal
 
 PERIOD_S = 0.192
 
 
-class FakeWheels(Mortal, RobotAbc, Steering, Localization):
+class FakeWheels(Crashing, RobotAbc, Steering, Localization):
     """A robot on two wheels; a subclass has `floor`, sizes and speeds, and implements `_look`.
 
     Args:
@@ -37,7 +37,7 @@ class FakeWheels(Mortal, RobotAbc, Steering, Localization):
         target: x, y in meters of the mark.
     """
 
-    floor: ClassVar[Layout]
+    floor: ClassVar[FloorLayout]
     axle_m: ClassVar[float]
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:

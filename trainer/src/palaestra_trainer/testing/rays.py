@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
 _LEAST_SLOPE = 1e-9
 Rays = NDArray[np.float64]
 Eye = tuple[float, float] | tuple[Rays, Rays]
 
 
-def nearest(layout: Layout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
+def nearest(layout: FloorLayout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
     """Return meters along each ray to the walls and to what stands on the floor.
 
     Args:
@@ -31,7 +31,7 @@ def nearest(layout: Layout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays
     return seen
 
 
-def _to_edges(layout: Layout, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
+def _to_edges(layout: FloorLayout, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
     """Return meters along each ray to the walls at the edges of the floor."""
     seen = np.full(len(way[0]), math.inf)
     for axis in (0, 1):

@@ -6,6 +6,7 @@ step that blocks forever while paused, and the state that a reset does not resto
 
 from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.cameras import Camera, Lidar, LidarPoints, RangeFinder
+from palaestra_trainer.webots.device_check import require_node
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
     Motor,
@@ -15,13 +16,12 @@ from palaestra_trainer.webots.devices import (
     set_velocities,
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
-from palaestra_trainer.webots.levers import Command, Lever
+from palaestra_trainer.webots.joint_motor import Command, JointMotor
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, Observer
-from palaestra_trainer.webots.requirements import require_node
-from palaestra_trainer.webots.simulation import Actuator, Simulation
+from palaestra_trainer.webots.obstacles import FLOOR, Thing
+from palaestra_trainer.webots.simulation import Actuator, Stepper
 from palaestra_trainer.webots.supervisor import Supervisor
-from palaestra_trainer.webots.surroundings import FLOOR, Thing
 
 __all__ = [
     "FLOOR",
@@ -30,8 +30,8 @@ __all__ = [
     "Camera",
     "Command",
     "DistanceSensor",
+    "JointMotor",
     "Launcher",
-    "Lever",
     "Lidar",
     "LidarPoints",
     "Mode",
@@ -42,7 +42,7 @@ __all__ = [
     "PositionSensor",
     "RangeFinder",
     "Sensor",
-    "Simulation",
+    "Stepper",
     "Supervisor",
     "Thing",
     "TouchSensor",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.errors import NoReading, WorldMisfit, WrongData
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.devices import Sensor, topic_name
-from palaestra_trainer.webots.pictures import ImageReading, PointsReading, RangesReading
+from palaestra_trainer.webots.image_decoding import ImageReading, PointsReading, RangesReading
 
 
 class _Rendered(Sensor):

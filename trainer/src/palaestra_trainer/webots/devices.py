@@ -8,8 +8,8 @@ from typing import Any
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
-from palaestra_trainer.waiting.turns import let_others
-from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
+from palaestra_trainer.waiting.greenlets import let_others
+from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
 from palaestra_trainer.webots.services import Services
 
 # Webots replaces these characters in names of devices, and no others.
@@ -125,7 +125,7 @@ class DistanceSensor(Sensor):
     __slots__ = ()
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "sensor_msgs/Range", Reading(device, RANGE))
+        super().__init__(robot, device, "sensor_msgs/Range", NumberReading(device, RANGE))
 
 
 class TouchSensor(Sensor):
@@ -134,7 +134,7 @@ class TouchSensor(Sensor):
     __slots__ = ()
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/BoolStamped", Reading(device, BOOL))
+        super().__init__(robot, device, "webots_ros/BoolStamped", NumberReading(device, BOOL))
 
 
 class PositionSensor(Sensor):
@@ -143,7 +143,7 @@ class PositionSensor(Sensor):
     __slots__ = ()
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/Float64Stamped", Reading(device, FLOAT64))
+        super().__init__(robot, device, "webots_ros/Float64Stamped", NumberReading(device, FLOAT64))
 
 
 class Motor:

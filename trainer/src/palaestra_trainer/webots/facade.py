@@ -20,10 +20,10 @@ from palaestra_trainer.errors import (
     SimulatorRefused,
     TrainerError,
 )
-from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.facade_registry import FacadeRegistry
 from palaestra_trainer.webots.observer import Mode, Observer
-from palaestra_trainer.webots.offers import offer, withdraw
 from palaestra_trainer.webots.supervisor import Supervisor
 
 Result = TypeVar("Result")
@@ -125,7 +125,7 @@ class Webots:
         self._at_start: dict[str, Callable[[], None]] = {}
         self._entered = 0
         self._stopped = False
-        offer(self)
+        open_facades.offer(self)
 
     @property
     def robot_name(self) -> str:
@@ -257,7 +257,7 @@ class Webots:
         Raises:
             subprocess.TimeoutExpired: that process does not end; errors of the simulator are suppressed.
         """
-        withdraw(self)
+        open_facades.withdraw(self)
         self._disconnect()
         if self._own is not None:
             self._own.close()
@@ -275,3 +275,6 @@ class Webots:
         self._probe.close()
         self.observer.close()
         self.supervisor.close()
+
+
+open_facades: FacadeRegistry[Webots] = FacadeRegistry()

@@ -18,7 +18,7 @@ _MULTIPLE: Final = 0x10  # added to the type number of a field that may have sev
 _SMALLEST_TURN: Final = 1e-6
 
 
-class Kind(NamedTuple):
+class FieldCodec(NamedTuple):
     """The type of a field: its name in services, its values in words, and its encoder and decoder."""
 
     name: str
@@ -27,7 +27,7 @@ class Kind(NamedTuple):
     from_wire: Callable[[Any], Value]
 
 
-def kind_of(type_number: int, field: str) -> Kind:
+def kind_of(type_number: int, field: str) -> FieldCodec:
     """Return the type of a field from its type number; `field` is its name in errors.
 
     Raises:
@@ -39,7 +39,7 @@ def kind_of(type_number: int, field: str) -> Kind:
     return kind
 
 
-def encoded(kind: Kind, field: str, value: Value) -> Any:
+def encoded(kind: FieldCodec, field: str, value: Value) -> Any:
     """Return `value` in the form that its service takes.
 
     Raises:
@@ -116,13 +116,13 @@ def _part(names: Sequence[str]) -> Callable[[Any], tuple[float, ...]]:
 
 
 # Source: WbFieldType of Webots, R2021b to R2023b.
-_KINDS: Final[Mapping[int, Kind]] = {
-    1: Kind("bool", "True or False", _exactly(bool), bool),
-    2: Kind("int32", "a whole number", _exactly(int), int),
-    3: Kind("float", "a finite number", _number, float),
-    4: Kind("vec2f", "x, y", _plane, _part("xy")),
-    5: Kind("vec3f", "x, y, z", _vector, _part("xyz")),
-    6: Kind("rotation", "x, y, z of an axis and an angle in radians", _quaternion, _axis_angle),
-    7: Kind("color", "red, green, blue from 0 to 1", _color, _part("rgb")),
-    8: Kind("string", "text", _exactly(str), str),
+_KINDS: Final[Mapping[int, FieldCodec]] = {
+    1: FieldCodec("bool", "True or False", _exactly(bool), bool),
+    2: FieldCodec("int32", "a whole number", _exactly(int), int),
+    3: FieldCodec("float", "a finite number", _number, float),
+    4: FieldCodec("vec2f", "x, y", _plane, _part("xy")),
+    5: FieldCodec("vec3f", "x, y, z", _vector, _part("xyz")),
+    6: FieldCodec("rotation", "x, y, z of an axis and an angle in radians", _quaternion, _axis_angle),
+    7: FieldCodec("color", "red, green, blue from 0 to 1", _color, _part("rgb")),
+    8: FieldCodec("string", "text", _exactly(str), str),
 }

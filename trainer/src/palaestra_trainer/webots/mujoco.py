@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.webots.devices import Sensor
-from palaestra_trainer.webots.levers import Lever
+from palaestra_trainer.webots.joint_motor import JointMotor
 
 _FOLDER: Final = "mujoco/"
 _TYPE: Final = "std_msgs/Float64MultiArray"
@@ -34,7 +34,7 @@ class MujocoSensor(Sensor):
         super().__init__(robot, f"{_FOLDER}{sensor}", _TYPE, read_numbers)
 
 
-class MujocoActuator(Lever):
+class MujocoActuator(JointMotor):
     """An actuator that is no motor of Webots, such as a muscle; `set` takes MuJoCo's control.
 
     The simulator keeps the control within the actuator's `ctrlrange`.

@@ -8,8 +8,8 @@ from typing import Any
 
 from palaestra_trainer.errors import WrongData
 from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.obstacles import ObstacleReader, Thing
 from palaestra_trainer.webots.services import Services
-from palaestra_trainer.webots.surroundings import Surroundings, Thing
 
 
 class Mode(enum.IntEnum):
@@ -35,7 +35,7 @@ class Observer:
         self._nodes: dict[str, int] = {}
         self._fields: dict[tuple[str, str], int] = {}
         self._types: dict[tuple[str, str], int] = {}
-        self._surroundings = Surroundings(self._services)
+        self._surroundings = ObstacleReader(self._services)
 
     def time(self) -> float:
         """Return the simulated time in seconds."""

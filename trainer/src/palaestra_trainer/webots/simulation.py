@@ -15,10 +15,10 @@ from typing import Protocol
 
 from palaestra_trainer.errors import Paused, SimulatorFault, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
-from palaestra_trainer.waiting.turns import let_others
+from palaestra_trainer.waiting.greenlets import let_others
+from palaestra_trainer.webots.device_check import require_devices, require_node
 from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.observer import Observer
-from palaestra_trainer.webots.requirements import require_devices, require_node
 from palaestra_trainer.webots.supervisor import Supervisor
 
 # Two extra steps deliver the messages of a lost wake-up; a sensor without a message after them is broken.
@@ -47,7 +47,7 @@ class Actuator(Protocol):
         ...
 
 
-class Simulation:
+class Stepper:
     """Steps and resets.
 
     Args:

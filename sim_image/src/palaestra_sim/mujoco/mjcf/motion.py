@@ -8,9 +8,9 @@ import numpy as np
 
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.mjcf.model import Model
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.seam import UnsimulatedError
 
 
 class BodyMotion:

@@ -15,8 +15,8 @@ from typing import Any, Final
 
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.motors import Motor, MotorSpec
-from palaestra_sim.seam import UnsimulatedError
 
 _JOINTS: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _FIXED: Final = int(mujoco.mjtGain.mjGAIN_FIXED)
@@ -37,7 +37,7 @@ class Control(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Actuator:
+class ModelActuator:
     """One actuator of a model.
 
     Attributes:
@@ -62,7 +62,7 @@ class ActuatorMotor(Motor):
 
     __slots__ = ("_actuator", "_aim", "_commanded")
 
-    def __init__(self, spec: MotorSpec, actuator: Actuator) -> None:
+    def __init__(self, spec: MotorSpec, actuator: ModelActuator) -> None:
         self._actuator = actuator
         super().__init__(spec)
         self.forceful = True  # MuJoCo moves everything by forces

@@ -8,16 +8,16 @@ from typing import Any, Final
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.mjcf import motors, own
+from palaestra_sim.mujoco.mjcf import generic_devices, motors
+from palaestra_sim.mujoco.mjcf.generic_devices import MujocoActuator
 from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
-from palaestra_sim.mujoco.mjcf.motors import Actuator, ActuatorMotor
-from palaestra_sim.mujoco.mjcf.own import MujocoActuator
-from palaestra_sim.mujoco.mjcf.sensors import Sensor, camera, in_webots, measured
-from palaestra_sim.scene.devices.kind import Devices, Kind, Sample, Shaft
+from palaestra_sim.mujoco.mjcf.motors import ActuatorMotor, ModelActuator
+from palaestra_sim.mujoco.mjcf.sensors import ModelSensor, camera, in_webots, measured
+from palaestra_sim.ros_interfaces import as_ros_name
+from palaestra_sim.scene.devices.device_type import Devices, DeviceType, Sample, Shaft
 from palaestra_sim.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.scene.joints import Joint
-from palaestra_sim.scene.reading import LeaveOut
-from palaestra_sim.seam import as_ros_name
+from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.world.mjcf import LEFT_OUT, Description
 
 _ACTUATOR: Final = "actuator"
@@ -100,14 +100,14 @@ class _Fitter:
         joint = motors.joint_of(model, index)
         default = self._defaults[index]
         control = motors.control_of(model, index)
-        folder = "" if control is not None else own.FOLDER
+        folder = "" if control is not None else generic_devices.FOLDER
         name = self._name(_ACTUATOR, default, f"{default}_actuator", folder)
         if name is None:
             return
         if control is None:
             self._add_own_actuator(index, name)
             return
-        actuator = Actuator(
+        actuator = ModelActuator(
             control=control[0],
             scale=control[1],
             length=motors.length_of(self._model, index),
@@ -122,20 +122,20 @@ class _Fitter:
 
     def _add_own_actuator(self, index: int, name: str) -> None:
         model = self._model.model
-        type_name = own.actuator_type_of(model, index)
+        type_name = generic_devices.actuator_type_of(model, index)
         if self._is_left_out(_ACTUATOR, model.actuator(index).name, name, type_name):
             return
-        actuator = own.actuator_of(model, self._model.data, index, name)
-        if self._add(_ACTUATOR, own.MUJOCO_ACTUATOR, actuator, None):
+        actuator = generic_devices.actuator_of(model, self._model.data, index, name)
+        if self._add(_ACTUATOR, generic_devices.MUJOCO_ACTUATOR, actuator, None):
             self._found.actuators.append(actuator)
 
     def _add_sensor(self, index: int) -> None:
         model = self._model.model
-        type_name = own.type_name_of(model, index)
+        type_name = generic_devices.type_name_of(model, index)
         what, which = int(model.sensor_objtype[index]), int(model.sensor_objid[index])
         given = model.sensor(index).name
         target = mujoco.mj_id2name(model, what, which) if which >= 0 else None
-        folder = "" if in_webots(model, index) else own.FOLDER
+        folder = "" if in_webots(model, index) else generic_devices.FOLDER
         default = given or f"{target or index}_{type_name}"
         name = self._name(_SENSOR, default, f"{given}_{type_name}", folder)
         if name is None or (folder and self._is_left_out(_SENSOR, given, name, type_name)):
@@ -143,7 +143,7 @@ class _Fitter:
         start = int(model.sensor_adr[index])
         joint = which if what == mujoco.mjtObj.mjOBJ_JOINT and self._is_simple(which) else None
         found = measured(
-            Sensor(
+            ModelSensor(
                 model=self._model,
                 number=index,
                 name=name,
@@ -154,11 +154,11 @@ class _Fitter:
         if self._add(_SENSOR, found.kind, found.device, None if folder else joint):
             self._found.samples.append(found.sample)
 
-    def _add(self, section: str, kind: Kind[Any], device: Any, joint: int | None) -> bool:
+    def _add(self, section: str, kind: DeviceType[Any], device: Any, joint: int | None) -> bool:
         name: str = device.name
         devices = self._found.devices
         if trouble := devices.trouble_with(name):
-            key = f"device:{section}/{name.removeprefix(own.FOLDER)}"
+            key = f"device:{section}/{name.removeprefix(generic_devices.FOLDER)}"
             remedy = f'rename one: <text name="{key}" data="..."/> in <custom>'
             error = self._description.error(section, name, trouble, remedy)
             self._found.refused.append(error)

@@ -12,24 +12,24 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.mjcf.eye import ModelEye
+from palaestra_sim.mujoco.mjcf.camera import ModelCamera
+from palaestra_sim.mujoco.mjcf.generic_devices import MUJOCO_SENSOR, MujocoSensor, type_name_of
 from palaestra_sim.mujoco.mjcf.model import Model
-from palaestra_sim.mujoco.mjcf.own import MUJOCO_SENSOR, MujocoSensor, type_name_of
+from palaestra_sim.scene.camera_interface import Lens
 from palaestra_sim.scene.devices.accelerometer import ACCELEROMETER, Accelerometer
 from palaestra_sim.scene.devices.camera import CAMERA, Camera
+from palaestra_sim.scene.devices.device_type import Carrier, DeviceT, DeviceType, Sample, Shaft
 from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR, DistanceSensor, DistanceSensorType
 from palaestra_sim.scene.devices.gps import GPS, Gps
 from palaestra_sim.scene.devices.gyro import GYRO, Gyro
 from palaestra_sim.scene.devices.inertial_unit import INERTIAL_UNIT, InertialUnit
-from palaestra_sim.scene.devices.kind import Carrier, DeviceT, Kind, Sample, Shaft
 from palaestra_sim.scene.devices.position_sensor import POSITION_SENSOR, PositionSensor
-from palaestra_sim.scene.devices.response import Axes
+from palaestra_sim.scene.devices.sensor_response import Axes
 from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
-from palaestra_sim.scene.eyes import Lens
-from palaestra_sim.scene.lookup import LookupTable
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.lookup_table import LookupTable
 
-_NOWHERE: Final = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # MuJoCo measures, not a place
+_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # MuJoCo measures, not a place
 _PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
 _FORCE: Final = 1  # what `get_type` of a touch sensor answers
 _PIXELS: Final = (64, 64)  # Webots' own, for a camera without a resolution
@@ -39,13 +39,13 @@ _PIXELS: Final = (64, 64)  # Webots' own, for a camera without a resolution
 class Measured:
     """A device, its row of the table of devices, and what gives it its value."""
 
-    kind: Kind[Any]
+    kind: DeviceType[Any]
     device: Any
     sample: Sample
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sensor:
+class ModelSensor:
     """A sensor of the model.
 
     Attributes:
@@ -68,7 +68,7 @@ def in_webots(model: Any, number: int) -> bool:
     return _maker(model, number) is not None
 
 
-def measured(sensor: Sensor) -> Measured:
+def measured(sensor: ModelSensor) -> Measured:
     """Return the device of a sensor: one of Webots, or else one that publishes the numbers as they are."""
     make = _maker(sensor.model.model, sensor.number) or _numbers
     return make(sensor)
@@ -87,7 +87,7 @@ def camera(parent: Model, number: int, name: str) -> Measured:
         near_m=float(model.vis.map.znear) * extent_m,
         far_m=float(model.vis.map.zfar) * extent_m,
     )
-    eye = ModelEye(parent, number, lens)
+    eye = ModelCamera(parent, number, lens)
     device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0, eye=eye)
     return Measured(kind=_CAMERA, device=device, sample=lambda: None)
 
@@ -97,23 +97,23 @@ def _by_model(_devices: Sequence[Any], _robot: Carrier) -> Sample:
     return lambda: None
 
 
-def _own(kind: Kind[DeviceT]) -> Kind[DeviceT]:
+def _own(kind: DeviceType[DeviceT]) -> DeviceType[DeviceT]:
     return replace(kind, sampler=_by_model)
 
 
-def _maker(model: Any, number: int) -> Callable[[Sensor], Measured] | None:
+def _maker(model: Any, number: int) -> Callable[[ModelSensor], Measured] | None:
     type_ = int(model.sensor_type[number])
     return _OF_ONE.get(type_, _number) if model.sensor_dim[number] == 1 else _OF_SEVERAL.get(type_)
 
 
-def _numbers(sensor: Sensor) -> Measured:
+def _numbers(sensor: ModelSensor) -> Measured:
     device = MujocoSensor(
         name=sensor.name, type_name=type_name_of(sensor.model.model, sensor.number), numbers=sensor.numbers
     )
     return Measured(kind=_MUJOCO_SENSOR, device=device, sample=device.sample)
 
 
-def _number(sensor: Sensor) -> Measured:
+def _number(sensor: ModelSensor) -> Measured:
     device = PositionSensor(name=sensor.name, shaft=sensor.shaft, resolution=-1.0, noise=0.0)
 
     def sample() -> None:
@@ -122,7 +122,7 @@ def _number(sensor: Sensor) -> Measured:
     return Measured(kind=_POSITION_SENSOR, device=device, sample=sample)
 
 
-def _distance(sensor: Sensor) -> Measured:
+def _distance(sensor: ModelSensor) -> Measured:
     """Return a distance sensor, which measures its whole reach where it meets nothing."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
@@ -143,7 +143,7 @@ def _distance(sensor: Sensor) -> Measured:
     return Measured(kind=_DISTANCE_SENSOR, device=device, sample=sample)
 
 
-def _touch(sensor: Sensor) -> Measured:
+def _touch(sensor: ModelSensor) -> Measured:
     device = TouchSensor(name=sensor.name, model="", outline=[], type=_FORCE, table=None, value=0.0)
 
     def sample() -> None:
@@ -152,17 +152,17 @@ def _touch(sensor: Sensor) -> Measured:
     return Measured(kind=_TOUCH_SENSOR, device=device, sample=sample)
 
 
-def _accelerometer(sensor: Sensor) -> Measured:
+def _accelerometer(sensor: ModelSensor) -> Measured:
     device = Accelerometer(name=sensor.name, model="", place=_NOWHERE, gravity=0.0, axes=_PLAIN)
     return Measured(kind=_ACCELEROMETER, device=device, sample=_vector(device, sensor))
 
 
-def _gyro(sensor: Sensor) -> Measured:
+def _gyro(sensor: ModelSensor) -> Measured:
     device = Gyro(name=sensor.name, model="", place=_NOWHERE, axes=_PLAIN)
     return Measured(kind=_GYRO, device=device, sample=_vector(device, sensor))
 
 
-def _inertial_unit(sensor: Sensor) -> Measured:
+def _inertial_unit(sensor: ModelSensor) -> Measured:
     device = InertialUnit(name=sensor.name, model="", place=_NOWHERE, noise=0.0, resolution=-1.0)
 
     def sample() -> None:
@@ -172,7 +172,7 @@ def _inertial_unit(sensor: Sensor) -> Measured:
     return Measured(kind=_INERTIAL_UNIT, device=device, sample=sample)
 
 
-def _gps(sensor: Sensor) -> Measured:
+def _gps(sensor: ModelSensor) -> Measured:
     model, number = sensor.model, sensor.number
     what, which = int(model.model.sensor_objtype[number]), int(model.model.sensor_objid[number])
     device = Gps(
@@ -196,7 +196,7 @@ def _gps(sensor: Sensor) -> Measured:
     return Measured(kind=_GPS, device=device, sample=sample)
 
 
-def _vector(device: Gps | Gyro | Accelerometer, sensor: Sensor) -> Sample:
+def _vector(device: Gps | Gyro | Accelerometer, sensor: ModelSensor) -> Sample:
     def sample() -> None:
         x, y, z = sensor.numbers.tolist()
         device.value = x, y, z
@@ -213,11 +213,11 @@ _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
 _MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
 _CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # it has its eye already
-_OF_ONE: Final[dict[int, Callable[[Sensor], Measured]]] = {
+_OF_ONE: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,
 }
-_OF_SEVERAL: Final[dict[int, Callable[[Sensor], Measured]]] = {
+_OF_SEVERAL: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_ACCELEROMETER): _accelerometer,
     int(mujoco.mjtSensor.mjSENS_GYRO): _gyro,
     int(mujoco.mjtSensor.mjSENS_FRAMEQUAT): _inertial_unit,

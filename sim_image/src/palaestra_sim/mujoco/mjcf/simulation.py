@@ -15,13 +15,13 @@ from palaestra_sim.mujoco.mjcf.motion import BodyMotion
 from palaestra_sim.mujoco.mjcf.robot import Equipment
 from palaestra_sim.mujoco.mjcf.states import BodyStates
 from palaestra_sim.mujoco.mjcf.tree import ModelTree
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.robot import Robot
-from palaestra_sim.scene.tree.fields import Field
-from palaestra_sim.seam import UnsimulatedError
+from palaestra_sim.scene.tree.fields import NodeField
 
 _FIXED: Final = "an MJCF world keeps its bodies while it runs; write them into the model"
 
@@ -130,7 +130,7 @@ class MjcfSimulation:
         """Return the robot of its node; None for any other node."""
         return self.robots[0] if node is self._nodes.robot else None
 
-    def add(self, text: str, field: Field, index: int) -> Never:
+    def add(self, text: str, field: NodeField, index: int) -> Never:
         """Refuse: a model is compiled once."""
         del text, field, index
         raise UnsimulatedError(_FIXED)

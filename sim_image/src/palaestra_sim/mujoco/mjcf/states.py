@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from palaestra_sim.mujoco.mjcf.model import Model
+from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.seam import UnsimulatedError
 
 _INITIAL: Final = "__init__"  # the state of the world file
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from palaestra_sim.mujoco.mjcf.body_frame import BodyFrame
 from palaestra_sim.mujoco.mjcf.model import Model
-from palaestra_sim.mujoco.mjcf.places import BodyPlace
 from palaestra_sim.mujoco.mjcf.robot import Equipment
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.scene_tree import SceneTree
@@ -67,10 +67,10 @@ def grow(
 
 def _place(model: Model, tree: ModelTree) -> None:
     """Give the bodies their places, parents first."""
-    places: dict[int, BodyPlace] = {}
+    places: dict[int, BodyFrame] = {}
     for node, number in sorted(tree.bodies.items(), key=lambda pair: pair[1]):
         parent = places.get(int(model.model.body_parentid[number]))
-        node.place = places[number] = BodyPlace(parent, model, number)
+        node.place = places[number] = BodyFrame(parent, model, number)
 
 
 class _Builder:

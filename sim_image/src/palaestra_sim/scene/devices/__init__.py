@@ -1,9 +1,9 @@
 """The devices of robots: one table, with a row for each type of node.
 
-A row (`Kind`) holds everything about one type: how it is read from the world, how its value is sampled, its
-services, its topics with their messages, and the rule of its `enable`. The effect of the fault `wrong_value`
-follows from the topic. A new device is one file in this package and one line in `DEVICES`; CONTRIBUTING.md
-has the steps.
+A row (`DeviceType`) holds everything about one type: how it is read from the world, how its value is sampled,
+its services, its topics with their messages, and the rule of its `enable`. The effect of the fault
+`wrong_value` follows from the topic. A new device is one file in this package and one line in `DEVICES`;
+CONTRIBUTING.md has the steps.
 
 - `kind`: what a row is
 - `distance_sensor`, `touch_sensor`: the rows of what feels obstacles
@@ -34,13 +34,13 @@ from palaestra_sim.scene.devices.brake import BRAKE
 from palaestra_sim.scene.devices.camera import CAMERA
 from palaestra_sim.scene.devices.compass import COMPASS
 from palaestra_sim.scene.devices.connector import CONNECTOR
+from palaestra_sim.scene.devices.device_type import DeviceType
 from palaestra_sim.scene.devices.display import DISPLAY
 from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.scene.devices.emitter import EMITTER
 from palaestra_sim.scene.devices.gps import GPS
 from palaestra_sim.scene.devices.gyro import GYRO
 from palaestra_sim.scene.devices.inertial_unit import INERTIAL_UNIT
-from palaestra_sim.scene.devices.kind import Kind
 from palaestra_sim.scene.devices.led import LED
 from palaestra_sim.scene.devices.lidar import LIDAR
 from palaestra_sim.scene.devices.light_sensor import LIGHT_SENSOR
@@ -57,7 +57,7 @@ from palaestra_sim.scene.devices.vacuum_gripper import VACUUM_GRIPPER
 
 # By the type of the node. Robots sample in this order, so a new row goes to the end: a row in between would
 # change the noise of the sensors behind it.
-DEVICES: Final[Mapping[str, Kind[Any]]] = {
+DEVICES: Final[Mapping[str, DeviceType[Any]]] = {
     kind.node: kind
     for kind in (
         DISTANCE_SENSOR,

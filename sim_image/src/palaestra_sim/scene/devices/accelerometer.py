@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.imu import imu_topic
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.imu_topic import imu_topic
+from palaestra_sim.scene.devices.sensor_response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector, transposed, turn
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -25,13 +25,13 @@ class Accelerometer:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     gravity: float
     axes: Axes
     value: Vector = (math.nan, math.nan, math.nan)
 
 
-def _read(part: Part) -> Accelerometer:
+def _read(part: DevicePart) -> Accelerometer:
     return Accelerometer(
         name=part.name,
         model=part.text("model"),
@@ -58,11 +58,11 @@ def _services(sensor: Accelerometer) -> tuple[Row, ...]:
     return sensor.axes.services()
 
 
-def _topics(sensor: Accelerometer) -> tuple[Topic, ...]:
+def _topics(sensor: Accelerometer) -> tuple[DeviceTopic, ...]:
     return (imu_topic("values", sensor, "linear_acceleration"),)
 
 
-ACCELEROMETER: Final = Kind(
+ACCELEROMETER: Final = DeviceType(
     node="Accelerometer",
     name="accelerometer",
     fields=AXES_FIELDS,

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import discrete
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import discrete
+from palaestra_sim.scene.frames import Frame
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -26,14 +26,14 @@ class Altimeter:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     reference: float
     accuracy: float
     resolution: float
     value: float = math.nan
 
 
-def _read(part: Part) -> Altimeter:
+def _read(part: DevicePart) -> Altimeter:
     return Altimeter(
         name=part.name,
         model=part.text("model"),
@@ -57,11 +57,11 @@ def _sampler(altimeters: Sequence[Altimeter], robot: Carrier) -> Sample:
     return sample
 
 
-def _topics(altimeter: Altimeter) -> tuple[Topic, ...]:
-    return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=altimeter),)
+def _topics(altimeter: Altimeter) -> tuple[DeviceTopic, ...]:
+    return (DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=altimeter),)
 
 
-ALTIMETER: Final = Kind(
+ALTIMETER: Final = DeviceType(
     node="Altimeter",
     name="altimeter",
     fields="accuracy SFFloat 0; resolution SFFloat -1",

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Shaft
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType, Shaft
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,7 +23,7 @@ class Brake:
     shaft: Shaft
 
 
-def _read(part: Part) -> Brake:
+def _read(part: DevicePart) -> Brake:
     return Brake(name=part.name, model=part.text("model"), shaft=part.shaft or Shaft())
 
 
@@ -42,4 +42,4 @@ def _services(brake: Brake) -> tuple[Row, ...]:
     )
 
 
-BRAKE: Final = Kind(node="Brake", name="brake", fields="", role="brake", read=_read, services=_services)
+BRAKE: Final = DeviceType(node="Brake", name="brake", fields="", role="brake", read=_read, services=_services)

@@ -9,18 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Stream, Topic
-from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
+from palaestra_sim.ros_interfaces import Fields, Handler, Row
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
+from palaestra_sim.scene.devices.camera_common import picture_topic, read_lens, saver
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Stream
 from palaestra_sim.scene.devices.recognition import (
     Recognition,
     read_recognition,
     recognition_services,
     recognition_stream,
 )
-from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.old_axes import looking
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Handler, Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -40,14 +40,14 @@ class Camera:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     lens: Lens
     spherical: bool
     exposure: float
     focus: tuple[float, float, float, float] | None = None
     zoom: tuple[float, float] | None = None
     recognition: Recognition | None = None
-    eye: Eye | None = None
+    eye: CameraInterface | None = None
 
     @property
     def value(self) -> bytes | memoryview:
@@ -70,7 +70,7 @@ class Camera:
             self.eye.open()
 
 
-def _read(part: Part) -> Camera:
+def _read(part: DevicePart) -> Camera:
     lens = read_lens(part, part.number("near", 0.01), part.number("far", 0.0))
     place = looking(part.node, part.place)
     return Camera(
@@ -86,7 +86,7 @@ def _read(part: Part) -> Camera:
     )
 
 
-def _focus(part: Part) -> tuple[float, float, float, float] | None:
+def _focus(part: DevicePart) -> tuple[float, float, float, float] | None:
     focus = part.inner("focus")
     if focus is None:
         return None
@@ -97,7 +97,7 @@ def _focus(part: Part) -> tuple[float, float, float, float] | None:
     return length, distance, highest, lowest
 
 
-def _zoom(part: Part) -> tuple[float, float] | None:
+def _zoom(part: DevicePart) -> tuple[float, float] | None:
     zoom = part.inner("zoom")
     if zoom is None:
         return None
@@ -178,11 +178,11 @@ def _exposure_setter(camera: Camera) -> Handler:
     return set_exposure
 
 
-def _topics(camera: Camera) -> tuple[Topic, ...]:
+def _topics(camera: Camera) -> tuple[DeviceTopic, ...]:
     return (picture_topic("image", camera, camera.lens, "bgra8"),)
 
 
-CAMERA: Final = Kind(
+CAMERA: Final = DeviceType(
     node="Camera",
     name="camera",
     without_effect="""exposure antiAliasing ambientOcclusionRadius bloomThreshold motionBlur noise

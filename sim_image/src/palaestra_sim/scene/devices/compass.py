@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector, transposed, turn
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -24,13 +24,13 @@ class Compass:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     axes: Axes
     north: Vector
     value: Vector = (math.nan, math.nan, math.nan)
 
 
-def _read(part: Part) -> Compass:
+def _read(part: DevicePart) -> Compass:
     x, y, z = (float(axis == part.axis_to("N")) for axis in range(3))
     return Compass(
         name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part), north=(x, y, z)
@@ -52,12 +52,12 @@ def _services(compass: Compass) -> tuple[Row, ...]:
     return compass.axes.services()
 
 
-def _topics(compass: Compass) -> tuple[Topic, ...]:
+def _topics(compass: Compass) -> tuple[DeviceTopic, ...]:
     type_name = "sensor_msgs/MagneticField"
-    return (Topic(name="values", type_name=type_name, source=compass, reading="magnetic_field"),)
+    return (DeviceTopic(name="values", type_name=type_name, source=compass, reading="magnetic_field"),)
 
 
-COMPASS: Final = Kind(
+COMPASS: Final = DeviceType(
     node="Compass",
     name="compass",
     fields=AXES_FIELDS,

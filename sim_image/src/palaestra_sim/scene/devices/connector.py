@@ -10,11 +10,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic
+from palaestra_sim.ros_interfaces import Fields, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.old_axes import pointing
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row, UnsimulatedError
 
 _PASSIVE: Final = -1  # the presence that a passive connector reads, which has no sensor
 _MATCHING: Final = {"symmetric": "symmetric", "active": "passive", "passive": "active"}
@@ -36,7 +36,7 @@ class Connector:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     kind: str
     reach_m: float
     tilt_rad: float
@@ -91,7 +91,7 @@ def _angle(a: Vector, b: Vector) -> float:
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
-def _read(part: Part) -> Connector:
+def _read(part: DevicePart) -> Connector:
     kind = part.text("type", "symmetric")
     if kind not in _MATCHING:
         part.refuse(f"no connector is of type {kind!r}", f"use {', '.join(_MATCHING)}")
@@ -117,11 +117,11 @@ def _services(connector: Connector) -> tuple[Row, ...]:
     return (("lock", "set_bool", lock), ("is_locked", "get_bool", lambda _: {"value": connector.locked}))
 
 
-def _topics(connector: Connector) -> tuple[Topic, ...]:
-    return (Topic(name="presence", type_name="webots_ros/Int8Stamped", source=connector),)
+def _topics(connector: Connector) -> tuple[DeviceTopic, ...]:
+    return (DeviceTopic(name="presence", type_name="webots_ros/Int8Stamped", source=connector),)
 
 
-CONNECTOR: Final = Kind(
+CONNECTOR: Final = DeviceType(
     node="Connector",
     name="connector",
     without_effect="autoLock unilateralLock unilateralUnlock snap tensileStrength shearStrength",

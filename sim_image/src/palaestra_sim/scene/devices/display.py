@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene import picture_files, raster
+from palaestra_sim.ros_interfaces import Fields, Handler, Row, UnsimulatedError
+from palaestra_sim.scene import image_buffer, picture_files
 from palaestra_sim.scene.devices.camera import Camera
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part
-from palaestra_sim.scene.letters import Font, letters
-from palaestra_sim.scene.raster import BLACK, OPAQUE, Color, Point, Raster, on_background
-from palaestra_sim.seam import Fields, Handler, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceType
+from palaestra_sim.scene.image_buffer import BLACK, OPAQUE, Color, ImageBuffer, Point, on_background
+from palaestra_sim.scene.text_rendering import Font, letters
 
 _LARGEST: Final = 4096  # pixels in a row or column; a display of Webots is a texture
 # Where blue, green, red and alpha are in a pixel of each format. Source: webots/display.h
@@ -46,16 +46,16 @@ class Display:
 
     name: str
     model: str
-    picture: Raster
+    picture: ImageBuffer
     color: Color = _WHITE
     opacity: int = OPAQUE
     font: Font = field(default_factory=Font)
-    images: dict[int, Raster] = field(default_factory=dict)
+    images: dict[int, ImageBuffer] = field(default_factory=dict)
     camera: Camera | None = None
     _robot: Carrier | None = field(default=None, repr=False)
 
     @property
-    def shown(self) -> Raster:
+    def shown(self) -> ImageBuffer:
         """What it shows: what was drawn, on top of what the camera sees now."""
         camera = self.camera
         return self.picture if camera is None else on_background(self.picture, camera.value)
@@ -89,13 +89,13 @@ class Display:
         self.picture.exchange(BLACK, _TRANSPARENT)
         return True
 
-    def keep(self, image: Raster) -> Fields:
+    def keep(self, image: ImageBuffer) -> Fields:
         """Keep a picture, and return its handle."""
         handle = max(self.images, default=0) + 1
         self.images[handle] = image
         return {"ir": handle}
 
-    def image(self, handle: int) -> Raster | None:
+    def image(self, handle: int) -> ImageBuffer | None:
         """Return a picture by its handle; None for 0, the handle of a picture that could not be made.
 
         Raises:
@@ -106,12 +106,12 @@ class Display:
         return self.images.get(handle)
 
 
-def _read(part: Part) -> Display:
+def _read(part: DevicePart) -> Display:
     width, height = int(part.number("width", 64.0)), int(part.number("height", 64.0))
     if not 0 < width <= _LARGEST or not 0 < height <= _LARGEST:
         part.refuse(f"a display of {width} by {height} pixels", f"use 1 to {_LARGEST}")
         width = height = 1
-    picture = Raster(width=width, height=height, pixels=bytearray(bytes(BLACK) * (width * height)))
+    picture = ImageBuffer(width=width, height=height, pixels=bytearray(bytes(BLACK) * (width * height)))
     return Display(name=part.name, model=part.text("model"), picture=picture)
 
 
@@ -167,13 +167,16 @@ def _share(value: float) -> float:
 def _drawing(display: Display) -> tuple[Row, ...]:
     shapes: dict[str, tuple[str, Callable[[Any], Iterable[Point]]]] = {
         "draw_pixel": ("pixel", lambda it: [(it.x1, it.y1)]),
-        "draw_line": ("line", lambda it: raster.line(it.x1, it.y1, it.x2, it.y2)),
-        "draw_rectangle": ("rectangle", lambda it: raster.rectangle(it.x, it.y, it.width, it.height)),
-        "draw_oval": ("oval", lambda it: raster.oval(it.cx, it.cy, it.a, it.b)),
-        "draw_polygon": ("polygon", lambda it: raster.outline(_corners(it))),
-        "fill_rectangle": ("rectangle", lambda it: raster.filled_rectangle(it.x, it.y, it.width, it.height)),
-        "fill_oval": ("oval", lambda it: raster.filled_oval(it.cx, it.cy, it.a, it.b)),
-        "fill_polygon": ("polygon", lambda it: raster.filled_polygon(_corners(it))),
+        "draw_line": ("line", lambda it: image_buffer.line(it.x1, it.y1, it.x2, it.y2)),
+        "draw_rectangle": ("rectangle", lambda it: image_buffer.rectangle(it.x, it.y, it.width, it.height)),
+        "draw_oval": ("oval", lambda it: image_buffer.oval(it.cx, it.cy, it.a, it.b)),
+        "draw_polygon": ("polygon", lambda it: image_buffer.outline(_corners(it))),
+        "fill_rectangle": (
+            "rectangle",
+            lambda it: image_buffer.filled_rectangle(it.x, it.y, it.width, it.height),
+        ),
+        "fill_oval": ("oval", lambda it: image_buffer.filled_oval(it.cx, it.cy, it.a, it.b)),
+        "fill_polygon": ("polygon", lambda it: image_buffer.filled_polygon(_corners(it))),
     }
 
     def draw_text(request: Any) -> Fields:
@@ -254,7 +257,7 @@ def _images(display: Display) -> tuple[Row, ...]:
     )
 
 
-def _image_of(request: Any) -> Raster | None:
+def _image_of(request: Any) -> ImageBuffer | None:
     """Return the picture of a request for a new one; None if Webots makes none either.
 
     Bytes that are missing are 0. Webots takes what lies in its memory behind the others.
@@ -268,10 +271,10 @@ def _image_of(request: Any) -> Raster | None:
     pixels = bytearray(4 * count)
     for channel, place in enumerate(places):
         pixels[channel::4] = bytes([OPAQUE]) * count if place is None else data[place::size]
-    return Raster(width=width, height=height, pixels=pixels)
+    return ImageBuffer(width=width, height=height, pixels=pixels)
 
 
-DISPLAY: Final = Kind(
+DISPLAY: Final = DeviceType(
     node="Display",
     name="display",
     fields="width SFInt32 64; height SFInt32 64",

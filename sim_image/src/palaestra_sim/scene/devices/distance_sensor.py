@@ -18,13 +18,13 @@ from enum import IntEnum
 from itertools import islice
 from typing import Final
 
-from palaestra_sim.scene.beams import Beam, beam_along
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import table_rows, table_service
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import table_rows, table_service
 from palaestra_sim.scene.geometry import Pose, Vector
-from palaestra_sim.scene.lookup import LookupTable, lookup_table
-from palaestra_sim.scene.sight import Glance
-from palaestra_sim.seam import Row
+from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
+from palaestra_sim.scene.sensor_rays import Beam, beam_along
+from palaestra_sim.scene.visual_rays import Glance
 
 _MOST_RAYS: Final = 10_000  # each is cast at every step
 _BESIDE_M: Final = 1e-4  # how far the rays are beside that of a sonar
@@ -83,7 +83,7 @@ class DistanceSensor:
     value: float = math.nan
 
 
-def _read(part: Part) -> DistanceSensor:
+def _read(part: DevicePart) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
@@ -250,7 +250,7 @@ def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
     )
 
 
-def _topics(sensor: DistanceSensor) -> tuple[Topic, ...]:
+def _topics(sensor: DistanceSensor) -> tuple[DeviceTopic, ...]:
     low, high = sensor.table.limits
     constants = {
         "radiation_type": int(sensor.type is DistanceSensorType.INFRA_RED),
@@ -258,10 +258,10 @@ def _topics(sensor: DistanceSensor) -> tuple[Topic, ...]:
         "min_range": low,
         "max_range": high,
     }
-    return (Topic(name="value", type_name="sensor_msgs/Range", source=sensor, constants=constants),)
+    return (DeviceTopic(name="value", type_name="sensor_msgs/Range", source=sensor, constants=constants),)
 
 
-DISTANCE_SENSOR: Final = Kind(
+DISTANCE_SENSOR: Final = DeviceType(
     node="DistanceSensor",
     name="distance sensor",
     fields="""lookupTable MFVec3f 0 0 0 0.1 1000 0; type SFString generic;

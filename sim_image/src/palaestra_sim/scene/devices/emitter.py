@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.ros_interfaces import Fields, Handler, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.old_axes import pointing
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Handler, Row
 
 EVERYWHERE: Final = -1  # as a range: without limit; as a channel: to or from all
 
@@ -27,7 +27,7 @@ class Emitter:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     buffer_size: int
     channel: int
     range_m: float
@@ -54,14 +54,14 @@ class Emitter:
             self.channel = channel
 
 
-def require_radio(part: Part) -> None:
+def require_radio(part: DevicePart) -> None:
     """Note that the stub simulates no medium but radio waves."""
     medium = part.text("type", "radio")
     if medium != "radio":
         part.lack(f"the type {medium!r} of {part.node.type_name}")
 
 
-def _read(part: Part) -> Emitter:
+def _read(part: DevicePart) -> Emitter:
     require_radio(part)
     return Emitter(
         name=part.name,
@@ -95,7 +95,7 @@ def _setter(command: Callable[[Any], None]) -> Handler:
     return handle
 
 
-EMITTER: Final = Kind(
+EMITTER: Final = DeviceType(
     node="Emitter",
     name="emitter",
     without_effect="aperture baudRate byteSize allowedChannels",

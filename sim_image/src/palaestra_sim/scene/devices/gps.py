@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import Gauss, discrete
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import Gauss, discrete
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
 
 _LOCAL: Final = 0  # what `get_coordinate_system` answers; WGS84 is 1
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
@@ -42,7 +42,7 @@ class Gps:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     reference: Vector
     accuracy: float
     resolution: float
@@ -53,7 +53,7 @@ class Gps:
     speed_vector: _Speed = field(default_factory=lambda: _Speed(_NOWHERE))
 
 
-def _read(part: Part) -> Gps:
+def _read(part: DevicePart) -> Gps:
     system = part.world_text("gpsCoordinateSystem", "local")
     if system == "WGS84":
         part.lack("a GPS with latitude and longitude (WorldInfo.gpsCoordinateSystem)")
@@ -125,18 +125,20 @@ def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
     return {"degreesMinutesSeconds": f"{degrees}° {minutes}\u2032 {seconds}\u2033"}
 
 
-def _topics(gps: Gps) -> tuple[Topic, ...]:
+def _topics(gps: Gps) -> tuple[DeviceTopic, ...]:
     point = "geometry_msgs/PointStamped"
     # Webots leaves the frame of the speed empty.
     no_frame: Fields = {"header": {}}
     return (
-        Topic(name="values", type_name=point, source=gps),
-        Topic(name="speed", type_name="webots_ros/Float64Stamped", source=gps.speed, constants=no_frame),
-        Topic(name="speed_vector", type_name=point, source=gps.speed_vector),
+        DeviceTopic(name="values", type_name=point, source=gps),
+        DeviceTopic(
+            name="speed", type_name="webots_ros/Float64Stamped", source=gps.speed, constants=no_frame
+        ),
+        DeviceTopic(name="speed_vector", type_name=point, source=gps.speed_vector),
     )
 
 
-GPS: Final = Kind(
+GPS: Final = DeviceType(
     node="GPS",
     name="gps",
     fields="""type SFString satellite; accuracy SFFloat 0; noiseCorrelation SFFloat 0;

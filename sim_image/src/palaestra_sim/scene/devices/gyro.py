@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.imu import imu_topic
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.imu_topic import imu_topic
+from palaestra_sim.scene.devices.sensor_response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector, transposed, turn
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -25,12 +25,12 @@ class Gyro:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     axes: Axes
     value: Vector = (math.nan, math.nan, math.nan)
 
 
-def _read(part: Part) -> Gyro:
+def _read(part: DevicePart) -> Gyro:
     return Gyro(name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part))
 
 
@@ -49,11 +49,11 @@ def _services(gyro: Gyro) -> tuple[Row, ...]:
     return gyro.axes.services()
 
 
-def _topics(gyro: Gyro) -> tuple[Topic, ...]:
+def _topics(gyro: Gyro) -> tuple[DeviceTopic, ...]:
     return (imu_topic("values", gyro, "angular_velocity"),)
 
 
-GYRO: Final = Kind(
+GYRO: Final = DeviceType(
     node="Gyro",
     name="gyro",
     fields=AXES_FIELDS,

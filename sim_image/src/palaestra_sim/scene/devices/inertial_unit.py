@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.imu import imu_topic
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import Gauss, discrete
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.imu_topic import imu_topic
+from palaestra_sim.scene.devices.sensor_response import Gauss, discrete
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import (
     Matrix,
     Quaternion,
@@ -17,8 +19,6 @@ from palaestra_sim.scene.geometry import (
     multiply,
     to_quaternion,
 )
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -32,13 +32,13 @@ class InertialUnit:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     noise: float
     resolution: float
     value: Quaternion = (math.nan, math.nan, math.nan, math.nan)
 
 
-def _read(part: Part) -> InertialUnit:
+def _read(part: DevicePart) -> InertialUnit:
     if not all(part.node.flag(axis, default=True) for axis in ("xAxis", "yAxis", "zAxis")):
         part.lack("an inertial unit with an axis that is switched off")
     return InertialUnit(
@@ -77,11 +77,11 @@ def _services(unit: InertialUnit) -> tuple[Row, ...]:
     return (("get_noise", "get_float", lambda _: {"value": unit.noise}),)
 
 
-def _topics(unit: InertialUnit) -> tuple[Topic, ...]:
+def _topics(unit: InertialUnit) -> tuple[DeviceTopic, ...]:
     return (imu_topic("quaternion", unit, "orientation"),)
 
 
-INERTIAL_UNIT: Final = Kind(
+INERTIAL_UNIT: Final = DeviceType(
     node="InertialUnit",
     name="inertial unit",
     fields="""noise SFFloat 0; xAxis SFBool TRUE; yAxis SFBool TRUE; zAxis SFBool TRUE;

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -18,7 +18,7 @@ class Led:
     state: int = 0
 
 
-def _read(part: Part) -> Led:
+def _read(part: DevicePart) -> Led:
     return Led(name=part.name, model=part.text("model"))
 
 
@@ -33,7 +33,7 @@ def _services(led: Led) -> tuple[Row, ...]:
     )
 
 
-LED: Final = Kind(
+LED: Final = DeviceType(
     node="LED",
     name="led",
     without_effect="color gradual",

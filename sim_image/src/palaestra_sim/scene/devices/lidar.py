@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.beams import Beam, beam_along
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import discrete
+from palaestra_sim.ros_interfaces import Fields, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import discrete
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.old_axes import looking
-from palaestra_sim.seam import Fields, Row, UnsimulatedError
+from palaestra_sim.scene.sensor_rays import Beam, beam_along
 
 _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
@@ -119,7 +119,7 @@ class _Cloud:
         return [b"".join(packed)]
 
 
-def _read(part: Part) -> Lidar:
+def _read(part: DevicePart) -> Lidar:
     if part.text("type", "fixed") != "fixed":
         part.lack("a lidar that rotates")
     if part.number("tiltAngle", 0.0) != 0.0:
@@ -238,10 +238,10 @@ def _image(lidar: Lidar, height: int) -> Fields:
     return {"height": height, "width": width, "encoding": "32FC1", "step": _FLOAT_BYTES * width}
 
 
-def _topics(lidar: Lidar) -> tuple[Topic, ...]:
+def _topics(lidar: Lidar) -> tuple[DeviceTopic, ...]:
     layers = lidar.info["numberOfLayers"]
     lidar.timing.update(_angles(lidar))
-    image = Topic(
+    image = DeviceTopic(
         name="range_image",
         type_name="sensor_msgs/Image",
         source=lidar,
@@ -255,8 +255,8 @@ def _topics(lidar: Lidar) -> tuple[Topic, ...]:
     return image, *(_scan(lidar, name, layer) for name, layer in scans), _cloud(lidar)
 
 
-def _scan(lidar: Lidar, name: str, layer: int) -> Topic:
-    return Topic(
+def _scan(lidar: Lidar, name: str, layer: int) -> DeviceTopic:
+    return DeviceTopic(
         name=name,
         type_name="sensor_msgs/LaserScan",
         source=_Scan(lidar, layer),
@@ -276,7 +276,7 @@ def _angles(lidar: Lidar) -> Fields:
     }
 
 
-def _cloud(lidar: Lidar) -> Topic:
+def _cloud(lidar: Lidar) -> DeviceTopic:
     count = lidar.info["numberOfLayers"] * lidar.info["horizontalResolution"]
     constants = {
         "height": 1,
@@ -285,7 +285,7 @@ def _cloud(lidar: Lidar) -> Topic:
         "point_step": _POINT.size,
         "row_step": _POINT.size * count,
     }
-    return Topic(
+    return DeviceTopic(
         name="point_cloud",
         type_name="sensor_msgs/PointCloud2",
         source=_Cloud(lidar),
@@ -295,7 +295,7 @@ def _cloud(lidar: Lidar) -> Topic:
     )
 
 
-LIDAR: Final = Kind(
+LIDAR: Final = DeviceType(
     node="Lidar",
     name="lidar",
     without_effect="near spherical rotatingHead",

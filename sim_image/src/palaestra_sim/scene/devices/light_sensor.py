@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import discrete, table_rows, table_service
-from palaestra_sim.scene.lookup import LookupTable, lookup_table
-from palaestra_sim.seam import Row
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import discrete, table_rows, table_service
+from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
 
 _LIGHTS: Final = frozenset(("DirectionalLight", "PointLight", "SpotLight", "TexturedBackgroundLight"))
 _DARKNESS: Final = 0.0  # irradiance in W/m2
@@ -32,7 +32,7 @@ class LightSensor:
     value: float = math.nan
 
 
-def _read(part: Part) -> LightSensor:
+def _read(part: DevicePart) -> LightSensor:
     *_, root = part.node.ancestors()
     if any(node.type_name in _LIGHTS for node in root.descendants()):
         part.lack("a light sensor in a world with lights")
@@ -60,12 +60,12 @@ def _services(sensor: LightSensor) -> tuple[Row, ...]:
     return table_service(() if sensor.table is None else sensor.table.rows)
 
 
-def _topics(sensor: LightSensor) -> tuple[Topic, ...]:
+def _topics(sensor: LightSensor) -> tuple[DeviceTopic, ...]:
     type_name = "sensor_msgs/Illuminance"
-    return (Topic(name="value", type_name=type_name, source=sensor, reading="illuminance"),)
+    return (DeviceTopic(name="value", type_name=type_name, source=sensor, reading="illuminance"),)
 
 
-LIGHT_SENSOR: Final = Kind(
+LIGHT_SENSOR: Final = DeviceType(
     node="LightSensor",
     name="light sensor",
     fields="""lookupTable MFVec3f 0 0 0 1 1000 0; colorFilter SFColor 1 1 1; occlusion SFBool FALSE;

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic
+from palaestra_sim.ros_interfaces import Handler, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 from palaestra_sim.scene.motors import Motor, MotorSpec
-from palaestra_sim.seam import Handler, Row, UnsimulatedError
 
 _ROTATIONAL: Final = 0  # what `get_type` answers
 _LINEAR: Final = 1
@@ -22,10 +22,10 @@ _FIELDS: Final = """
     sound MFString sounds/{}.wav; muscles MFNode"""
 
 
-def _reader(limit: str) -> Callable[[Part], Motor]:
+def _reader(limit: str) -> Callable[[DevicePart], Motor]:
     """Return the function that reads a motor whose torque or force the field `limit` limits."""
 
-    def read(part: Part) -> Motor:
+    def read(part: DevicePart) -> Motor:
         number = part.number
         return Motor(
             MotorSpec(
@@ -45,7 +45,7 @@ def _reader(limit: str) -> Callable[[Part], Motor]:
     return read
 
 
-def _gains(part: Part) -> tuple[float, float, float]:
+def _gains(part: DevicePart) -> tuple[float, float, float]:
     p, i, d = part.reading.vector(part.node, "controlPID", (10.0, 0.0, 0.0))
     return p, i, d
 
@@ -103,14 +103,16 @@ class Feedback:
         return self.motor.feedback_nm
 
 
-def _topics(effort: str) -> Callable[[Motor], tuple[Topic, ...]]:
+def _topics(effort: str) -> Callable[[Motor], tuple[DeviceTopic, ...]]:
     """Return the function that lists the topics of a motor; `effort` is "torque" or "force"."""
 
-    def topics(motor: Motor) -> tuple[Topic, ...]:
+    def topics(motor: Motor) -> tuple[DeviceTopic, ...]:
         if not motor.forceful:
             return ()
         return (
-            Topic(name=f"{effort}_feedback", type_name="webots_ros/Float64Stamped", source=Feedback(motor)),
+            DeviceTopic(
+                name=f"{effort}_feedback", type_name="webots_ros/Float64Stamped", source=Feedback(motor)
+            ),
         )
 
     return topics
@@ -180,7 +182,7 @@ def _unable(motor: Motor, effort: str) -> Handler:
     return fail
 
 
-ROTATIONAL_MOTOR: Final = Kind(
+ROTATIONAL_MOTOR: Final = DeviceType(
     node="RotationalMotor",
     name="rotational motor",
     without_effect="consumptionFactor sound muscles",
@@ -191,7 +193,7 @@ ROTATIONAL_MOTOR: Final = Kind(
     topics=_topics("torque"),
     sensor="torque_feedback_sensor",
 )
-LINEAR_MOTOR: Final = Kind(
+LINEAR_MOTOR: Final = DeviceType(
     node="LinearMotor",
     name="linear motor",
     without_effect="consumptionFactor sound muscles",

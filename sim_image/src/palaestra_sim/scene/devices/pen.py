@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -19,7 +19,7 @@ class Pen:
     ink: tuple[int, float] = (0, 0.5)
 
 
-def _read(part: Part) -> Pen:
+def _read(part: DevicePart) -> Pen:
     return Pen(name=part.name, model=part.text("model"), writes=part.node.flag("write", True))
 
 
@@ -35,7 +35,7 @@ def _services(pen: Pen) -> tuple[Row, ...]:
     return (("write", "set_bool", write), ("set_ink_color", "pen_set_ink_color", set_ink_color))
 
 
-PEN: Final = Kind(
+PEN: Final = DeviceType(
     node="Pen",
     name="pen",
     without_effect="inkColor inkDensity leadSize maxDistance",

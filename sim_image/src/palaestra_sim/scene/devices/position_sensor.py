@@ -7,9 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Shaft, Topic
-from palaestra_sim.scene.devices.response import discrete
-from palaestra_sim.seam import Row
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import (
+    Carrier,
+    DevicePart,
+    DeviceTopic,
+    DeviceType,
+    Sample,
+    Shaft,
+)
+from palaestra_sim.scene.devices.sensor_response import discrete
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -24,7 +31,7 @@ class PositionSensor:
     value: float = math.nan
 
 
-def _read(part: Part) -> PositionSensor:
+def _read(part: DevicePart) -> PositionSensor:
     return PositionSensor(
         name=part.name,
         shaft=part.shaft or Shaft(),
@@ -50,11 +57,11 @@ def _services(sensor: PositionSensor) -> tuple[Row, ...]:
     return (("get_type", "get_int", lambda _: {"value": sensor.shaft.type_number}),)
 
 
-def _topics(sensor: PositionSensor) -> tuple[Topic, ...]:
-    return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
+def _topics(sensor: PositionSensor) -> tuple[DeviceTopic, ...]:
+    return (DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
 
 
-POSITION_SENSOR: Final = Kind(
+POSITION_SENSOR: Final = DeviceType(
     node="PositionSensor",
     name="position sensor",
     fields="noise SFFloat 0; resolution SFFloat -1",

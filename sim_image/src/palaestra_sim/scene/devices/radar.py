@@ -12,13 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.echoes import Bounds, Echoes, Target
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import looking
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.scene.radar_targets import Bounds, RadarTarget, RadarTargets
 
 _LIGHT_M_S: Final = 299_792_458.0
 _MILLIWATT: Final = 0.001
@@ -27,7 +27,7 @@ _Gauss = Callable[[float, float], float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class RadarLimits:
     """What a radar detects.
 
     Attributes:
@@ -91,24 +91,24 @@ class Radar:
     name: str
     model: str
     node: SceneNode
-    place: Place
-    limits: Limits
+    place: Frame
+    limits: RadarLimits
     gain_w_m2: float
     occlusion: bool
     seen: list[Echo] = field(default_factory=list)
-    _echoes: Echoes = field(default_factory=Echoes)
+    _echoes: RadarTargets = field(default_factory=RadarTargets)
     _robot: frozenset[SceneNode] = frozenset()
     _now_ms: Callable[[], int] = field(default=lambda: 0)
     _enabled: bool = False
     _before_ms: int = 0
-    _before: dict[Place, Vector] = field(default_factory=dict)
+    _before: dict[Frame, Vector] = field(default_factory=dict)
 
     @property
     def value(self) -> list[Fields]:
         """The targets of the last sample, as messages."""
         return [echo.message() for echo in self.seen]
 
-    def show(self, echoes: Echoes, now_ms: Callable[[], int]) -> None:
+    def show(self, echoes: RadarTargets, now_ms: Callable[[], int]) -> None:
         """Take what is there to see; `now_ms` returns the time of the simulation."""
         self._echoes, self._now_ms = echoes, now_ms
         robot = next((it for it in self.node.ancestors() if it.type_name == "Robot"), self.node)
@@ -132,7 +132,7 @@ class Radar:
         self._before = {place: place.ground_pose.position for place in places}
         self._before_ms = self._now_ms()
 
-    def _echo(self, target: Target, passed_s: float, gauss: _Gauss) -> Echo | None:
+    def _echo(self, target: RadarTarget, passed_s: float, gauss: _Gauss) -> Echo | None:
         """Return a target as it is now; None if it is not detected."""
         limits = self.limits
         radar = self.place.ground_pose
@@ -151,7 +151,7 @@ class Radar:
         azimuth = max(-edge, min(edge, -math.atan2(y, x))) + _noise(limits.noise[2], gauss)
         return Echo(distance, power_w, speed, azimuth)
 
-    def _hidden(self, target: Target, eye: Vector, bounds: Bounds) -> bool:
+    def _hidden(self, target: RadarTarget, eye: Vector, bounds: Bounds) -> bool:
         """Return whether something is in the way, more than half the depth of the target before it."""
         if not self.occlusion:
             return False
@@ -167,7 +167,7 @@ class Radar:
         distance += _noise(self.limits.noise[0], gauss)
         return None if distance < low - slack else max(low, min(high, distance))
 
-    def _speed(self, place: Place, passed_s: float) -> float:
+    def _speed(self, place: Frame, passed_s: float) -> float:
         """Return how fast a target moves away; 0 if it, or the time, was not seen before."""
         if passed_s <= 0.0 or place not in self._before or self.place not in self._before:
             return 0.0
@@ -221,7 +221,7 @@ class _Count:
         return len(self.radar.seen)
 
 
-def _read(part: Part) -> Radar:
+def _read(part: DevicePart) -> Radar:
     number = part.number
     wavelength_m = _LIGHT_M_S / (number("frequency", 24.0) or 24.0) / 1e9
     gain = 10.0 ** (number("antennaGain", 20.0) / 10.0)
@@ -236,7 +236,7 @@ def _read(part: Part) -> Radar:
     )
 
 
-def _limits(part: Part) -> Limits:
+def _limits(part: DevicePart) -> RadarLimits:
     """Return what a radar detects; ranges that are empty are those that Webots then takes."""
     number = part.number
     low, high = number("minRange", 1.0), number("maxRange", 50.0)
@@ -244,7 +244,7 @@ def _limits(part: Part) -> Limits:
         low, high = (low, low + 1.0) if high <= 0.0 else (max(0.0, high - 1.0), high)
     slowest, fastest = number("minRadialSpeed", 1.0), number("maxRadialSpeed", -1.0)
     limited = bool(slowest or fastest)
-    return Limits(
+    return RadarLimits(
         range_m=(low, high),
         field_of_view_rad=(number("horizontalFieldOfView", 0.78), number("verticalFieldOfView", 0.1)),
         radial_m_s=(slowest, fastest if fastest > slowest else slowest + 1.0) if limited else None,
@@ -282,14 +282,14 @@ def _services(radar: Radar) -> tuple[Row, ...]:
     )
 
 
-def _topics(radar: Radar) -> tuple[Topic, ...]:
+def _topics(radar: Radar) -> tuple[DeviceTopic, ...]:
     return (
-        Topic(name="targets", type_name="webots_ros/RadarTarget", source=radar, many=True, whole=True),
-        Topic(name="number_of_targets", type_name="webots_ros/Int8Stamped", source=_Count(radar)),
+        DeviceTopic(name="targets", type_name="webots_ros/RadarTarget", source=radar, many=True, whole=True),
+        DeviceTopic(name="number_of_targets", type_name="webots_ros/Int8Stamped", source=_Count(radar)),
     )
 
 
-RADAR: Final = Kind(
+RADAR: Final = DeviceType(
     node="Radar",
     name="radar",
     fields="""minRange SFFloat 1; maxRange SFFloat 50; horizontalFieldOfView SFFloat 0.78;

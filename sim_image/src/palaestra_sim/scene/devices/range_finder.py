@@ -9,12 +9,12 @@ from array import array
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
-from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
-from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
+from palaestra_sim.scene.devices.camera_common import picture_topic, read_lens, saver
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.old_axes import looking
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
 
 _WHITE: Final = 255
 
@@ -34,12 +34,12 @@ class RangeFinder:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     lens: Lens
     least_m: float
     resolution_m: float
     spherical: bool
-    eye: Eye | None = None
+    eye: CameraInterface | None = None
 
     @property
     def value(self) -> bytes | memoryview:
@@ -85,7 +85,7 @@ class RangeFinder:
         return bytes(pixels)
 
 
-def _read(part: Part) -> RangeFinder:
+def _read(part: DevicePart) -> RangeFinder:
     least_m = part.number("minRange", 0.01)
     return RangeFinder(
         name=part.name,
@@ -105,11 +105,11 @@ def _services(finder: RangeFinder) -> tuple[Row, ...]:
     )
 
 
-def _topics(finder: RangeFinder) -> tuple[Topic, ...]:
+def _topics(finder: RangeFinder) -> tuple[DeviceTopic, ...]:
     return (picture_topic("range_image", finder, finder.lens, "32FC1"),)
 
 
-RANGE_FINDER: Final = Kind(
+RANGE_FINDER: Final = DeviceType(
     node="RangeFinder",
     name="range-finder",
     without_effect="motionBlur noise lens",

@@ -6,12 +6,12 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 from palaestra_sim.scene.devices.emitter import EVERYWHERE, require_radio
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.old_axes import pointing
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
 
 
 class Packet(NamedTuple):
@@ -34,7 +34,7 @@ class Receiver:
 
     name: str
     model: str
-    place: Place
+    place: Frame
     buffer_size: int
     channel: int
     listening: bool = False
@@ -58,7 +58,7 @@ class Receiver:
             self.queue.clear()
 
 
-def _read(part: Part) -> Receiver:
+def _read(part: DevicePart) -> Receiver:
     require_radio(part)
     return Receiver(
         name=part.name,
@@ -98,11 +98,11 @@ def _direction(receiver: Receiver) -> Fields:
     return {"direction": list(queue[0].direction) if queue else [0.0, 0.0, 0.0]}
 
 
-def _topics(receiver: Receiver) -> tuple[Topic, ...]:
-    return (Topic(name="data", type_name="webots_ros/StringStamped", source=receiver, reading="data"),)
+def _topics(receiver: Receiver) -> tuple[DeviceTopic, ...]:
+    return (DeviceTopic(name="data", type_name="webots_ros/StringStamped", source=receiver, reading="data"),)
 
 
-RECEIVER: Final = Kind(
+RECEIVER: Final = DeviceType(
     node="Receiver",
     name="receiver",
     without_effect="aperture baudRate byteSize signalStrengthNoise directionNoise allowedChannels",

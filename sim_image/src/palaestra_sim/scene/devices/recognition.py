@@ -11,13 +11,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from palaestra_sim.scene.devices.kind import Part, Stream, Topic
-from palaestra_sim.scene.devices.pictures import picture_topic, saver
-from palaestra_sim.scene.eyes import Corners, Eye, Lens
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.camera_interface import CameraInterface, Corners, Lens
+from palaestra_sim.scene.devices.camera_common import picture_topic, saver
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, Stream
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, to_quaternion
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
 
 _BYTE = 255
 _CHANNELS = 3
@@ -36,13 +36,13 @@ class Recognition:
         eye: None if the camera sees nothing.
     """
 
-    place: Place
+    place: Frame
     lens: Lens
     reach_m: float
     most: int
     segments: bool
     segmenting: bool = False
-    eye: Eye | None = None
+    eye: CameraInterface | None = None
 
     @property
     def value(self) -> list[Fields]:
@@ -83,7 +83,7 @@ class _Segments:
         return [self.recognition.picture] if self.recognition.segmenting else []
 
 
-def read_recognition(part: Part, place: Place, lens: Lens) -> Recognition | None:
+def read_recognition(part: DevicePart, place: Frame, lens: Lens) -> Recognition | None:
     """Return the Recognition node of a camera; None if it has none."""
     node = part.inner("recognition")
     if node is None:
@@ -110,7 +110,7 @@ def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
 
 def recognition_stream(recognition: Recognition) -> Stream:
     """Return the topics that `recognition_enable` begins."""
-    objects = Topic(
+    objects = DeviceTopic(
         name="recognition_objects",
         type_name="webots_ros/RecognitionObjects",
         source=recognition,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
-from palaestra_sim.seam import Handler, Row, UnsimulatedError
+from palaestra_sim.ros_interfaces import Handler, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -17,7 +17,7 @@ class Skin:
     model: str
 
 
-def _read(part: Part) -> Skin:
+def _read(part: DevicePart) -> Skin:
     return Skin(name=part.name, model=part.text("model"))
 
 
@@ -41,7 +41,7 @@ def _services(skin: Skin) -> tuple[Row, ...]:
     )
 
 
-SKIN: Final = Kind(
+SKIN: Final = DeviceType(
     node="Skin",
     name="skin",
     without_effect="modelUrl appearance bones castShadows",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 
 # Source: Webots reference, Speaker.
 _LANGUAGES: Final = {
@@ -33,7 +33,7 @@ class Speaker:
             self.looping.clear()
 
 
-def _read(part: Part) -> Speaker:
+def _read(part: DevicePart) -> Speaker:
     return Speaker(name=part.name, model=part.text("model"))
 
 
@@ -85,4 +85,4 @@ def _speech(speaker: Speaker) -> tuple[Row, ...]:
     )
 
 
-SPEAKER: Final = Kind(node="Speaker", name="speaker", fields="", read=_read, services=_services)
+SPEAKER: Final = DeviceType(node="Speaker", name="speaker", fields="", read=_read, services=_services)

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
-from palaestra_sim.scene.devices.response import Gauss, discrete, table_rows, table_service
+from palaestra_sim.ros_interfaces import Row
+from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.sensor_response import Gauss, discrete, table_rows, table_service
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.seam import Row
 
 _TYPES: Final = ("bumper", "force", "force-3d")  # by what `get_type` answers
 _BUMPER, _FORCE, _FORCE_3D = range(3)
@@ -76,7 +76,7 @@ class Wrench:
         return {"force": self.sensor.value, "torque": _NOTHING}
 
 
-def _read(part: Part) -> TouchSensor:
+def _read(part: DevicePart) -> TouchSensor:
     type_name = part.text("type", "bumper")
     kind = _TYPES.index(type_name) if type_name in _TYPES else _BUMPER
     if type_name != "bumper" and not part.forces:
@@ -129,19 +129,19 @@ def _services(sensor: TouchSensor) -> tuple[Row, ...]:
     )
 
 
-def _topics(sensor: TouchSensor) -> tuple[Topic, ...]:
+def _topics(sensor: TouchSensor) -> tuple[DeviceTopic, ...]:
     if sensor.type == _BUMPER:
-        return (Topic(name="value", type_name="webots_ros/BoolStamped", source=sensor),)
+        return (DeviceTopic(name="value", type_name="webots_ros/BoolStamped", source=sensor),)
     if sensor.type == _FORCE:
-        return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
+        return (DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
     return (
-        Topic(
+        DeviceTopic(
             name="values", type_name="geometry_msgs/WrenchStamped", source=Wrench(sensor), reading="wrench"
         ),
     )
 
 
-TOUCH_SENSOR: Final = Kind(
+TOUCH_SENSOR: Final = DeviceType(
     node="TouchSensor",
     name="touch sensor",
     fields="type SFString bumper; lookupTable MFVec3f 0 0 0 5000 50000 0; resolution SFFloat -1",

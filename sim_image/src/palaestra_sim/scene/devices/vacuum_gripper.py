@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic
-from palaestra_sim.seam import Fields, Row, UnsimulatedError
+from palaestra_sim.ros_interfaces import Fields, Row, UnsimulatedError
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class VacuumGripper:
         self.on = on
 
 
-def _read(part: Part) -> VacuumGripper:
+def _read(part: DevicePart) -> VacuumGripper:
     on, touches = part.node.flag("isOn", False), bool(part.node.nodes("boundingObject"))
     if on and touches:
         part.lack("a VacuumGripper that holds what touches it")
@@ -60,11 +60,11 @@ def _services(gripper: VacuumGripper) -> tuple[Row, ...]:
     )
 
 
-def _topics(gripper: VacuumGripper) -> tuple[Topic, ...]:
-    return (Topic(name="presence", type_name="webots_ros/BoolStamped", source=gripper),)
+def _topics(gripper: VacuumGripper) -> tuple[DeviceTopic, ...]:
+    return (DeviceTopic(name="presence", type_name="webots_ros/BoolStamped", source=gripper),)
 
 
-VACUUM_GRIPPER: Final = Kind(
+VACUUM_GRIPPER: Final = DeviceType(
     node="VacuumGripper",
     name="vacuum gripper",
     without_effect="tensileStrength shearStrength",

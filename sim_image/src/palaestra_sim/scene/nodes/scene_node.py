@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.world import Node
 from palaestra_sim.world.source import Source
 
@@ -72,7 +72,7 @@ class SceneNode:
         self.def_name = ""
         self.fields: dict[str, FieldContent] = {}
         self.twins: list[SceneNode] = [self]
-        self.place: Place | None = None
+        self.place: Frame | None = None
         self.outline = False
         self.shipped = False
         self.stand_in = False

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 from palaestra_sim.errors import SimError
 from palaestra_sim.scene.geometry import AxisAngle
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
-from palaestra_sim.scene.tree.catalogue import WIDTH, FieldKind, FieldType
-from palaestra_sim.scene.tree.effects import require_effect
+from palaestra_sim.scene.tree.field_types import WIDTH, FieldKind, FieldType
+from palaestra_sim.scene.tree.write_rules import require_effect
 
 
 class NoValueError(SimError, LookupError):
@@ -36,7 +36,7 @@ class Changes(Protocol):
         ...
 
 
-class Field:
+class NodeField:
     """One field of one node.
 
     Attributes:

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from palaestra_sim.errors import WorldError, refusal
-from palaestra_sim.scene.nodes.growing import Descriptions, Grower
+from palaestra_sim.scene.nodes.instantiate import Descriptions, Instantiator
 from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.nodes.scope import Scope
-from palaestra_sim.scene.tree.catalogue import kinds_of
-from palaestra_sim.scene.tree.fields import Changes, Field
+from palaestra_sim.scene.tree.field_types import kinds_of
+from palaestra_sim.scene.tree.fields import Changes, NodeField
 from palaestra_sim.world import World, parse_nodes
 from palaestra_sim.world.source import Source
 
@@ -35,12 +35,12 @@ class SceneTree:
 
     def __init__(self, world: World, name: str = "world", descriptions: Descriptions | None = None) -> None:
         self.source = world.source
-        self._grower = Grower(descriptions or Descriptions())
+        self._grower = Instantiator(descriptions or Descriptions())
         self.root = self._grower.root(world, name)
         self.nodes: dict[int, SceneNode] = self._grower.nodes
         self.refused: list[WorldError] = self._grower.refused
         self.ignored: list[WorldError] = self._grower.ignored
-        self._fields: dict[tuple[int, str], Field] = {}
+        self._fields: dict[tuple[int, str], NodeField] = {}
         _mark_outlines(self.nodes.values())
 
     def grow(self, text: str, parent: SceneNode) -> list[SceneNode]:
@@ -80,12 +80,12 @@ class SceneTree:
                 gone.twins.remove(gone)
                 self.nodes.pop(gone.number, None)
 
-    def field_of(self, node: SceneNode, name: str, changes: Changes) -> Field | None:
+    def field_of(self, node: SceneNode, name: str, changes: Changes) -> NodeField | None:
         """Return a node's field; None if a node of this type has none of that name."""
         found = self._fields.get((node.number, name))
         kind = kinds_of(node).get(name) if found is None else None
         if kind is not None:
-            found = self._fields[node.number, name] = Field(node, name, kind, changes)
+            found = self._fields[node.number, name] = NodeField(node, name, kind, changes)
         return found
 
     def of_def(self, path: str, within: SceneNode | None = None) -> SceneNode | None:

@@ -23,7 +23,7 @@ from palaestra_sim.world.mjcf.description import (
     whole_step_ms,
 )
 from palaestra_sim.world.mjcf.files import absolutes, named_files, parts
-from palaestra_sim.world.mjcf.growing import growing
+from palaestra_sim.world.mjcf.size_checks import growing
 from palaestra_sim.world.paths import is_relative
 
 _ROS_REMAPPING: Final = re.compile(r"__\w+:=")

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from palaestra_sim.errors import WorldError, refusal
-from palaestra_sim.world.bounded import read_bounded
+from palaestra_sim.world.bounded_read import read_bounded
 from palaestra_sim.world.mjcf.description import Description
 from palaestra_sim.world.mjcf.elements import Element, read
 from palaestra_sim.world.mjcf.files import absolutes, assets, named_folders, parts
-from palaestra_sim.world.mjcf.growing import growing
+from palaestra_sim.world.mjcf.size_checks import growing
 from palaestra_sim.world.paths import climb, is_relative
 from palaestra_sim.world.source import Source
 

@@ -1,0 +1,129 @@
+"""The history of a replica in the status: end of the last attempt, faults, and time by activity.
+
+Kubernetes deletes logs with their pod, so the status keeps the last lines. Every part is bounded, because a
+status is one object of the API server and people read it.
+"""
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import Field
+
+from palaestra.api.fields import Count, Listed, Sentence, Word
+from palaestra.api.model import StatusModel
+from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES
+
+Line = Annotated[str, Field(max_length=MOST_LINE)]
+Seconds = Annotated[int, Field(ge=0, le=2_000_000_000)]
+
+
+class Fault(StatusModel):
+    """One fault of one simulator."""
+
+    time: datetime = Field(strict=False)
+    """Time at which the trainer detected it."""
+
+    simulator: Word
+    """Group and number: `collect-0`."""
+
+    kind: Word
+    """`dead`, `hung` or `wrong_data`."""
+
+    fact: Line = ""
+    """Description of the fault, in a sentence."""
+
+    step: Count
+    """Environment steps trained at that time."""
+
+
+class LastAttempt(StatusModel):
+    """End of the newest attempt that has ended; kept after its pod is deleted."""
+
+    attempt: Count
+    """Number of the attempt, from 1."""
+
+    exit_code: Count | None = None
+    """Exit code of the trainer; absent: unknown, for example because its node was lost."""
+
+    reason: Word
+    """Reason for its end, in one word: `Disrupted`, `SimulatorBudgetSpent`, `Succeeded`, ..."""
+
+    message: Sentence
+    """Reason for its end, in a sentence for people."""
+
+    log: Annotated[Listed[Line], Field(max_length=MOST_LINES)] = ()
+    """Last lines of the trainer's log, the newest last, each truncated to 200 characters."""
+
+    faults: Annotated[Listed[Fault], Field(max_length=MOST_FAULTS)] = ()
+    """Last faults of its simulators, the newest last."""
+
+    restarts: Count = 0
+    """Restarts of simulators after a fault."""
+
+
+class Faults(StatusModel):
+    """Number of simulator faults by kind, and of slow steps, over all attempts."""
+
+    dead: Count = 0
+    """Refused or closed connections."""
+
+    hung: Count = 0
+    """Timeouts."""
+
+    slow: Count = 0
+    """Steps that took more than ten times as long as usual; they are not faults and cause no restart."""
+
+    wrong_data: Count = 0
+    """Invalid answers."""
+
+
+class Goodput(StatusModel):
+    """Time of the trainer by activity, over all attempts, in whole seconds."""
+
+    stepping: Seconds = 0
+    """Seconds in which training waited for simulators to compute a step."""
+
+    transport: Seconds = 0
+    """Seconds of steps spent on requests, responses and the environment's code."""
+
+    learning: Seconds = 0
+    """Seconds spent in the algorithm."""
+
+    evaluating: Seconds = 0
+    """Seconds spent on evaluations."""
+
+    checkpointing: Seconds = 0
+    """Seconds spent on saving checkpoints."""
+
+    starting: Seconds = 0
+    """Seconds before the first step of each attempt."""
+
+    recovering: Seconds = 0
+    """Seconds in which every simulator was broken, or a resumed run restored its simulators to the state at
+    the checkpoint. In releases that do not report `recycling`, this includes recycling."""
+
+    recycling: Seconds | None = None
+    """Seconds in which training waited for a healthy simulator to restart, as `recycle` schedules it; absent:
+    none, or not reported."""
+
+
+class MemoryKills(StatusModel):
+    """How many times one container was killed because it ran out of memory."""
+
+    container: Word
+    """Name of the container: `sim-collect-0` or `trainer`."""
+
+    times: Count
+    """Number of kills that the operator observed, over all attempts."""
+
+    limit: Word | None = None
+    """Memory limit of the container, as `512Mi`; absent: it has no limit, so its node ran out of memory."""
+
+    last: datetime = Field(strict=False)
+    """Time of the last kill, by the node's clock."""
+
+    pod: Word | None = None
+    """UID of the pod of the last kill; absent: an older release counted it."""
+
+    run: Count | None = None
+    """Number of the container's run that was killed last in that pod, from 0; absent if `pod` is absent."""

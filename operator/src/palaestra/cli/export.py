@@ -1,0 +1,38 @@
+"""`palaestra export`: a policy as one file for other programs."""
+
+import argparse
+from pathlib import Path
+
+from palaestra.cli.subcommands import Commands, command
+from palaestra.local.export import export
+
+EXPORT = """\
+Writes the best policy of the run directory RUN as one file, for programs without Palaestra or PyTorch. With
+the observation as the environment returned it, the file returns the action that the environment takes. It is
+written once it has acted as the policy on 1,000 observations, or not at all. It holds a data sheet of
+observations and actions, and the environment, steps and success of the run. Export only runs that you trust.
+"""
+EXIT_CODES = """\
+exit codes:
+  0    done
+  1    any other error, such as a file that would act differently; nothing was written
+  2    RUN or the file name is wrong, or palaestra-trainer[export] is not installed
+  130  ended by Ctrl-C
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = command(commands, "export", _export, EXPORT, EXIT_CODES)
+    parser.add_argument("run", metavar="RUN", type=Path, help="run directory, such as runs/<job>/<replica>")
+    parser.add_argument(
+        "--to",
+        choices=("onnx", "safetensors"),
+        required=True,
+        help="onnx runs by itself; safetensors has the tensors for a network that you build",
+    )
+    parser.add_argument("--output", metavar="FILE", type=Path, help="default: RUN/policy.<format>")
+
+
+def _export(options: argparse.Namespace) -> int:
+    return export(options.run, options.to, options.output)

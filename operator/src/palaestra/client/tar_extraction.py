@@ -1,0 +1,141 @@
+"""Unpack the tar that a container sends, which may send anything.
+
+Only regular files that were asked for are written, below one folder. Their number, their bytes, the length of
+their names and what is kept in memory are bounded.
+"""
+
+import io
+import shutil
+import tarfile
+from collections.abc import Collection, Iterator
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from palaestra.api.text import one_line
+
+MOST_FILES = 10_000
+MOST_PARTS = 16
+MOST_NAME_BYTES = 255
+# What may come between two files: their headers, and the blocks that are read ahead.
+MOST_HEAD_BYTES = 2**16
+
+
+class WrongArchive(tarfile.TarError):
+    """A tar is damaged, or has what was not asked for; text for people."""
+
+
+def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_bytes: int) -> None:
+    """Write the files of a tar stream into a new folder, and read the stream to its end.
+
+    Args:
+        chunks: of the stream.
+        into: the folder.
+        wanted: names of files, and of folders whose files are wanted.
+        most_bytes: of all files together.
+
+    Raises:
+        WrongArchive: it is not a tar, has other members, or is too large.
+        OSError: a file cannot be written.
+    """
+    stream = _Stream(chunks)
+    seen = _Seen()
+    left = most_bytes
+    try:
+        with tarfile.open(fileobj=stream, mode="r|") as tar:
+            for member in tar:
+                path = _path(member, wanted, seen)
+                seen.add(path)
+                left -= member.size
+                _refuse(f"its files have more than {most_bytes} bytes", when=left < 0)
+                stream.left = member.size + MOST_HEAD_BYTES
+                _write(tar, member, into / path)
+    except WrongArchive:
+        raise
+    except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile's reader raises all three
+        raise WrongArchive(f"it is damaged ({one_line(str(error), 200)})") from error
+    for _ in chunks:  # The exit code of the command comes last.
+        pass
+
+
+class _Seen:
+    """The files of an archive so far, and the folders that they are in."""
+
+    def __init__(self) -> None:
+        self.files: set[PurePosixPath] = set()
+        self._folders: set[PurePosixPath] = set()
+
+    def add(self, path: PurePosixPath) -> None:
+        self.files.add(path)
+        self._folders.update(path.parents)
+
+    def clashes_with(self, path: PurePosixPath) -> bool:
+        """Return whether a file cannot be beside those that were seen."""
+        return path in self.files or path in self._folders or not self.files.isdisjoint(path.parents)
+
+
+def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> PurePosixPath:
+    """Return the path of a member that may be written.
+
+    Raises:
+        WrongArchive: it may not.
+    """
+    name, path = member.name, PurePosixPath(member.name)
+    shown = one_line(name, 100) or "a member without a name"
+    asked_for = bool(path.parts) and (name in wanted or path.parts[0] in wanted) and ".." not in path.parts
+    _refuse(f"{shown} is not a file of the run", when=not (asked_for and name.isprintable()))
+    _refuse(f"{shown} is not a plain file", when=not member.isreg() or member.issparse())
+    long = len(path.parts) > MOST_PARTS or any(len(part.encode()) > MOST_NAME_BYTES for part in path.parts)
+    _refuse(f"{shown} has too long a name", when=long)
+    _refuse(f"{shown} is there twice, or is a file and a folder", when=seen.clashes_with(path))
+    _refuse(f"it has more than {MOST_FILES} files", when=len(seen.files) >= MOST_FILES)
+    return path
+
+
+def _refuse(fact: str, *, when: bool) -> None:
+    if when:
+        raise WrongArchive(fact)
+
+
+def _write(tar: tarfile.TarFile, member: tarfile.TarInfo, path: Path) -> None:
+    content = tar.extractfile(member)
+    if content is None:
+        raise AssertionError("unreachable: a plain file has content")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with content, path.open("xb") as target:
+        shutil.copyfileobj(content, target)
+
+
+class _Stream(io.RawIOBase):
+    """An iterator of chunks as a readable file.
+
+    Attributes:
+        left: bytes that may be read before the next member is known; a header that is larger would be kept
+            in memory as a whole.
+    """
+
+    def __init__(self, chunks: Iterator[bytes]) -> None:
+        self._chunks = chunks
+        self._rest = b""
+        self.left = MOST_HEAD_BYTES
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Copy received bytes into the buffer and return their number; 0 at the end.
+
+        Raises:
+            WrongArchive: too many come between two files.
+        """
+        while not self._rest:
+            try:
+                self._rest = next(self._chunks)
+            except StopIteration:
+                return 0
+        size = min(len(buffer), len(self._rest))
+        self.left -= size
+        if self.left < 0:
+            raise WrongArchive(f"a header has more than {MOST_HEAD_BYTES} bytes")
+        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
+        return size

@@ -1,0 +1,82 @@
+"""A pod's service account: two files, which the kubelet keeps up to date, and two environment variables.
+
+They are read here, because the official client needs 10 MiB of memory to read them.
+"""
+
+import os
+import ssl
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from palaestra.cluster.client_config import Access
+from palaestra.cluster.connection_pool import connections
+from palaestra.cluster.errors import NotConfigured
+from palaestra.cluster.proxies import proxy_of_environment
+from palaestra.cluster.tls import verification
+from palaestra.cluster.tokens import FRESH_S, FileToken, text_of
+
+FILES = Path("/var/run/secrets/kubernetes.io/serviceaccount")
+HOST, PORT = "KUBERNETES_SERVICE_HOST", "KUBERNETES_SERVICE_PORT"
+
+
+def account(files: Path | None = None, clock: Callable[[], float] = time.monotonic) -> Access:
+    """Return the access of the pod in which this process runs; `files` is the folder of its account.
+
+    Raises:
+        NotConfigured: this process does not run in a pod, or the pod has no usable account.
+    """
+    folder = files or FILES
+    host, port = os.environ.get(HOST), os.environ.get(PORT)
+    if not host or not port:
+        raise NotConfigured(f"{HOST} and {PORT} are not set, as they are in a pod")
+    authority = folder / "ca.crt"
+    if not text_of(authority):
+        raise NotConfigured(f"{authority} is missing or empty")
+    if not text_of(folder / "token"):
+        raise NotConfigured(f"{folder / 'token'} is missing or empty")
+    server = f"https://[{host}]:{port}" if ":" in host else f"https://{host}:{port}"
+    proxy = proxy_of_environment(server, os.environ)
+    try:
+        tls = verification(authority)
+    except (OSError, ValueError) as error:
+        raise NotConfigured(f"{authority} is no certificate in PEM ({error})") from error
+    return Access(
+        host=server,
+        pool=connections(tls, proxy),
+        authorization=_Kept(FileToken(folder / "token", clock), authority, tls, clock),
+        proxy=proxy,
+    )
+
+
+class _Kept:
+    """The header of an account, and its authority: a kubelet replaces both files.
+
+    A new authority is trusted in addition; the old one until the end of the process, as client-go does it.
+    """
+
+    def __init__(
+        self, token: FileToken, authority: Path, tls: ssl.SSLContext, clock: Callable[[], float]
+    ) -> None:
+        self._token = token
+        self._authority = authority
+        self._known = text_of(authority)
+        self._tls = tls
+        self._clock = clock
+        self._looked_at = clock()
+
+    def __call__(self) -> str:
+        """Return the header `Authorization`.
+
+        Raises:
+            Unreachable: the token cannot be read.
+        """
+        if self._clock() - self._looked_at >= FRESH_S:
+            self._looked_at = self._clock()
+            text = text_of(self._authority)
+            if text and text != self._known:
+                with suppress(OSError, ValueError):  # half written: the next look is in a minute
+                    self._tls.load_verify_locations(cadata=text)
+                    self._known = text
+        return self._token()

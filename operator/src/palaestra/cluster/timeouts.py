@@ -1,0 +1,53 @@
+"""Deadlines for all requests to the API server, and the waits between attempts."""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+JITTER = 0.5  # a wait is cut by up to this share, so that many clients do not come back at once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Backoff:
+    """Waits that double from `first_s` to `cap_s`, each shortened at random.
+
+    Attributes:
+        first_s: longest first wait in seconds, above 0.
+        cap_s: longest wait in seconds.
+        chance: returns numbers in [0, 1).
+    """
+
+    first_s: float
+    cap_s: float
+    chance: Callable[[], float] = random.random
+
+    def wait_s(self, failures: int) -> float:
+        """Return the seconds to wait after so many failures in a row.
+
+        At least half of `first_s` and at most `cap_s`; after n failures at most `first_s * 2**(n-1)`.
+        """
+        doublings = min(max(failures, 1) - 1, 64)
+        longest_s = min(self.first_s * 2.0**doublings, self.cap_s)
+        return longest_s * (1 - JITTER * self.chance())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeouts:
+    """Deadlines, in seconds; one place for all of them.
+
+    Attributes:
+        connect_s: until a connection stands.
+        call_s: for one request and its whole answer, waiting on a busy server included.
+        watch_s: shortest and longest life of one watch; between them by chance, so that not all end at once.
+        silence_s: longest silence on a watch. An API server sends a bookmark about every 60 s, so more than
+            that means a connection that only looks alive.
+        again: waits between attempts to list and watch.
+        turned_away: waits after an answer 429, added to those that the server asks for, which may be none.
+    """
+
+    connect_s: float = 5.0
+    call_s: float = 10.0
+    watch_s: tuple[float, float] = (300.0, 600.0)
+    silence_s: float = 90.0
+    again: Backoff = field(default_factory=lambda: Backoff(first_s=0.5, cap_s=30.0))
+    turned_away: Backoff = field(default_factory=lambda: Backoff(first_s=0.2, cap_s=2.0))

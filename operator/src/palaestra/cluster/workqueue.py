@@ -1,0 +1,164 @@
+"""Work for the controller: names of objects, each once, each with one worker at a time.
+
+A name that is added while a worker has it is handed out again after that worker is done. So no change is
+missed, and two workers never work on one object. The queue holds names, not events: a worker reads the
+current state of the object.
+
+Names are in lanes, which take turns. So a thousand names of one lane delay a name of another lane only by the
+work that has begun.
+"""
+
+import heapq
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+from palaestra.cluster.timeouts import Backoff
+
+Item = TypeVar("Item", bound=Hashable)
+RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with its jitter: 0.05 s to 60 s
+
+
+def _nobody(seconds: float) -> None:
+    del seconds
+
+
+def _one_lane(key: Hashable) -> Hashable:
+    del key
+    return None
+
+
+class WorkQueue(Generic[Item]):
+    """A deduplicating queue with delays; safe to use from several threads.
+
+    Args:
+        again: the wait of a name whose work failed.
+        waited: called with the seconds for which a name was ready before a worker took it.
+        lane: returns the lane of a name.
+        clock: a monotonic clock, in seconds.
+    """
+
+    def __init__(
+        self,
+        *,
+        again: Backoff = RETRY,
+        waited: Callable[[float], None] = _nobody,
+        lane: Callable[[Item], Hashable] = _one_lane,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._again = again
+        self._waited = waited
+        self._lane = lane
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._ready: dict[Hashable, deque[Item]] = {}  # by lane, that of the next turn first
+        self._since: dict[Item, float] = {}  # names that wait for a worker, also if one has them now
+        self._working: set[Item] = set()
+        self._later: list[tuple[float, int, Item]] = []
+        self._due: dict[Item, float] = {}
+        self._failures: dict[Item, int] = {}
+        self._order = itertools.count()  # orders entries of the same moment
+        self._closed = False
+
+    @property
+    def depth(self) -> int:
+        """Return how many names are ready for a worker."""
+        with self._changed:
+            self._promote(self._clock())
+            return sum(map(len, self._ready.values()))
+
+    @property
+    def closed(self) -> bool:
+        """Return whether `close` was called; then no name is handed out."""
+        return self._closed
+
+    def add(self, key: Item) -> None:
+        """Ask for work on a name as soon as a worker is free."""
+        with self._changed:
+            self._add(key, self._clock())
+            self._changed.notify_all()
+
+    def add_after(self, key: Item, seconds: float) -> None:
+        """Ask for work on a name after `seconds`; of several such requests the earliest counts."""
+        with self._changed:
+            due = self._clock() + seconds
+            if due < self._due.get(key, float("inf")):
+                self._due[key] = due
+                heapq.heappush(self._later, (due, next(self._order), key))
+                self._changed.notify_all()
+
+    def retry(self, key: Item) -> float:
+        """Ask for work on a name that failed, later after each failure; return the seconds until then."""
+        with self._changed:
+            self._failures[key] = self._failures.get(key, 0) + 1
+            wait_s = self._again.wait_s(self._failures[key])
+        self.add_after(key, wait_s)
+        return wait_s
+
+    def failures(self, key: Item) -> int:
+        """Return how often in a row work on a name has failed."""
+        with self._changed:
+            return self._failures.get(key, 0)
+
+    def forget(self, key: Item) -> None:
+        """Reset the failures of a name whose work succeeded."""
+        with self._changed:
+            self._failures.pop(key, None)
+
+    def get(self, deadline_s: float) -> Item | None:
+        """Return a name to work on, then call `done`; None after `deadline_s`, or if the queue is closed."""
+        with self._changed:
+            ends = self._clock() + deadline_s
+            while not self._closed:
+                now = self._clock()
+                self._promote(now)
+                if self._ready:
+                    return self._take(now)
+                if now >= ends:
+                    return None
+                self._changed.wait(min([ends, *(due for due, _, _ in self._later[:1])]) - now)
+            return None
+
+    def done(self, key: Item) -> None:
+        """End a worker's work on a name; it is handed out again if it was added meanwhile."""
+        with self._changed:
+            self._working.discard(key)
+            if key in self._since:
+                self._line_up(key)
+                self._changed.notify_all()
+
+    def close(self) -> None:
+        """Hand out nothing more; workers that wait return at once."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _add(self, key: Item, now: float) -> None:
+        if key in self._since:
+            return
+        self._since[key] = now
+        if key not in self._working:
+            self._line_up(key)
+
+    def _line_up(self, key: Item) -> None:
+        self._ready.setdefault(self._lane(key), deque()).append(key)
+
+    def _take(self, now: float) -> Item:
+        lane = next(iter(self._ready))
+        line = self._ready.pop(lane)
+        key = line.popleft()
+        if line:
+            self._ready[lane] = line  # behind all other lanes
+        self._waited(now - self._since.pop(key))
+        self._working.add(key)
+        return key
+
+    def _promote(self, now: float) -> None:
+        while self._later and self._later[0][0] <= now:
+            due, _, key = heapq.heappop(self._later)
+            if self._due.get(key) == due:  # else an earlier request has replaced it
+                del self._due[key]
+                self._add(key, due)

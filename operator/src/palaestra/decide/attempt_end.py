@@ -1,0 +1,283 @@
+"""Why one attempt of a replica ended, by its pod and its trainer's last report: the first check that holds.
+
+The cause of a disruption comes before the trainer's reaction to it, as in the Job's podFailurePolicy.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from palaestra.api.reasons import Reason
+from palaestra.decide.checkpoints import next_pod
+from palaestra.decide.conditions import Explanation
+from palaestra.decide.oom_kills import killed_for_memory, kills_of, limit_of, memory_kills
+from palaestra.decide.replica_context import ReplicaContext, explain
+from palaestra.decide.restart_counts import exit_code, failed_by_itself
+from palaestra.decide.suspend import ended_by_suspension, suspended_by
+from palaestra.decide.waiting_reasons import (
+    full_volume,
+    how_it_failed,
+    mark_of,
+    probe_failed,
+    storage_eviction,
+)
+from palaestra.observe.models import JobView, PodView
+from palaestra.plan.replica import TRAINER
+from palaestra_protocol.pod.enums import SILENT
+from palaestra_protocol.pod.status import ExitCode, Termination
+
+BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
+GONE = "its pod is gone; no last word"
+TAKEN, AGAIN = ", which took it back", "; it continues when it is admitted again"
+_HUNG = "SimulatorHung"  # how a last word begins
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndedAttempt:
+    """An attempt that has ended.
+
+    Attributes:
+        situation: the replica.
+        number: from 1.
+        name: of its pod.
+        pod: None if it is gone.
+        code: exit code of its trainer; None if unknown.
+    """
+
+    situation: ReplicaContext
+    number: int
+    name: str
+    pod: PodView | None
+    code: int | None
+
+    @property
+    def word(self) -> Termination | None:
+        """Return the trainer's termination message, its last word."""
+        return self.situation.seen.terminations.get(self.pod.uid) if self.pod is not None else None
+
+    @property
+    def words(self) -> str:
+        """Return why it ended, in the best words that are known."""
+        if self.word is not None:
+            return self.word.reason
+        return how_it_failed(self.situation, self.pod) if self.pod is not None else GONE
+
+
+EndCheck = Callable[[EndedAttempt], Explanation | None]
+
+
+def of_pod(situation: ReplicaContext, pod: PodView, number: int) -> EndedAttempt:
+    """Return the attempt of a pod that still exists."""
+    return EndedAttempt(situation=situation, number=number, name=pod.name, pod=pod, code=exit_code(pod))
+
+
+def ended_silently(attempt: EndedAttempt) -> Explanation | None:
+    """The built-in loop did not say that it was complete: a library has ended its process."""
+    if attempt.code != ExitCode.DONE or attempt.pod is None or attempt.word is not None:
+        return None
+    own = attempt.situation.job.spec.trainer.command
+    return None if own else explain(Reason.TRAINER_FAILED, how=SILENT)
+
+
+def completed(attempt: EndedAttempt) -> Explanation | None:
+    """The training is complete."""
+    return explain(Reason.SUCCEEDED, what=success(attempt.word)) if attempt.code == ExitCode.DONE else None
+
+
+def evicted_for_storage(attempt: EndedAttempt) -> Explanation | None:
+    """The pod was evicted because it wrote more than its limit."""
+    return None if attempt.pod is None else storage_eviction(attempt.pod)
+
+
+def replaced(attempt: EndedAttempt) -> Explanation | None:
+    """The operator replaced the pod, because no kubelet repairs it."""
+    return None if attempt.pod is None else mark_of(attempt.situation, attempt.pod)
+
+
+def disrupted(attempt: EndedAttempt) -> Explanation | None:
+    """The cluster interrupted the pod, by a condition of the pod."""
+    if attempt.pod is None or not attempt.pod.disruption:
+        return None
+    return _disrupted(attempt, attempt.pod.disruption)
+
+
+def gone(attempt: EndedAttempt) -> Explanation | None:
+    """The pod is gone; report the cause under which its restart was counted."""
+    if attempt.pod is not None:
+        return None
+    before, after = attempt.situation.old.restarts, attempt.situation.counted.restarts
+    if after.trainer > before.trainer:
+        return explain(Reason.TRAINER_FAILED, how=GONE)
+    mark = attempt.situation.seen.job.replaced if attempt.situation.seen.job is not None else None
+    if mark is not None and (after.operator or 0) > (before.operator or 0):
+        return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
+    if after.suspension > before.suspension:
+        return paused(attempt.situation)
+    return _disrupted(attempt, GONE)
+
+
+def deleted(attempt: EndedAttempt) -> Explanation | None:
+    """The pod was deleted: by us, by Kueue, or by a person."""
+    pod, job = attempt.pod, attempt.situation.seen.job
+    if attempt.code not in BY_SIGNAL or pod is None or pod.gone_by is None:
+        return None
+    if job is not None and (stop := stop_of(job)) is not None:
+        return stop
+    if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
+        return paused(attempt.situation)
+    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # the Job counts it so
+        how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
+        return explain(Reason.TRAINER_FAILED, how=how)
+    return _disrupted(attempt, "it was deleted")
+
+
+def ended_by_probe(attempt: EndedAttempt) -> Explanation | None:
+    """The kubelet ended the trainer, because a probe failed; the cluster reports that for the newest pod."""
+    known, newest = attempt.situation.old.last_attempt, attempt.situation.seen.pod
+    if attempt.pod is None or attempt.code not in BY_SIGNAL:
+        return None
+    if newest is not None and newest.uid == attempt.pod.uid and attempt.situation.seen.probe:
+        return probe_failed(attempt.situation, attempt.pod)
+    kept = known is not None and (known.attempt, known.reason) == (attempt.number, Reason.PROBE_FAILED)
+    return Explanation(reason=Reason.PROBE_FAILED, message=known.message) if known and kept else None
+
+
+def interrupted(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer was interrupted for an unknown reason."""
+    if attempt.code != ExitCode.INTERRUPTED or attempt.pod is None:
+        return None
+    how, begins = how_it_failed(attempt.situation, attempt.pod), next_pod(attempt.situation)
+    return explain(Reason.INTERRUPTED, pod=attempt.name, how=how, next_pod=begins)
+
+
+def configuration_refused(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer refused its configuration; retrying cannot help."""
+    return _of_code(attempt, ExitCode.CONFIGURATION, Reason.CONFIGURATION_REFUSED)
+
+
+def simulator_budget_spent(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer gave up on a simulator."""
+    if attempt.code != ExitCode.FAULT_BUDGET:
+        return None
+    return explain(Reason.SIMULATOR_BUDGET_SPENT, words=attempt.words, memory=_memory(attempt))
+
+
+def diverged(attempt: EndedAttempt) -> Explanation | None:
+    """The learner diverged."""
+    return _of_code(attempt, ExitCode.DIVERGED, Reason.DIVERGED)
+
+
+def trainer_out_of_memory(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer ran out of memory; a retry would need as much."""
+    trainer = attempt.pod.trainer if attempt.pod is not None else None
+    if trainer is None or not killed_for_memory(trainer):
+        return None
+    return explain(
+        Reason.TRAINER_OUT_OF_MEMORY,
+        limit=limit_of(trainer.memory_limit),
+        times=kills_of(attempt.situation, TRAINER),
+    )
+
+
+def simulator_hung(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer waited for one simulator until it gave up."""
+    if attempt.code != ExitCode.STALLED or attempt.word is None or not attempt.word.reason.startswith(_HUNG):
+        return None
+    return explain(Reason.SIMULATOR_HUNG, what=attempt.word.reason)
+
+
+def stalled(attempt: EndedAttempt) -> Explanation | None:
+    """The trainer's watchdog ended it."""
+    if attempt.code != ExitCode.STALLED:
+        return None
+    seconds = attempt.situation.job.spec.stall_deadline_seconds
+    what = attempt.word.reason if attempt.word else f"no environment step for {seconds} s"
+    return explain(Reason.STALLED, what=what)
+
+
+def storage_full(attempt: EndedAttempt) -> Explanation | None:
+    """The volume is full."""
+    return full_volume(attempt.word)
+
+
+# Ends that a new pod would repeat.
+CAUSES: tuple[EndCheck, ...] = (
+    configuration_refused,
+    simulator_budget_spent,
+    diverged,
+    trainer_out_of_memory,
+    evicted_for_storage,
+    simulator_hung,
+    stalled,
+    storage_full,
+)
+ENDS: tuple[EndCheck, ...] = (
+    ended_silently,
+    completed,
+    evicted_for_storage,
+    replaced,
+    disrupted,
+    gone,
+    deleted,
+    ended_by_probe,
+    interrupted,
+    *CAUSES,
+)
+
+
+def why(attempt: EndedAttempt) -> Explanation:
+    """Return why an attempt ended, by the first check that holds."""
+    return first(ENDS, attempt) or explain(Reason.TRAINER_FAILED, how=attempt.words)
+
+
+def first(checks: tuple[EndCheck, ...], attempt: EndedAttempt) -> Explanation | None:
+    """Return the result of the first check that holds."""
+    return next((found for check in checks if (found := check(attempt)) is not None), None)
+
+
+def stop_of(job: JobView) -> Explanation | None:
+    """Return why the operator stopped a replica, by the mark on its Job; None if it did not."""
+    if job.stopped is None:
+        return None
+    reason, message = job.stopped
+    return Explanation(reason=Reason.known(reason), message=message or f"stopped: {reason}")
+
+
+def paused(situation: ReplicaContext, why: str = "") -> Explanation:
+    """Return why a Job is suspended; if it has a queue, Kueue did it, and `why` is its message."""
+    queue = (
+        situation.seen.job.queue if situation.seen.job else ""
+    ) or situation.job.spec.scheduling.queue_name
+    if not queue:
+        return explain(Reason.SUSPENDED, by=suspended_by(situation.job, situation.seen))
+    taken, again = (TAKEN, AGAIN) if situation.counted.attempt else ("", "")
+    return explain(Reason.QUEUED, queue=queue, taken=taken, why=f": {why}" if why else "", again=again)
+
+
+def success(word: Termination | None) -> str:
+    """Return the result of a complete training."""
+    if word is None:
+        return "the training is complete"
+    rate = f", success rate {word.success_rate:.2f}" if word.success_rate is not None else ""
+    if (interval := word.success_interval) is not None:
+        rate += f" ({interval.low:.2f} to {interval.high:.2f}, {interval.episodes} episodes)"
+    return f"the training is complete: {word.step} steps{rate}"
+
+
+def _disrupted(attempt: EndedAttempt, words: str) -> Explanation:
+    return explain(Reason.DISRUPTED, pod=attempt.name, words=words, next_pod=next_pod(attempt.situation))
+
+
+def _memory(attempt: EndedAttempt) -> str:
+    """Return which simulators of the attempt ran out of memory, with the remedy; "" if none did."""
+    uid = attempt.pod.uid if attempt.pod is not None else None
+    killed = [
+        f"{kill.container} ran out of memory and was killed ({limit_of(kill.limit)})"
+        for kill in memory_kills(attempt.situation)
+        if uid is not None and kill.pod == uid and kill.container != TRAINER
+    ]
+    remedy = "; raise spec.simulators[].resources.limits.memory"
+    return f"; {', '.join(killed)}{remedy}" if killed else ""
+
+
+def _of_code(attempt: EndedAttempt, code: ExitCode, reason: Reason) -> Explanation | None:
+    return explain(reason, words=attempt.words) if attempt.code == code else None

@@ -1,0 +1,112 @@
+"""The clocks of one reconcile, and the record of the reconcile before it in this process.
+
+Clocks differ: a node's may be minutes off, and the operator's own may be set. So a wait is measured on this
+process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader every
+wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only the
+time to live is measured by it, from a time that the operator wrote. A status has whole seconds, so
+decisions do too.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+
+from palaestra.decide.conditions import Explanation
+
+WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wait:
+    """A wait with a deadline.
+
+    Attributes:
+        key: identifies the wait within a replica; a wait with another key begins again.
+        seconds: the deadline.
+        begun_s: when it began, on the monotonic clock; None: when the operator first found it.
+    """
+
+    key: tuple[str, ...]
+    seconds: float
+    begun_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaitingReason:
+    """A cause that delays a replica's first step.
+
+    Attributes:
+        explanation: the reason and its message.
+        gone_s: when a reconcile first did not find it, on the monotonic clock; None: it is still there.
+    """
+
+    explanation: Explanation
+    gone_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReconcileRecord:
+    """The record that one reconcile leaves to the next in the same process; a restart may lose it.
+
+    Attributes:
+        waits: when each open wait was first found, on the monotonic clock.
+        troubles: by replica, while it waits for its first step.
+        active_s: seconds for which the job was active, as far as this process knows.
+        active_at_s: the moment up to which they are counted; None: the job is not active.
+    """
+
+    waits: Mapping[WaitKey, float] = field(default_factory=dict)
+    troubles: Mapping[int, WaitingReason] = field(default_factory=dict)
+    active_s: float = 0.0
+    active_at_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Times:
+    """The clocks at one reconcile.
+
+    Attributes:
+        now: the wall clock, with a time zone.
+        clock_s: the monotonic clock of this process.
+        record: of the reconcile before.
+    """
+
+    now: datetime
+    clock_s: float
+    record: ReconcileRecord = field(default_factory=ReconcileRecord)
+
+    def since_s(self, replica: int, wait: Wait) -> float:
+        """Return when a wait of a replica began."""
+        begun_s = self.clock_s if wait.begun_s is None else min(wait.begun_s, self.clock_s)
+        return self.record.waits.get((replica, *wait.key), begun_s)
+
+    def active_s(self, written_s: int) -> float:
+        """Return how long the job was active; `written_s` is the value in its status."""
+        record = self.record
+        elapsed_s = 0.0 if record.active_at_s is None else self.clock_s - record.active_at_s
+        return max(float(written_s), record.active_s + elapsed_s)
+
+
+def whole(at: datetime) -> datetime:
+    """Return a time with a time zone in UTC and whole seconds, as a status holds it."""
+    return at.astimezone(UTC).replace(microsecond=0)
+
+
+def after(at: datetime, seconds: float) -> datetime:
+    """Return the moment `seconds` after `at`."""
+    return at + timedelta(seconds=seconds)
+
+
+def seconds_between(before: datetime, later: datetime) -> int:
+    """Return the whole seconds from one moment to a later one, 0 where it is not later."""
+    return max(int((later - before).total_seconds()), 0)
+
+
+def seconds_to(at: datetime | None, now: datetime) -> float | None:
+    """Return the seconds from `now` to `at`; None where there is no such moment."""
+    return None if at is None else (at - now).total_seconds()
+
+
+def first_of(waits_s: Iterable[float | None]) -> float | None:
+    """Return the seconds until the first of some waits is over; None: none goes on."""
+    return min((waits_ for waits_ in waits_s if waits_ is not None and waits_ > 0), default=None)

@@ -1,0 +1,114 @@
+"""How a replica ended, by its Job.
+
+`palaestra.decide.replica_policy` has the order: first a stop mark, because it caused everything after it;
+then the trainer's exit code and termination message; then the Job's own message.
+"""
+
+import re
+from dataclasses import replace
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase
+from palaestra.decide.attempt_end import CAUSES, EndedAttempt, ended_silently, first, of_pod, stop_of, success
+from palaestra.decide.attempt_end import why as why_of
+from palaestra.decide.clocks import Wait
+from palaestra.decide.conditions import Explanation
+from palaestra.decide.replica_context import Finding, ReplicaContext, after, explain
+from palaestra.decide.restart_counts import exit_code
+from palaestra.decide.waiting_reasons import how_it_failed
+from palaestra.observe.models import JobEnd, JobView, PodView
+from palaestra_protocol.pod.status import ExitCode
+
+LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is seen too
+_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
+
+
+def ended_by_others(situation: ReplicaContext) -> Finding | None:
+    """The Job is complete, but the built-in loop did not say so: a library has ended its process."""
+    job, pod = situation.seen.job, situation.seen.pod
+    if job is None or job.end is not JobEnd.COMPLETE or pod is None:
+        return None
+    why = ended_silently(of_pod(situation, pod, situation.counted.attempt))
+    return None if why is None else _ended(situation, job, why)
+
+
+def job_is_complete(situation: ReplicaContext) -> Finding | None:
+    """The Job is complete, and so is the training."""
+    job = situation.seen.job
+    if job is None or job.end is not JobEnd.COMPLETE:
+        return None
+    why = explain(Reason.SUCCEEDED, what=success(situation.seen.termination))
+    return replace(_ended(situation, job, why), phase=Phase.SUCCEEDED)
+
+
+def stopped(situation: ReplicaContext) -> Finding | None:
+    """The operator stopped it; the mark on the Job has the reason."""
+    job = situation.seen.job
+    why = stop_of(job) if job is not None else None
+    return None if job is None or why is None else _with_phase(_ended(situation, job, why))
+
+
+def trainer_was_done(situation: ReplicaContext) -> Finding | None:
+    """The Job has failed, but its trainer was done: a container of others has failed."""
+    job, pod = situation.seen.job, situation.seen.pod
+    if job is None or job.end is not JobEnd.FAILED or pod is None or exit_code(pod) != ExitCode.DONE:
+        return None
+    return _with_phase(_ended(situation, job, why_of(of_pod(situation, pod, situation.counted.attempt))))
+
+
+def _with_phase(end: Finding) -> Finding:
+    """Return an end with the phase of its reason."""
+    done = end.explanation.reason is Reason.SUCCEEDED
+    return replace(end, phase=Phase.SUCCEEDED if done else Phase.FAILED)
+
+
+def would_end_the_same(situation: ReplicaContext) -> Finding | None:
+    """The Job has failed, and the last attempt ended by itself for a cause that has a name."""
+    job, pod = situation.seen.job, situation.seen.pod
+    if job is None or job.end is None:
+        return None
+    name = pod.name if pod is not None else ""
+    last = EndedAttempt(
+        situation=situation, number=situation.counted.attempt, name=name, pod=pod, code=_code(situation, job)
+    )
+    why = first(CAUSES, last)
+    return None if why is None else _ended(situation, job, why)
+
+
+def backoff_limit_spent(situation: ReplicaContext) -> Finding | None:
+    """The Job has failed: it was tried as often as `backoffLimit` allows."""
+    job = situation.seen.job
+    if job is None or job.end_reason != "BackoffLimitExceeded":
+        return None
+    how = how_it_failed(situation, situation.seen.pod) if situation.seen.pod else "its pod is gone"
+    return _ended(situation, job, explain(Reason.BACKOFF_LIMIT_SPENT, pods=job.failures, how=how))
+
+
+def job_failed(situation: ReplicaContext) -> Finding | None:
+    """The Job has failed for another cause; the reason has the Job's own message."""
+    job = situation.seen.job
+    if job is None or job.end is None:
+        return None
+    words = ": ".join(word for word in (job.end_reason, job.end_message) if word)
+    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it does not say why"))
+
+
+def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:
+    """Return an end, after the end of the pod was seen too or `LAST_WORD_S` passed.
+
+    Two watches have different delays, so the Job's end may be seen before that of the pod, which has the
+    termination message.
+    """
+    if job.stopped is not None or situation.pod is None:
+        return Finding(explanation=why, phase=Phase.FAILED)
+    wait = Wait(key=("last word", job.uid), seconds=LAST_WORD_S)
+    return replace(after(situation, wait, why), phase=Phase.FAILED)
+
+
+def _code(situation: ReplicaContext, job: JobView) -> int | None:
+    pod: PodView | None = situation.seen.pod
+    code = exit_code(pod) if pod is not None else None
+    if code is not None or job.end_reason != "PodFailurePolicy":
+        return code
+    match = _EXIT_CODE.search(job.end_message)
+    return int(match[1]) if match else None

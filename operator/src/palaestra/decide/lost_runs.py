@@ -1,0 +1,100 @@
+"""Runs that are lost: the claim of a replica is gone, or its run directory is empty, although it has trained.
+
+Such a replica would train from step 0 again. It is held instead, and its Job is suspended, until a person
+restores the run or gives it up. The person's word is an annotation of the TrainingJob with any new value,
+such as the time. The status keeps the value that was obeyed last, so one word has one effect.
+"""
+
+from collections.abc import Collection, Iterable
+from datetime import datetime
+
+from palaestra.api import TrainingJob
+from palaestra.api.reasons import Reason, say
+from palaestra.api.status import LostPart, LostRun, ReplicaStatus
+from palaestra.decide.conditions import Explanation
+from palaestra.decide.restart_counts import counted
+from palaestra.observe.models import ReplicaObserved
+from palaestra.plan.claim import claim_name, former_name
+from palaestra.plan.replica import RESTART_LOST_RUNS
+
+
+def lost_runs(
+    job: TrainingJob, replicas: Iterable[ReplicaObserved], present: Collection[tuple[str, str]]
+) -> dict[int, LostRun]:
+    """Return the lost runs for which a person's word is missing, by replica; `present` has the claims."""
+    before = {replica.index: replica for replica in job.status.replicas}
+    found = {
+        seen.index: _lost(job, before.get(seen.index, ReplicaStatus(index=seen.index)), seen, present)
+        for seen in replicas
+    }
+    return {index: lost for index, lost in found.items() if lost is not None}
+
+
+def why_lost(job: TrainingJob, index: int, lost: LostRun) -> Explanation:
+    """Return the reason and message of a lost run."""
+    claim = claim_name(job.metadata.name, index, job.metadata.uid or "")
+    fact = f"the run directory is empty, although the run was at step {lost.step}"
+    if lost.what is LostPart.CLAIM:
+        fact = f"claim {claim} does not exist, although the run on it was at step {lost.step}"
+    return Explanation(
+        reason=Reason.RUN_LOST, message=say(Reason.RUN_LOST, fact=fact, name=job.metadata.name)
+    )
+
+
+def new_word(job: TrainingJob) -> str | None:
+    """Return the person's word that the operator has not obeyed yet; None: there is none."""
+    word = job.metadata.annotations.get(RESTART_LOST_RUNS, "")[:256]
+    return word if word and word != job.status.lost_runs_restarted else None
+
+
+def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaStatus:
+    """Return the status of a replica whose lost run was given up: it begins at step 0 again."""
+    forgotten = (
+        "step",
+        "furthest_step",
+        "last_checkpoint",
+        "success_rate",
+        "success_interval",
+        "mean_return",
+    )
+    given_up = lost.model_copy(update={"restarted": now, "pod": replica.pod})
+    return replica.model_copy(update={**dict.fromkeys(forgotten), "fruitless": 0, "lost": given_up})
+
+
+def _lost(
+    job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved, present: Collection[tuple[str, str]]
+) -> LostRun | None:
+    waiting = old.lost if old.lost is not None and old.lost.restarted is None else None
+    if _lacks_claim(job, old, seen, present):
+        return waiting or _record(LostPart.CLAIM, old, seen)
+    if waiting is not None and waiting.what is LostPart.RUN_DIRECTORY:
+        return waiting
+    return _record(LostPart.RUN_DIRECTORY, old, seen) if _is_empty(job, old, seen) else None
+
+
+def _lacks_claim(
+    job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved, present: Collection[tuple[str, str]]
+) -> bool:
+    storage = job.spec.storage
+    if storage.ephemeral or storage.existing_claim is not None or not counted(old, seen).furthest_step:
+        return False
+    parts = (job.metadata.name, old.index, job.metadata.uid or "")
+    names = (claim_name(*parts), former_name(*parts))
+    return not any(("PersistentVolumeClaim", name) in present for name in names)
+
+
+def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bool:
+    """Return whether a later attempt has found no record of earlier ones, so that it calls itself the first.
+
+    An ephemeral run is deleted with its pod. A program of the job's own reports no number of its attempt.
+    """
+    if seen.polled is None or old.last_checkpoint is None or job.spec.storage.ephemeral:
+        return False
+    begins = seen.polled.status.attempt == 1 and seen.polled.status.last_checkpoint is None
+    return begins and counted(old, seen).attempt > 1
+
+
+def _record(what: LostPart, old: ReplicaStatus, seen: ReplicaObserved) -> LostRun:
+    saved = old.last_checkpoint.step if old.last_checkpoint is not None else 0
+    counts = counted(old, seen)
+    return LostRun(what=what, step=saved or counts.furthest_step or 0, pod=counts.pod)

@@ -1,0 +1,141 @@
+"""The input and the result of a check on one replica."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+from palaestra.api import SimulatorGroup, TrainingJob
+from palaestra.api.reasons import Reason, say
+from palaestra.api.status import Phase, ReplicaStatus
+from palaestra.decide.clocks import Times, Wait
+from palaestra.decide.conditions import Explanation
+from palaestra.decide.hold import Hold
+from palaestra.decide.restart_counts import Counted
+from palaestra.observe.models import ContainerView, PodView, ReplicaObserved
+from palaestra.plan.replica import SIMULATOR_PREFIX
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplicaContext:
+    """One replica that has not ended.
+
+    Attributes:
+        old: its status so far.
+        seen: the observation.
+        counted: its attempts and restarts by now.
+        times: the clocks; the wall clock in UTC and whole seconds.
+        active_left_s: seconds of the job's active time that are left; None: it has no deadline, or its
+            active time does not run now.
+        hold: the cause that keeps its objects from being created; None: there is none.
+    """
+
+    job: TrainingJob
+    old: ReplicaStatus
+    seen: ReplicaObserved
+    counted: Counted
+    times: Times
+    active_left_s: float | None = None
+    hold: Hold | None = None
+
+    @property
+    def now(self) -> datetime:
+        """Return the wall clock, in whole seconds, to stamp a status with."""
+        return self.times.now
+
+    @property
+    def pod(self) -> PodView | None:
+        """Return the newest pod while it has not ended."""
+        pod = self.seen.pod
+        return pod if pod is not None and not pod.ended else None
+
+    def waited_s(self, wait: Wait) -> float:
+        """Return how long a wait has gone on."""
+        return self.times.clock_s - self.times.since_s(self.seen.index, wait)
+
+    def left_s(self, wait: Wait) -> float:
+        """Return how much longer a wait may go on; 0 or less: it is over."""
+        return wait.seconds - self.waited_s(wait)
+
+    def start_deadline_s(self, container: str) -> int:
+        """Return how long a container may take to start; for trainer and master, the longest of all."""
+        deadlines = {_container(group, i): group.start_deadline_seconds for group, i in _members(self.job)}
+        return deadlines.get(container, max(deadlines.values()))
+
+    @property
+    def fresh(self) -> bool:
+        """Return whether the trainer has answered lately."""
+        polled = self.seen.polled
+        return polled is not None and self.times.clock_s - polled.at_s <= FRESH_S
+
+    @property
+    def suspended(self) -> bool:
+        """Return whether `spec.suspend` or a queue keeps the replica from running."""
+        job = self.seen.job
+        return self.job.spec.suspend if job is None else job.suspended
+
+    @property
+    def trains(self) -> bool:
+        """Return whether the trainer has reported that its simulators are up."""
+        polled = self.seen.polled
+        return polled is not None and polled.status.phase != STARTING
+
+
+FRESH_S = 45  # an older answer does not describe the current state
+STARTING = "starting"  # the trainer's phase until all its simulators are up
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """The result of a check.
+
+    Attributes:
+        explanation: the reason and its message.
+        left_s: seconds until it holds; 0 or less: it holds now.
+        wait: the wait to keep until the next reconcile; None: there is none.
+        phase: the phase of the replica; None: by the state of its trainer's container.
+    """
+
+    explanation: Explanation
+    left_s: float = 0.0
+    wait: Wait | None = None
+    phase: Phase | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplicaVerdict:
+    """The phase of a replica, and the reason."""
+
+    phase: Phase
+    explanation: Explanation
+
+
+Check = Callable[[ReplicaContext], Finding | None]
+
+
+def explain(reason: Reason, **facts: object) -> Explanation:
+    """Return a reason with its message."""
+    return Explanation(reason=reason, message=say(reason, **facts))
+
+
+def found(reason: Reason, **facts: object) -> Finding:
+    """Return a finding that holds at once."""
+    return Finding(explanation=explain(reason, **facts))
+
+
+def after(situation: ReplicaContext, wait: Wait, why: Explanation) -> Finding:
+    """Return a finding that holds once a wait is over."""
+    return Finding(explanation=why, left_s=situation.left_s(wait), wait=wait)
+
+
+def first_waiting(pod: PodView | None, reasons: frozenset[str]) -> ContainerView | None:
+    """Return the first container that waits for one of these reasons of the kubelet."""
+    containers = pod.containers if pod is not None else ()
+    return next((container for container in containers if container.waiting in reasons), None)
+
+
+def _members(job: TrainingJob) -> list[tuple[SimulatorGroup, int]]:
+    return [(group, i) for group in job.spec.simulators for i in range(group.count)]
+
+
+def _container(group: SimulatorGroup, index: int) -> str:
+    return f"{SIMULATOR_PREFIX}{group.name}-{index}"

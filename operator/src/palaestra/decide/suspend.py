@@ -1,0 +1,101 @@
+"""Find out which client suspended or resumed a Job: the operator, a queue, or another field manager."""
+
+from palaestra.api import TrainingJob
+from palaestra.api.status import PodReference
+from palaestra.decide.restart_counts import lives
+from palaestra.observe.models import JobView, Observed, PodView, ReplicaObserved, Suspended
+
+BY_SPEC = "spec.suspend; set it to false to continue"
+SOMEBODY = "somebody else"  # where no field manager is known
+
+
+def set_last(job: TrainingJob, seen: JobView) -> bool:
+    """Return the `spec.suspend` that the operator set last on a Job of its own, by the Job's annotation.
+
+    A Job of an earlier release has no annotation, but that release kept the Job as the spec was. So a
+    difference comes from another client, unless the spec changed since the last status write.
+    """
+    if seen.suspend_set is not None:
+        return seen.suspend_set
+    changed = job.status.observed_generation != job.metadata.generation
+    return seen.suspended if changed else job.spec.suspend
+
+
+def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = None) -> bool:
+    """Return whether the operator has to suspend or resume a Job; if it has a queue, Kueue does.
+
+    The Job is to be as `suspend`; None: as the spec.
+
+    The spec is compared with the value that the operator set last, not with the current one. Otherwise the
+    operator and another client would undo each other's writes forever.
+    """
+    if seen is None or job.spec.scheduling.queue_name is not None or seen.queue or seen.end is not None:
+        return False
+    return set_last(job, seen) != (job.spec.suspend if suspend is None else suspend)
+
+
+def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
+    """Return the `observedGeneration` for the status.
+
+    It stays at the old value while a Job without the annotation is not yet as the spec asks; otherwise a
+    patch that was refused or held back would look done.
+    """
+    jobs = (
+        replica.job
+        for replica in observed.replicas
+        if replica.job is not None and replica.job.stopped is None
+    )
+    waits = any(known.suspend_set is None and to_set(job, known) for known in jobs)
+    return job.status.observed_generation if waits else job.metadata.generation
+
+
+def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
+    """Return whether the operator has to resume a Job, which then creates a new pod."""
+    return not job.spec.suspend and to_set(job, seen)
+
+
+def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) -> Suspended | None:
+    """Return the mark about the current pod for the patch that suspends or resumes a Job; None: no mark.
+
+    A pod may be created before the suspension and seen after it. The patch that resumes the Job names such a
+    pod, because a suspended Job creates none.
+    """
+    job = seen.job
+    if job is None or current is None or job.suspended == suspend:
+        return None
+    named = job.suspension is not None and job.suspension.pod == current.uid
+    lived = seen.pod is not None and lives(seen.pod)
+    if suspend:  # again, before the next pod is created: the existing mark is right
+        return None if named and not lived else Suspended(pod=current.uid, lived=lived)
+    late = job.suspend_set is True and not named
+    return Suspended(pod=current.uid, lived=True) if late else None
+
+
+def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
+    """Return whether a pod was deleted because the operator suspended its Job, even if resumed since."""
+    mark = seen.job.suspension if seen.job is not None else None
+    return mark is not None and mark.lived and mark.pod == pod.uid and pod.gone_by is not None
+
+
+def overruled(job: TrainingJob, seen: JobView) -> bool:
+    """Return whether another client has suspended or resumed a Job since the operator set it."""
+    queued = job.spec.scheduling.queue_name is not None or seen.queue
+    return not queued and seen.end is None and seen.suspended != set_last(job, seen)
+
+
+def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
+    """Return what suspended the Job of a replica, with what resumes it."""
+    if seen.job is None or not overruled(job, seen.job):
+        return BY_SPEC
+    return f"{seen.switcher or SOMEBODY}, not by spec.suspend; it goes on when Job {seen.job.name} is resumed"
+
+
+def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
+    """Return the words for a suspension that has no effect; "" if there is none."""
+    if seen.job is None or not job.spec.suspend or seen.job.suspended:
+        return ""
+    if seen.job.queue:
+        return f"; spec.suspend is not heeded, as queue {seen.job.queue} starts and stops it"
+    if overruled(job, seen.job):
+        return f"; resumed by {seen.switcher or SOMEBODY} though spec.suspend is true"
+    return ""

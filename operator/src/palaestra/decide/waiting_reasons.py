@@ -1,0 +1,304 @@
+"""Checks for a waiting replica: the status shows the reason, and nothing is ended or counted.
+
+The API server, the scheduler and the kubelet retry by themselves. `palaestra.decide.replica_policy` has the
+order of these checks.
+"""
+
+from dataclasses import replace
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase
+from palaestra.decide.checkpoints import next_pod
+from palaestra.decide.clocks import Wait
+from palaestra.decide.conditions import Explanation
+from palaestra.decide.oom_kills import killed_for_memory, kills_of, limit_of
+from palaestra.decide.pod_size_remedy import remedy_of
+from palaestra.decide.replica_context import Finding, ReplicaContext, after, explain, first_waiting, found
+from palaestra.decide.restart_counts import exit_code, failed_by_itself
+from palaestra.decide.suspend import ended_by_suspension
+from palaestra.observe.models import ContainerKind, ContainerView, PodView
+from palaestra.plan.job import GIVEN_UP
+from palaestra.plan.replica import SIMULATOR_PREFIX
+from palaestra_protocol.pod.status import SimulatorStatus, Termination
+
+LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
+CRASHES = 3  # of one sidecar, before they are called a loop
+PULLING = frozenset(
+    {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
+     "RegistryUnavailable", "SignatureValidationFailed"}
+)  # fmt: skip
+MAKING = frozenset(
+    {"CreateContainerConfigError", "CreateContainerError", "RunContainerError", "PreStartHookError",
+     "PostStartHookError"}
+)  # fmt: skip
+FULL = ("StorageFull", "DiskFull")  # beginnings of a termination message; the second in older releases
+
+
+def objects_refused(situation: ReplicaContext) -> Finding | None:
+    """The API server refuses to create an object of the replica; no event in the cluster reports it."""
+    if situation.seen.job is not None or not situation.seen.denied or situation.pod is not None:
+        return None
+    phase = Phase.SUSPENDED if situation.job.spec.suspend else Phase.PENDING
+    return Finding(explanation=_not_admitted(situation.seen.denied), phase=phase)
+
+
+def name_taken(situation: ReplicaContext) -> Finding | None:
+    """Another Job has the replica's name."""
+    obstacle = situation.seen.obstacle
+    if situation.seen.job is not None or obstacle is None:
+        return None
+    deleting = " and is being deleted" if obstacle.deleting else ""
+    return found(Reason.NAME_TAKEN, name=obstacle.name, deleting=deleting)
+
+
+def old_pod_holds_claim(situation: ReplicaContext) -> Finding | None:
+    """A pod of an earlier TrainingJob of this name may still write to the claim that both name."""
+    old = next(iter(situation.seen.former), None)
+    if situation.seen.job is not None or old is None:
+        return None
+    claim, node = situation.job.spec.storage.existing_claim, old.node or "unknown"
+    return found(Reason.OLD_POD_TERMINATING, pod=old.name, claim=claim, node=node)
+
+
+def pods_refused(situation: ReplicaContext) -> Finding | None:
+    """The API server refuses to create the pod; only the Job's events have the reason."""
+    refused = situation.seen.refused
+    words = situation.seen.denied or (refused.message if refused is not None else "")
+    if situation.pod is not None or not words:
+        return None
+    return Finding(explanation=_not_admitted(words))
+
+
+def _not_admitted(words: str) -> Explanation:
+    """Quote the API server, and name the fields of the job that it may not have by name."""
+    return explain(Reason.PODS_REFUSED, words=words, remedy=remedy_of(words))
+
+
+def node_lost(situation: ReplicaContext) -> Finding | None:
+    """A deleted pod still exists long after its grace period."""
+    pod = situation.pod
+    if pod is None or pod.gone_by is None:
+        return None
+    why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
+    wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
+    return replace(after(situation, wait, why), phase=Phase.PENDING)  # as its node said last, it runs
+
+
+def unschedulable(situation: ReplicaContext) -> Finding | None:
+    """No node takes the pod."""
+    if situation.pod is None or not situation.pod.unschedulable:
+        return None
+    return found(Reason.UNSCHEDULABLE, pod=situation.pod.name, words=situation.pod.unschedulable)
+
+
+def volume_not_mounted(situation: ReplicaContext) -> Finding | None:
+    """The pod is on a node, and a volume is not mounted; only the pod's events have the reason."""
+    if situation.pod is None or not situation.seen.unmounted:
+        return None
+    return found(Reason.VOLUME_NOT_MOUNTED, pod=situation.pod.name, words=situation.seen.unmounted)
+
+
+def image_does_not_come(situation: ReplicaContext) -> Finding | None:
+    """An image cannot be pulled; the kubelet tries again."""
+    stuck = first_waiting(situation.pod, PULLING)
+    return None if stuck is None else of_image(stuck)
+
+
+def container_refused(situation: ReplicaContext) -> Finding | None:
+    """The node cannot create a container; the kubelet tries again."""
+    stuck = first_waiting(situation.pod, MAKING)
+    if stuck is None:
+        return None
+    words = stuck.waiting_message or stuck.waiting
+    return found(Reason.CONTAINER_REFUSED, container=stuck.name, words=words)
+
+
+def sidecar_out_of_memory(situation: ReplicaContext) -> Finding | None:
+    """A sidecar was killed for its memory; the kubelet starts it again."""
+    stuck = next(
+        (each for each in crashing(situation.pod) if each.simulates and killed_for_memory(each)), None
+    )
+    return None if stuck is None else Finding(explanation=of_crash(situation, stuck))
+
+
+def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
+    """A sidecar does not stay up; the kubelet starts it again and again."""
+    looping = next(
+        (container for container in crashing(situation.pod) if container.restarts >= CRASHES), None
+    )
+    return None if looping is None else Finding(explanation=of_crash(situation, looping))
+
+
+def simulator_not_up(situation: ReplicaContext) -> Finding | None:
+    """A simulator takes long to start; the trainer gives it up when its restart budget is spent."""
+    polled = situation.seen.polled
+    if situation.pod is None or polled is None or situation.trains or not situation.fresh:
+        return None
+    up = {sidecar.name: sidecar for sidecar in situation.pod.sidecars if sidecar.running_since is not None}
+    states = (
+        (simulator, up.get(f"{SIMULATOR_PREFIX}{simulator.name}"))
+        for simulator in polled.status.simulators
+        if simulator.state != "ready"
+    )
+    late = [
+        _not_up(situation, situation.pod, state, sidecar) for state, sidecar in states if sidecar is not None
+    ]
+    return min(late, key=lambda finding: finding.left_s, default=None)
+
+
+def pod_filled_its_storage(situation: ReplicaContext) -> Finding | None:
+    """The newest pod was evicted for what it wrote, and no other is there yet."""
+    why = None if situation.seen.pod is None else storage_eviction(situation.seen.pod)
+    return None if why is None else Finding(explanation=why)
+
+
+def pod_was_taken(situation: ReplicaContext) -> Finding | None:
+    """The newest pod was interrupted, and no other is there yet."""
+    pod = situation.seen.pod
+    if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
+        return None
+    if (mark := mark_of(situation, pod)) is not None:
+        return Finding(explanation=mark)
+    if ended_by_suspension(situation.seen, pod):  # and resumed: the next pod is on its way
+        return None
+    if pod.disruption or pod.gone_by is not None:
+        words = pod.disruption or "it was deleted"
+        return found(Reason.DISRUPTED, pod=pod.name, words=words, next_pod=next_pod(situation))
+    how = how_it_failed(situation, pod)
+    return found(Reason.INTERRUPTED, pod=pod.name, how=how, next_pod=next_pod(situation))
+
+
+def volume_is_full(situation: ReplicaContext) -> Finding | None:
+    """The newest pod could not write to the volume, and another will try."""
+    pod = situation.seen.pod
+    if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
+        return None
+    why = full_volume(situation.seen.termination)
+    return None if why is None else Finding(explanation=why)
+
+
+def pod_failed(situation: ReplicaContext) -> Finding | None:
+    """The newest pod failed, and another will come."""
+    pod = situation.seen.pod
+    if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
+        return None
+    how = how_it_failed(situation, pod)
+    return found(Reason.RETRYING, pod=pod.name, how=how, next_pod=next_pod(situation))
+
+
+def no_other_comes(situation: ReplicaContext, pod: PodView) -> bool:
+    """Return whether a failed pod is the last one, because its Job is about to fail."""
+    booked = situation.seen.job.failures if situation.seen.job is not None else 0
+    failures = max(
+        booked, situation.counted.restarts.trainer + 1
+    )  # the Job may not have counted the newest yet
+    return failures > situation.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
+
+
+def of_image(stuck: ContainerView) -> Finding:
+    """Return the finding about a container whose image cannot be pulled."""
+    words = stuck.waiting_message or stuck.waiting
+    return found(Reason.IMAGE_PULL, container=stuck.name, image=stuck.image, words=words)
+
+
+def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
+    """Return why the operator replaces a pod, by the mark on its Job; None if it does not."""
+    mark = situation.seen.job.replaced if situation.seen.job is not None else None
+    if mark is None or mark.pod != pod.uid:
+        return None
+    return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
+
+
+def probe_failed(situation: ReplicaContext, pod: PodView) -> Explanation:
+    """Return the reason for a trainer that the kubelet ended, because a probe failed."""
+    code, probe, begins = exit_code(pod), situation.seen.probe, next_pod(situation)
+    how = f"exit code {code}"
+    return explain(Reason.PROBE_FAILED, pod=pod.name, probe=probe, how=how, next_pod=begins)
+
+
+def _not_up(
+    situation: ReplicaContext, pod: PodView, simulator: SimulatorStatus, sidecar: ContainerView
+) -> Finding:
+    seconds = situation.start_deadline_s(sidecar.name)
+    fault = f": {simulator.last_fault}" if simulator.last_fault else ""
+    what = f"{sidecar.name} is not up within {seconds} s of its container's start{fault}"
+    wait = Wait(key=("start", pod.uid, sidecar.name, str(sidecar.restarts)), seconds=seconds)
+    return after(situation, wait, explain(Reason.SIMULATOR_START_DEADLINE, what=what))
+
+
+def crashing(pod: PodView | None) -> tuple[ContainerView, ...]:
+    """Return the sidecars that do not run now, though they have before."""
+    sidecars = pod.sidecars if pod is not None else ()
+    return tuple(
+        sidecar for sidecar in sidecars if sidecar.running_since is None and sidecar.exit is not None
+    )
+
+
+def storage_eviction(pod: PodView) -> Explanation | None:
+    """Return the reason if a node evicted the pod because it wrote too much, else None."""
+    if pod.reason != "Evicted" or "ephemeral" not in pod.message.lower():
+        return None
+    return explain(Reason.EPHEMERAL_STORAGE, pod=pod.name, words=pod.message)
+
+
+def full_volume(word: Termination | None) -> Explanation | None:
+    """Return the reason if a trainer could not write to its full volume, else None."""
+    if word is None or not word.reason.startswith(FULL):
+        return None
+    fact = word.reason.partition(": ")[2].partition("; ")[0]  # its remedy is ours
+    return explain(Reason.STORAGE_FULL, words=fact or "no space left")
+
+
+def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation:
+    """Return the reason for a sidecar that crashed."""
+    if container.simulates and killed_for_memory(container):
+        times, limit = kills_of(situation, container.name), limit_of(container.memory_limit)
+        return explain(Reason.SIMULATOR_OUT_OF_MEMORY, container=container.name, limit=limit, times=times)
+    times = max(container.restarts, 1)
+    code = container.exit.code if container.exit is not None else "unknown"
+    return explain(Reason.SIDECAR_CRASH_LOOP, container=container.name, times=times, how=f"exit code {code}")
+
+
+def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
+    """Return how a pod failed, in the best words that are known."""
+    word = situation.seen.terminations.get(pod.uid)
+    trainer = pod.trainer
+    if trainer is not None and killed_for_memory(trainer):
+        return "the trainer was killed because it ran out of memory"
+    code = exit_code(pod)
+    newest = situation.seen.pod is not None and situation.seen.pod.uid == pod.uid
+    if newest and situation.seen.probe:
+        return (
+            f"exit code {code}, the kubelet ended the trainer because its {situation.seen.probe} probe failed"
+        )
+    if word is not None and word.reason:
+        return f"exit code {code}, {word.reason}"
+    if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:
+        line = _last_line(before) or before.exit.reason or "no word"
+        return f"container {before.name}: exit code {before.exit.code}, {line}"
+    words = _last_line(trainer) or pod.message or pod.reason or "no word from the trainer"
+    return f"exit code {code}, {words}" if code is not None else words
+
+
+def _failed_before(pod: PodView) -> ContainerView | None:
+    """Return the failed container among those that must succeed before the others start, if any."""
+    init = (container for container in pod.containers if container.kind is ContainerKind.INIT)
+    return next((container for container in init if container.exit is not None and container.exit.code), None)
+
+
+def left_by(pod: PodView) -> str:
+    """Return the end of the log of a pod's trainer, or of the container that kept it from starting."""
+    failed = _failed_before(pod)
+    trainer = pod.trainer
+    ends = [
+        container.exit
+        for container in (trainer, failed)
+        if container is not None and container.exit is not None
+    ]
+    return next((end.message for end in ends if end.message), "")
+
+
+def _last_line(container: ContainerView | None) -> str:
+    """Return the last line of a container's termination message."""
+    log = container.exit.message if container is not None and container.exit is not None else ""
+    return next(iter(log.strip().splitlines()[-1:]), "")

@@ -1,0 +1,53 @@
+"""All checks, ordered so that causes come before their consequences."""
+
+from collections.abc import Iterator, Mapping
+
+from palaestra.cluster import ApiError, Forbidden, Untrusted
+from palaestra.doctor.check_result import Check, CheckResult, CheckStatus, Site, unknown, wrong
+from palaestra.doctor.installation import images, leads, metrics, operator_rights, runs
+from palaestra.doctor.platform import answers, definition, namespace, nodes, sidecars, storage
+from palaestra.doctor.rbac import own_rights
+
+CHECKS: tuple[tuple[str, Check], ...] = (
+    ("API server", answers),
+    ("nodes", nodes),
+    ("TrainingJobs", definition),
+    ("namespace", namespace),
+    ("your rights", own_rights),
+    ("sidecars", sidecars),
+    ("storage class", storage),
+    ("operator", runs),
+    ("images", images),
+    ("leader", leads),
+    ("operator's rights", operator_rights),
+    ("metrics", metrics),
+)
+# If the key check fails, the other checks would fail too or mislead: RBAC also grants rights in a namespace
+# that does not exist.
+POINTLESS: Mapping[Check, frozenset[Check]] = {
+    answers: frozenset(check for _, check in CHECKS),
+    namespace: frozenset({own_rights, sidecars, operator_rights}),
+}
+
+
+def examine(site: Site) -> Iterator[CheckResult]:
+    """Yield the findings of each check; after a failed check, skip those that `POINTLESS` lists for it."""
+    skipped: frozenset[Check] = frozenset()
+    for what, check in CHECKS:
+        if check in skipped:
+            continue
+        found = list(_findings(what, check, site))
+        yield from found
+        if any(finding.verdict is CheckStatus.WRONG for finding in found):
+            skipped |= POINTLESS.get(check, frozenset())
+
+
+def _findings(what: str, check: Check, site: Site) -> Iterator[CheckResult]:
+    try:
+        yield from check(site)
+    except Forbidden as error:
+        yield unknown(what, f"you have no permission: {error.message}", "ask a cluster administrator")
+    except Untrusted as error:
+        yield wrong(what, error.fact, error.remedy)
+    except ApiError as error:
+        yield wrong(what, str(error), "check the API server and the connection to it")

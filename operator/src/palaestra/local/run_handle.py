@@ -1,0 +1,262 @@
+"""`palaestra.run`: a TrainingJob trains in the background of a Python program.
+
+The run is a process of its own (`bound`), so it takes over neither signals nor the terminal, and several runs
+at the same time do not meet. All of it ends with this process, also after SIGKILL.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+from palaestra.api import TrainingJob
+from palaestra.api.yaml_io import write
+from palaestra.job_input import Given, data_of, job_of
+from palaestra.local import run_directory
+from palaestra.local.child_end import end_descriptor
+from palaestra.local.child_main import ChildRequest
+from palaestra.local.errors import KILLED, RunRefused, StillRunning
+from palaestra.local.files import storage
+from palaestra.local.outcome import RunOutcome
+from palaestra.local.progress import ProgressReader, RunProgress
+from palaestra.local.run import RunOptions, check
+from palaestra.plan import identified
+
+STOP_S = 90.0  # A pod has 60 s for its last checkpoint; the rest is for its processes.
+_RUNNING: set["RunHandle"] = set()  # a run lives on if the program drops its handle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """The end of a run; a value that was not measured is None.
+
+    Attributes:
+        exit_code: that of `palaestra run`.
+        succeeded: whether the training is complete.
+        reason: why it ended; empty if nothing was reported.
+        directory: the run directory.
+        policy: the best policy by evaluation, `model.zip`; None if there is none yet.
+        steps: environment steps that were learned from.
+        success_rate: of the policy, 0 to 1.
+        steps_per_second: over the whole run.
+        faults: of all simulators.
+    """
+
+    exit_code: int
+    succeeded: bool
+    reason: str
+    directory: Path
+    policy: Path | None
+    steps: int | None
+    success_rate: float | None
+    steps_per_second: float | None
+    faults: int | None
+
+
+class RunHandle:
+    """One replica that trains in the background; as a context, it is stopped with the block.
+
+    Safe to use from several threads.
+
+    Attributes:
+        directory: the run directory.
+        log: the file with what `palaestra run` would print; logs/ in the run directory has all else.
+    """
+
+    def __init__(self, directory: Path, request: ChildRequest, control: int) -> None:
+        self.directory = directory
+        self.log = directory.with_name(f"{directory.name}.log")
+        self._control = os.fdopen(control, "wb", buffering=0)
+        self._watch = ProgressReader(directory)
+        with storage(self.log), _emptied(self.log) as log, tempfile.TemporaryFile() as file:
+            file.write(request.to_json())
+            file.seek(0)
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "palaestra.local.child_main"],
+                stdin=file,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                pass_fds=[request.control, request.lock],
+                start_new_session=True,
+            )
+        self._end = end_descriptor(self._process.pid)
+
+    def __enter__(self) -> Self:
+        """Return the run."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop it if it has not ended."""
+        self.stop()
+
+    @property
+    def progress(self) -> RunProgress:
+        """Return the newest figures; after the end those of the result."""
+        newest = self._watch.progress()
+        if not self.ended:
+            return newest
+        result = self._result()
+        known = {
+            "step": result.steps,
+            "success_rate": result.success_rate,
+            "steps_per_second": result.steps_per_second,
+            "faults": result.faults,
+        }
+        measured: dict[str, Any] = {name: value for name, value in known.items() if value is not None}
+        return replace(newest, phase="ended", **measured)
+
+    @property
+    def ended(self) -> bool:
+        """Return whether it has ended."""
+        return self.wait(0.0)
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable once the run has ended, for `select`; valid until `wait`."""
+        return self._end
+
+    def wait(self, deadline_s: float) -> bool:
+        """Return whether it ended within `deadline_s`."""
+        try:
+            self._process.wait(deadline_s)
+        except subprocess.TimeoutExpired:
+            return False
+        self._let_go()
+        return True
+
+    def result(self, deadline_s: float) -> Result:
+        """Wait for the end and return the result.
+
+        Raises:
+            StillRunning: it has not ended after `deadline_s`; it goes on.
+        """
+        if not self.wait(deadline_s):
+            raise StillRunning(
+                f"{self.directory}: the run has not ended within {deadline_s:g} s; wait longer, or stop it"
+            )
+        return self._result()
+
+    def interrupt(self) -> None:
+        """Ask it to save a checkpoint and to end; return at once. The same job resumes from there."""
+        if not self.ended:
+            with suppress(BrokenPipeError, ValueError):  # it has ended meanwhile
+                self._control.write(b"\n")
+
+    def stop(self, deadline_s: float = STOP_S) -> Result:
+        """Save a checkpoint, end the run and return the result; kill it after `deadline_s`."""
+        self.interrupt()
+        if not self.wait(deadline_s):
+            self.kill()
+        return self._result()
+
+    def kill(self) -> None:
+        """End it at once; the same job resumes from the newest checkpoint."""
+        self._process.kill()
+        self._process.wait()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        with suppress(KeyError):  # another thread has let go
+            _RUNNING.remove(self)
+            self._control.close()
+            os.close(self._end)
+
+    def _result(self) -> Result:
+        code = self._process.returncode
+        code = KILLED if code < 0 else code
+        outcome = RunOutcome.of(self.directory)
+        if outcome is None or outcome.exit_code != code:  # it wrote none; an earlier run may have
+            last = self.log.read_text(errors="replace").splitlines()[-1:]
+            outcome = RunOutcome(exit_code=code, reason="".join(last))
+        policy = self.directory / "model.zip"
+        return Result(
+            exit_code=code,
+            succeeded=outcome.finished,
+            reason=outcome.reason,
+            directory=self.directory,
+            policy=policy if policy.exists() else None,
+            steps=outcome.steps,
+            success_rate=outcome.success_rate,
+            steps_per_second=outcome.steps_per_second,
+            faults=outcome.faults,
+        )
+
+
+def run(
+    job: Given, *, runs: Path | str = "runs", replica: int | None = None, fresh: bool = False
+) -> RunHandle:
+    """Train a job on this machine, in the background, and return its handle.
+
+    The run is that of `palaestra run`: it resumes from its newest checkpoint, and does nothing if it is
+    complete. A job with more `trainer.steps` prolongs it. It saves a checkpoint and ends when this process
+    ends.
+
+    Args:
+        job: the path of a file, YAML text, plain data or the model.
+        runs: folder of all runs; the run directory is `<runs>/<job>/<replica>`.
+        replica: its number; None only if the job has one replica.
+        fresh: start from the beginning; an existing run is moved aside.
+
+    Raises:
+        SpecErrors: the job is wrong; lists every mistake.
+        LocalError: it cannot be run here, or another process runs it.
+        PlanError: it cannot be run on one machine.
+        WorldError: one of its worlds is wrong.
+        OSError: the file cannot be read.
+    """
+    given = job_of(job)
+    number = _replica(given, replica)
+    directory = run_directory.job_directory(Path(runs), given.metadata.name)
+    options = RunOptions(runs=Path(runs), version=version("palaestra"), replica=number, fresh=fresh)
+    identified_job = identified(given, run_directory.uid_of(directory))
+    check(identified_job, directory, range(number, number + 1), options)
+    with run_directory.locked(directory / str(number)) as lock:
+        if not fresh:
+            run_directory.refuse_another_job(directory / str(number), run_directory.record_of(identified_job))
+        return _started(given, directory / str(number), options, lock)
+
+
+def _emptied(log: Path) -> BinaryIO:
+    """Return a log file without content, as `LimitedFile` needs it."""
+    log.write_bytes(b"")
+    return log.open("a+b")
+
+
+def _replica(job: TrainingJob, replica: int | None) -> int:
+    """Return the number of the replica to run.
+
+    Raises:
+        Refused: there is no such replica, or none was chosen of several.
+    """
+    count = job.spec.replicas
+    if replica is None and count > 1:
+        raise RunRefused(f"spec.replicas: the job has {count}; choose one with replica=, all may run at once")
+    number = replica or 0
+    if not 0 <= number < count:
+        raise RunRefused(
+            f"replica={number}: the job has {count}; use 0 to {count - 1}, or raise spec.replicas"
+        )
+    return number
+
+
+def _started(job: TrainingJob, directory: Path, options: RunOptions, lock: int) -> RunHandle:
+    theirs, ours = os.pipe()
+    try:
+        request = ChildRequest(
+            job=write(data_of(job)),
+            runs=str(options.runs.absolute()),
+            replica=int(directory.name),
+            fresh=options.fresh,
+            process=os.getpid(),
+            control=theirs,
+            lock=lock,
+        )
+        started = RunHandle(directory, request, ours)
+    finally:
+        os.close(theirs)
+    _RUNNING.add(started)
+    return started

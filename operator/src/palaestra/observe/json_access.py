@@ -1,0 +1,74 @@
+"""Read untrusted JSON: every value has the expected type and size, or counts as absent."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Any
+
+from palaestra.api.text import one_line
+
+MOST_TEXT = 600
+MOST_ITEMS = 128  # containers or conditions of a pod; a pod of ours has 34 containers at most
+MOST_COUNT = 2_000_000_000  # as the status' counts are bounded
+
+
+def part(raw: Any, *path: str) -> dict[str, Any]:
+    """Return the object at `path` below `raw`; empty if there is none."""
+    for name in path:
+        raw = raw.get(name) if isinstance(raw, dict) else None
+    return raw if isinstance(raw, dict) else {}
+
+
+def parts(raw: Any, *path: str) -> Iterator[dict[str, Any]]:
+    """Yield the objects in the list at `path` below `raw`, 128 of them at most."""
+    *above, last = path
+    items = part(raw, *above).get(last)
+    if isinstance(items, list):
+        yield from (item for item in items[:MOST_ITEMS] if isinstance(item, dict))
+
+
+def text(raw: Any, name: str, most: int = MOST_TEXT) -> str:
+    """Return the text of a field on one line, cut to `most` characters; "" if there is none."""
+    value = raw.get(name) if isinstance(raw, dict) else None
+    return one_line(value, most) if isinstance(value, str) else ""
+
+
+def count(raw: Any, name: str) -> int:
+    """Return a whole number from 0 to 2·10⁹; 0 if there is none."""
+    value = raw.get(name) if isinstance(raw, dict) else None
+    if not isinstance(value, int) or isinstance(value, bool):
+        return 0
+    return min(max(value, 0), MOST_COUNT)
+
+
+def time(raw: Any, name: str) -> datetime | None:
+    """Return a time in UTC; None if there is none."""
+    value = raw.get(name) if isinstance(raw, dict) else None
+    return as_time(value) if isinstance(value, str) else None
+
+
+def as_time(value: str) -> datetime | None:
+    """Return the time that RFC 3339 text names, in UTC and whole seconds; None for anything else."""
+    try:
+        read = datetime.fromisoformat(value)
+        at = read.astimezone(UTC) if read.tzinfo else read.replace(tzinfo=UTC)
+    except (ValueError, OverflowError):
+        return None
+    return at.replace(microsecond=0)
+
+
+def owners(raw: Any) -> frozenset[str]:
+    """Return the uids of an object's owners."""
+    uids = (owner.get("uid") for owner in parts(raw, "metadata", "ownerReferences"))
+    return frozenset(uid for uid in uids if isinstance(uid, str) and uid)
+
+
+def condition(raw: Any, kind: str) -> dict[str, Any]:
+    """Return the condition of this type in the status of `raw`; empty if there is none."""
+    return next(
+        (condition for condition in parts(raw, "status", "conditions") if condition.get("type") == kind), {}
+    )
+
+
+def holds(raw: Any, kind: str) -> bool:
+    """Return whether a condition is True."""
+    return condition(raw, kind).get("status") == "True"

@@ -1,0 +1,58 @@
+"""The objects to which a job refers by name; each must be open to jobs before it is used."""
+
+from collections.abc import Iterator, Mapping
+
+from palaestra.api import TrainingJob
+from palaestra.api.container import Variable
+from palaestra.observe.models import ReferencedObject, ReferenceKind
+
+FOR_JOBS = "palaestra.dev/for-jobs"
+
+
+def references(job: TrainingJob) -> tuple[ReferencedObject, ...]:
+    """Return every object of the job's namespace that must be open to jobs for its spec, each once."""
+    return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_pull_secrets(job), *_claims(job))))
+
+
+def open_to_jobs(raw: object) -> bool:
+    """Return whether an object has the label that opens it to jobs."""
+    metadata = raw.get("metadata") if isinstance(raw, Mapping) else None
+    labels = metadata.get("labels") if isinstance(metadata, Mapping) else None
+    return isinstance(labels, Mapping) and labels.get(FOR_JOBS) == "true"
+
+
+def _worlds(job: TrainingJob) -> Iterator[ReferencedObject]:
+    for place, group in enumerate(job.spec.simulators):
+        if (reference := group.world.config_map) is not None:
+            field = f"spec.simulators[{place}].world.configMap"
+            yield ReferencedObject(kind=ReferenceKind.CONFIG_MAP, name=reference.name, field=field)
+
+
+def _secrets(job: TrainingJob) -> Iterator[ReferencedObject]:
+    yield from _of_variables(job.spec.trainer.env, "spec.trainer")
+    for place, group in enumerate(job.spec.simulators):
+        yield from _of_variables(group.env, f"spec.simulators[{place}]")
+
+
+def _pull_secrets(job: TrainingJob) -> Iterator[ReferencedObject]:
+    """Yield the Secrets for pulling images; an earlier release accepted them without the label."""
+    release = job.status.release
+    if release is None or release.pull_secrets_for_jobs:
+        for place, secret in enumerate(job.spec.image_pull_secrets):
+            field = f"spec.imagePullSecrets[{place}]"
+            yield ReferencedObject(kind=ReferenceKind.SECRET, name=secret.name, field=field)
+
+
+def _of_variables(env: tuple[Variable, ...], owner: str) -> Iterator[ReferencedObject]:
+    for place, variable in enumerate(env):
+        if (reference := variable.secret_key_ref) is not None:
+            field = f"{owner}.env[{place}].secretKeyRef"
+            yield ReferencedObject(kind=ReferenceKind.SECRET, name=reference.name, field=field)
+
+
+def _claims(job: TrainingJob) -> Iterator[ReferencedObject]:
+    if (name := job.spec.storage.existing_claim) is not None:
+        yield ReferencedObject(kind=ReferenceKind.CLAIM, name=name, field="spec.storage.existingClaim")
+    if (initial := job.spec.trainer.initial_policy) is not None and initial.claim is not None:
+        field = "spec.trainer.initialPolicy.claim"
+        yield ReferencedObject(kind=ReferenceKind.CLAIM, name=initial.claim, field=field)

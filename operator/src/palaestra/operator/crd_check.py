@@ -1,0 +1,113 @@
+"""Compare the cluster's definition of TrainingJobs with the fields that this release writes.
+
+With `crds.install: false` an administrator applies the definition, and may forget to. Then the API server
+drops new fields of a status without an error. No decision depends on them, but people miss them. It refuses a
+status with a condition of a new type. So the operator leaves out such conditions until it has read that the
+definition has them; those that a status has already stay.
+
+Columns and selectable fields are not compared, because no written value is lost without them.
+
+The operator has no right to read CustomResourceDefinitions, so it reads the OpenAPI document, which every
+account may read. If that fails, the operator still works.
+"""
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import structlog
+
+from palaestra.api.crd import schema
+from palaestra.api.job import API_VERSION, KIND
+from palaestra.api.schema_diff import lacks
+from palaestra.api.status import ConditionType
+from palaestra.cluster import Api, ApiError
+from palaestra.observe.json_access import part, parts, text
+
+READ_S = 5.0
+FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
+MOST_SHOWN = 20
+_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # since a5276f3
+
+log = structlog.get_logger(__name__)
+
+
+class CrdCheck:
+    """The definition of TrainingJobs in a cluster, compared with this release's.
+
+    Args:
+        api: the cluster.
+        changed: called when the definition accepts more fields of a status than before.
+
+    Attributes:
+        outdated: whether it lacks something; None: it could not be read yet.
+    """
+
+    def __init__(self, api: Api, changed: Callable[[], None]) -> None:
+        self._api = api.within(READ_S)
+        self._changed = changed
+        self._found: tuple[str, ...] = ()
+        self._knows_new = False
+        self.outdated: bool | None = None
+
+    def follow(self, stopping: threading.Event, every_s: float) -> None:
+        """Compare at once, then in a thread of its own until nothing is lacking."""
+        self._try_look()
+        threading.Thread(
+            target=self._follow, args=(stopping, every_s), name="definition", daemon=True
+        ).start()
+
+    def look(self) -> None:
+        """Compare once, and log the missing fields if they have changed."""
+        try:
+            served = self._api.schema(API_VERSION, KIND)
+        except ApiError as error:
+            log.info("definition not read", error=str(error))
+            return
+        before, self._found = self._found, tuple(_lacking(served.get("properties", {})))
+        knew, self._knows_new = self._knows_new, _condition_types(served) >= _NEW
+        self.outdated = bool(self._found)
+        if self._knows_new and not knew:
+            self._changed()
+        if self._found and self._found != before:
+            log.warning(
+                "definition outdated",
+                lacks=self._found[:MOST_SHOWN],
+                count=len(self._found),
+                remedy="kubectl apply --server-side --filename manifests/crd.yaml of this release",
+            )
+
+    def accepted(self, stored: Any, status: dict[str, Any]) -> dict[str, Any]:
+        """Return a status without conditions whose type the definition does not have.
+
+        Until the definition was read, the types are those in the `stored` status.
+        """
+        if self._knows_new:
+            return status
+        there = {text(condition, "type") for condition in parts(stored, "conditions")}
+        refused = _NEW if self.outdated else _NEW - there
+        kept = [condition for condition in status["conditions"] if condition["type"] not in refused]
+        return {**status, "conditions": kept}
+
+    def _follow(self, stopping: threading.Event, every_s: float) -> None:
+        pause_s = FIRST_PAUSE_S
+        while self.outdated is not False and not stopping.wait(pause_s):
+            self._try_look()
+            pause_s = min(2 * pause_s, every_s)
+
+    def _try_look(self) -> None:
+        try:
+            self.look()
+        except Exception:  # a document of an unforeseen shape must not end the operator
+            log.exception("definition not compared")
+
+
+def _lacking(served: Mapping[str, Any]) -> list[str]:
+    ours = schema()["properties"]
+    return [fact for part in ("spec", "status") for fact in lacks(served.get(part, {}), ours[part], part)]
+
+
+def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
+    """Return the types of conditions that a served schema allows."""
+    way = ("status", "properties", "conditions", "items", "properties", "type")
+    return frozenset(part(served, "properties", *way).get("enum", ()))

@@ -1,0 +1,91 @@
+"""Whose worlds are checked next: one job of a namespace at a time, and the namespaces in turn.
+
+So the jobs of a namespace wait for each other, and not those of other namespaces for them.
+"""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from palaestra.objects import Key
+from palaestra.plan import GivenWorld
+
+
+@dataclass(slots=True, kw_only=True)
+class Turn:
+    """The turn of a job; `worlds` is None until its reconcile has handed them over, as they are not kept."""
+
+    key: Key
+    worlds: Sequence[GivenWorld] | None = None
+
+
+class FairQueue:
+    """A line of jobs for each namespace; safe to use from several threads."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._lines: dict[str, dict[Key, None]] = {}  # by namespace, that of the next turn first
+        self._turns: dict[Key, Turn] = {}
+        self._closed = False
+
+    def waits(self, key: Key) -> bool:
+        """Return whether the worlds of a job wait, or are being checked; False if they are asked for."""
+        with self._changed:
+            turn = self._turns.get(key)
+            return turn.worlds is not None if turn is not None else key in self._lines.get(key[0], ())
+
+    def hand_over(self, key: Key, worlds: Sequence[GivenWorld]) -> None:
+        """Pass the worlds of a job that must be checked, and have it wait if it is not its turn."""
+        with self._changed:
+            turn = self._turns.get(key)
+            if turn is not None and turn.worlds is None:
+                turn.worlds = worlds
+            elif turn is None and worlds:
+                self._lines.setdefault(key[0], {})[key] = None
+            elif not worlds:
+                self._leave(key)
+            self._changed.notify_all()
+
+    def next(self) -> Turn | None:
+        """Begin the next turn, then call `end`; waits for one, and returns None after `close`."""
+        with self._changed:
+            while not self._closed:
+                busy = {key[0] for key in self._turns}
+                namespace = next((name for name in self._lines if name not in busy), None)
+                if namespace is not None:
+                    return self._begin(namespace)
+                self._changed.wait()
+            return None
+
+    def handed(self, turn: Turn, deadline_s: float) -> Sequence[GivenWorld]:
+        """Return the worlds of a turn; none if they were not handed over in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: turn.worlds is not None or self._closed, deadline_s)
+            return turn.worlds or ()
+
+    def end(self, turn: Turn) -> None:
+        """End a turn, so that the next one of its namespace can begin."""
+        with self._changed:
+            self._turns.pop(turn.key, None)
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Begin no more turns."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _begin(self, namespace: str) -> Turn:
+        line = self._lines.pop(namespace)
+        turn = Turn(key=next(iter(line)))
+        self._turns[turn.key] = turn
+        del line[turn.key]
+        if line:
+            self._lines[namespace] = line  # behind all other namespaces
+        return turn
+
+    def _leave(self, key: Key) -> None:
+        line = self._lines.get(key[0], {})
+        line.pop(key, None)
+        if not line:
+            self._lines.pop(key[0], None)

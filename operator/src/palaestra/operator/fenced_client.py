@@ -1,0 +1,96 @@
+"""Every write to the cluster goes through this module, which refuses it while another operator leads.
+
+It also refuses a write that was decided in an earlier tenure: while a thread was delayed between decision and
+write, another operator may have led.
+"""
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from palaestra.cluster import Api, Resource
+from palaestra.cluster.resources import TRAINING_JOBS, resource_of
+from palaestra.errors import PalaestraError
+from palaestra.objects import Object
+
+
+class NotLeading(PalaestraError):
+    """Another operator may lead by now, so nothing is written; the leader reconciles the job."""
+
+
+class FencedClient:
+    """Writes to the cluster while this operator leads.
+
+    Each method raises NotLeading if it does not lead, and ApiError if the API server refuses.
+
+    Args:
+        api: the cluster.
+        term: returns the number of the tenure in which this operator leads; None: it does not lead.
+    """
+
+    def __init__(self, api: Api, term: Callable[[], int | None]) -> None:
+        self._api = api
+        self._term = term
+        self._look = threading.local()
+
+    def begin(self) -> None:
+        """Begin a reconcile: later writes of this thread must be decided on reads after this call."""
+        self._look.term = self._term()
+
+    def create(self, obj: Object) -> Object:
+        """Create an object and return it as stored."""
+        self._check()
+        return self._api.create(resource_of(obj), obj)
+
+    def apply(self, obj: Object) -> Object:
+        """Apply an object that only the operator writes, whether it exists or not."""
+        self._check()
+        return self._api.apply(obj)
+
+    def merge(self, resource: Resource, namespace: str, name: str, patch: Object, version: str) -> Object:
+        """Change the fields in `patch` of an object that still has this version."""
+        self._check()
+        return self._api.merge(resource, namespace, name, patch, resource_version=version)
+
+    def delete(self, resource: Resource, namespace: str, name: str, *, uid: str, version: str) -> None:
+        """Delete the object with this uid and version, but no later one of its name."""
+        self._check()
+        self._api.delete(resource, namespace, name, uid=uid, resource_version=version)
+
+    def evict(self, namespace: str, name: str, uid: str) -> None:
+        """Evict the pod with this uid, but no later one of its name."""
+        self._check()
+        self._api.evict(namespace, name, uid=uid)
+
+    def status(self, job: Object, patch: Object) -> Object:
+        """Change the status of a TrainingJob that still has the version of `job`; return it as stored."""
+        self._check()
+        metadata = job["metadata"]
+        return self._api.merge(
+            TRAINING_JOBS,
+            metadata["namespace"],
+            metadata["name"],
+            {"status": patch},
+            subresource="status",
+            resource_version=metadata["resourceVersion"],
+        )
+
+    def _check(self) -> None:
+        term = self._term()
+        if term is None or term != getattr(self._look, "term", term):
+            raise NotLeading("the Lease may have passed on since this was decided; it is not written")
+
+
+def difference(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the merge patch (RFC 7386) that makes `old` into `new`; empty: they are equal."""
+    before: Mapping[str, Any] = old if isinstance(old, Mapping) else {}
+    patch: dict[str, Any] = {key: None for key in before if key not in new}
+    for key, value in new.items():
+        if key not in before:
+            patch[key] = value
+        elif isinstance(value, Mapping) and isinstance(before[key], Mapping):
+            if part := difference(before[key], value):
+                patch[key] = part
+        elif before[key] != value:
+            patch[key] = value
+    return patch

@@ -1,0 +1,80 @@
+"""One kind of objects, watched in some namespaces or in all of them.
+
+If the operator watches only some namespaces, each has a reflector of its own, because no list spans several.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+
+from palaestra.cluster import Api, Reflector, Resource
+from palaestra.cluster.reflector import Changed, Keep
+from palaestra.objects import Key, Object
+
+
+class Informer:
+    """The objects of one kind, as they were a moment ago.
+
+    Args:
+        api: the cluster.
+        resource: the kind.
+        namespaces: the watched ones; empty: all of them.
+        labels: a label selector.
+        keep: returns the part of an object to cache.
+        changed: called with the cached part of each object that changed.
+    """
+
+    def __init__(
+        self,
+        api: Api,
+        resource: Resource,
+        *,
+        namespaces: Sequence[str] = (),
+        labels: str | None = None,
+        keep: Keep,
+        changed: Changed,
+    ) -> None:
+        self.plural = resource.plural
+        self._reflectors = tuple(
+            Reflector(api, resource, namespace=namespace, labels=labels, keep=keep, changed=changed)
+            for namespace in namespaces or (None,)
+        )
+
+    @property
+    def synced(self) -> bool:
+        """Return whether a whole list of each namespace was read, at least once."""
+        return all(reflector.synced for reflector in self._reflectors)
+
+    def start(self) -> None:
+        """Start the watches; once."""
+        for reflector in self._reflectors:
+            reflector.start()
+
+    def stop(self, deadline_s: float) -> None:
+        """End the watches, and wait for them until `deadline_s`."""
+        for reflector in self._reflectors:
+            reflector.stop(0.0)
+        ends = time.monotonic() + deadline_s
+        for reflector in self._reflectors:
+            reflector.stop(max(0.0, ends - time.monotonic()))
+
+    def wait_synced(self, deadline_s: float) -> bool:
+        """Return whether everything was read once, `deadline_s` from now at the latest."""
+        ends = time.monotonic() + deadline_s
+        return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._reflectors)
+
+    def get(self, namespace: str, name: str) -> Object | None:
+        """Return an object, None if there is none."""
+        found = (reflector.store.get(namespace, name) for reflector in self._reflectors)
+        return next((obj for obj in found if obj is not None), None)
+
+    def holds(self, namespace: str, name: str) -> bool:
+        """Return whether there is such an object, without reading it."""
+        return any(reflector.store.holds(namespace, name) for reflector in self._reflectors)
+
+    def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
+        """Return the objects with these labels; namespace None: in all watched namespaces."""
+        return [obj for reflector in self._reflectors for obj in reflector.store.select(namespace, labels)]
+
+    def keys(self) -> set[Key]:
+        """Return namespace and name of all objects."""
+        return set().union(*(reflector.store.keys() for reflector in self._reflectors))

@@ -1,0 +1,91 @@
+"""The trainers to poll, updated by each event, so that no caller has to read all pods.
+
+Labels alone do not make a pod a trainer: its Job must be known, and be owned by the same TrainingJob. Only
+the address and the owners of a pod are kept.
+"""
+
+import ipaddress
+from dataclasses import dataclass
+
+from palaestra.objects import Key, Object
+from palaestra.observe.json_access import owners, part, parts, text
+from palaestra.operator.poll_schedule import PollTarget
+from palaestra.plan.layout import STATUS_PORT
+from palaestra.plan.replica import JOB_LABEL, TRAINER
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Job:
+    key: Key
+    uid: str
+    owners: frozenset[str]
+
+
+class PollTargets:
+    """The running trainers by the events of the caches; safe to read from any thread."""
+
+    def __init__(self) -> None:
+        self._training_jobs: dict[Key, str] = {}
+        self._jobs: dict[Key, _Job] = {}
+        self._pods: dict[Key, tuple[PollTarget, frozenset[str]]] = {}
+
+    def training_job(self, obj: Object, *, exists: bool) -> None:
+        """Record the newest state of a TrainingJob, or the last one of a deleted TrainingJob."""
+        name = _name(obj)
+        if exists:
+            self._training_jobs[name] = text(part(obj, "metadata"), "uid")
+        else:
+            self._training_jobs.pop(name, None)
+
+    def job(self, obj: Object, *, exists: bool) -> None:
+        """Record the newest state of a batch/v1 Job, or the last one of a deleted Job."""
+        name, uid = _name(obj), text(part(obj, "metadata"), "uid")
+        if exists:
+            self._jobs[name] = _Job(key=_key(obj), uid=uid, owners=owners(obj))
+        else:
+            self._jobs.pop(name, None)
+
+    def pod(self, obj: Object, *, exists: bool) -> None:
+        """Record the newest state of a pod, or the last one of a deleted pod."""
+        name, host = _name(obj), _address(obj)
+        if exists and host is not None and _trains(obj):
+            uid = text(part(obj, "metadata"), "uid")
+            self._pods[name] = PollTarget(key=_key(obj), uid=uid, host=host, port=STATUS_PORT), owners(obj)
+        else:
+            self._pods.pop(name, None)
+
+    def targets(self) -> list[PollTarget]:
+        """Return the trainers to poll."""
+        keys = {
+            job.uid: job.key
+            for job in tuple(self._jobs.values())
+            if self._training_jobs.get(job.key) in job.owners
+        }
+        pods = tuple(self._pods.values())
+        return [target for target, uids in pods if any(keys.get(uid) == target.key for uid in uids)]
+
+
+def _name(obj: Object) -> Key:
+    return obj["metadata"]["namespace"], obj["metadata"]["name"]
+
+
+def _key(obj: Object) -> Key:
+    """Return the key of the TrainingJob in a child's label."""
+    return obj["metadata"]["namespace"], obj["metadata"]["labels"][JOB_LABEL]
+
+
+def _trains(pod: Object) -> bool:
+    """Return whether the trainer's container runs."""
+    states = {
+        text(container, "name"): part(container, "state")
+        for container in parts(pod, "status", "containerStatuses")
+    }
+    return "running" in states.get(TRAINER, {}) and "deletionTimestamp" not in pod["metadata"]
+
+
+def _address(pod: Object) -> str | None:
+    """Return a pod's IP address; None: it has none. A name is not resolved."""
+    try:
+        return str(ipaddress.ip_address(text(part(pod, "status"), "podIP")))
+    except ValueError:
+        return None

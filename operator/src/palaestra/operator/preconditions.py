@@ -1,0 +1,79 @@
+"""Confirm by reads that the cluster is still as it was at the decision, because a cache may lag.
+
+If it has changed, the actions are not done, and the next reconcile decides again. A change between the read
+and the write fails on a precondition of the write: the uid and the resourceVersion of the object.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from palaestra.cluster import Api, NotFound
+from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS, resource_of
+from palaestra.decide import Action, Create, Replace, Stop
+from palaestra.errors import PalaestraError
+from palaestra.objects import Object
+from palaestra.observe.json_access import owners, part
+from palaestra.observe.pods import claims
+from palaestra.plan.replica import JOB_LABEL, REPLICA_LABEL, UID_LABEL
+
+
+class Outdated(PalaestraError):
+    """The cluster has changed since the decision, so the action was not done; reconcile again."""
+
+
+def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
+    """Check that the TrainingJob is unchanged, and before a Job is created or stopped its pods too.
+
+    So an ended replica is never trained again, and no replica has two pods. A replica that has started since
+    is not stopped, nor is its pod replaced, for a cause that has passed.
+
+    Raises:
+        Outdated: one of them has changed.
+    """
+    if not actions:
+        return
+    namespace, name = raw["metadata"]["namespace"], raw["metadata"]["name"]
+    try:
+        found = api.get(TRAINING_JOBS.only_metadata(), namespace, name)["metadata"]["resourceVersion"]
+    except NotFound:
+        found = None
+    if found != raw["metadata"]["resourceVersion"]:
+        raise Outdated(f"TrainingJob {name} is not as in the cache")
+    created = (
+        action for action in actions if isinstance(action, Create) and resource_of(action.object) == JOBS
+    )
+    begun = {str(creation.replica): creation.object for creation in created}
+    stops = [action for action in actions if isinstance(action, Stop | Replace)]
+    pods = api.list(PODS, namespace, labels=f"{JOB_LABEL}={name}") if begun or stops else []
+    for pod in pods:
+        if _occupies(pod, begun) or any(_is_news(pod, stop, raw) for stop in stops):
+            raise Outdated(f"pod {pod['metadata']['name']} is not as in the cache")
+    there = {pod["metadata"]["uid"] for pod in pods} if stops else set()
+    if any(uid not in there for stop in stops for uid, _ in stop.basis.pods):
+        raise Outdated(f"a pod of TrainingJob {name} is gone and still in the cache")
+
+
+def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
+    """Return whether a pod may still write to the volume of one of these Jobs, given by replica.
+
+    A pod of an earlier TrainingJob of the same name can do so only if both mount the same claim.
+    """
+    labels = pod["metadata"]["labels"]
+    job = jobs.get(labels.get(REPLICA_LABEL))
+    if job is None or (pod.get("status") or {}).get("phase") in {"Succeeded", "Failed"}:
+        return False
+    own = labels.get(UID_LABEL) == job["metadata"]["labels"][UID_LABEL]
+    return own or bool(claims(part(pod, "spec")) & claims(part(job, "spec", "template", "spec")))
+
+
+def _is_news(pod: Object, stop: Stop | Replace, raw: Object) -> bool:
+    """Return whether a pod of the replica to be stopped is new or has changed.
+
+    A pod whose labels were edited no longer belongs to the replica, as in `observe`. Otherwise it would
+    prevent the stop of the replica forever.
+    """
+    uid, known, labels = pod["metadata"]["uid"], dict(stop.basis.pods), pod["metadata"]["labels"]
+    if (labels.get(UID_LABEL), labels.get(REPLICA_LABEL)) != (raw["metadata"]["uid"], str(stop.replica)):
+        return False
+    if uid in known:
+        return known[uid] != str(pod["metadata"]["resourceVersion"])
+    return stop.basis.uid in owners(pod)

@@ -1,0 +1,96 @@
+"""The program that checks worlds: a process with a budget of time and memory, which it gives to itself.
+
+It writes a line when it is ready. A request is a line of JSON and then the bytes of a world; the answer is
+the verdict as a line of JSON. It writes no file, and ends with its parent. Only the operator runs it, as
+
+    python -m palaestra.operator.world_check_main PARENT SECONDS MEBIBYTES
+"""
+
+import ctypes
+import gc
+import json
+import os
+import resource
+import signal
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world import check
+
+MOST_CHARACTERS = 4096  # of the message of a refusal; a status shows fewer
+TOO_MUCH_MEMORY = "memory"
+_NICENESS = 5  # the operator itself comes first
+_PR_SET_PDEATHSIG = 1  # Source: linux/prctl.h
+_OOM_SCORE = Path("/proc/self/oom_score_adj")
+
+
+def main() -> None:
+    """Check worlds until the standard input ends."""
+    parent, seconds, mebibytes = map(int, sys.argv[1:])
+    _end_with(parent)
+    _limit(mebibytes)
+    gc.disable()  # a tree of nodes has no cycles, and a collection walks all of it
+    _write({})
+    for field, source in _requests():
+        _give_time(seconds)
+        _write(_verdict(field, source))
+
+
+def _write(answer: Mapping[str, str]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+def _requests() -> Iterator[tuple[str, bytes]]:
+    """Yield the field and the bytes of each world."""
+    for line in sys.stdin.buffer:
+        request = json.loads(line)
+        yield request["field"], sys.stdin.buffer.read(request["bytes"])
+
+
+def _verdict(field: str, source: bytes) -> dict[str, str]:
+    """Return the refusal of a world, or the exceeded budget; {}: the world is fine."""
+    try:
+        check(source, field)
+    except WorldError as error:
+        return {"problem": str(error)[:MOST_CHARACTERS]}
+    except MemoryError:
+        return {"exceeded": TOO_MUCH_MEMORY}
+    return {}
+
+
+def _end_with(parent: int) -> None:
+    """Have the kernel kill this process as soon as its parent ends."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != parent:  # it ended before
+        sys.exit(1)
+
+
+def _limit(mebibytes: int) -> None:
+    """Bound the memory, write no file and no core, and be the first to end if the container has none left."""
+    _bound(resource.RLIMIT_AS, mebibytes << 20)
+    _bound(resource.RLIMIT_CORE, 0)
+    _bound(resource.RLIMIT_FSIZE, 0)
+    os.nice(_NICENESS)
+    with suppress(OSError):  # other systems have no such file
+        _OOM_SCORE.write_text("1000")
+
+
+def _give_time(seconds: int) -> None:
+    """Bound the processor time from now on; the kernel ends the process with SIGXCPU."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    _bound(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + seconds)
+
+
+def _bound(kind: int, most: int) -> None:
+    """Set a limit of this process, unless the system already has a lower one."""
+    _, hard = resource.getrlimit(kind)
+    resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""Check worlds in a process of its own, with a budget for each world.
+
+A mistake in a check, such as one whose time grows with the square of a world's size, then costs the author's
+job, and not the operator that serves everybody.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import structlog
+
+from palaestra.plan import GivenWorld, WorldVerdict
+
+SECONDS = 20  # of processor time for a world; the costliest of 900 kB takes 2
+MEBIBYTES = 144  # of address space; the costliest of 900 kB takes 135, and two fit into the container
+DEADLINE_S = 300.0  # for all worlds of a job; passing it is the fault of a busy node, not of a world
+_CRASHES: Final = frozenset(  # 1: an exception, whose traceback is in the operator's log
+    (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
+)
+_PROGRAM = "palaestra.operator.world_check_main"
+_REMEDY = "make the world smaller, or put it into the image and name it with world.file"
+
+log = structlog.get_logger(__name__)
+
+
+class WorldCheckProcess:
+    """Runs the program that checks worlds, once for each call; calls may come from several threads.
+
+    Args:
+        seconds: of processor time for a world.
+        mebibytes: of memory for a world.
+        deadline_s: for a whole call.
+    """
+
+    def __init__(
+        self, *, seconds: int = SECONDS, mebibytes: int = MEBIBYTES, deadline_s: float = DEADLINE_S
+    ) -> None:
+        self._seconds = seconds
+        self._mebibytes = mebibytes
+        self._deadline_s = deadline_s
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._lock = threading.Lock()
+        self._stopped = False
+
+    def check(self, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
+        """Return the verdicts on worlds by digest; one that has none can be tried again."""
+        lines, code = self._answers(worlds)
+        ready, lines = bool(lines), lines[1:]
+        verdicts = {
+            world.digest: self._verdict(world, line) for world, line in zip(worlds, lines, strict=False)
+        }
+        if len(lines) < len(worlds):
+            world = worlds[len(lines)]
+            if (verdict := self._ended(world, code, ready=ready)) is not None:
+                verdicts[world.digest] = verdict
+        return verdicts
+
+    def stop(self) -> None:
+        """End all checks; later ones return no verdict."""
+        with self._lock:
+            self._stopped = True
+            for process in self._running:
+                process.kill()
+
+    def _answers(self, worlds: Sequence[GivenWorld]) -> tuple[list[bytes], int]:
+        """Return the lines that the program wrote, and its exit code."""
+        command = [sys.executable, "-I", "-m", _PROGRAM]
+        limits = [str(os.getpid()), str(self._seconds), str(self._mebibytes)]
+        with self._lock:
+            if self._stopped:
+                return [], -signal.SIGKILL
+            try:
+                process = subprocess.Popen([*command, *limits], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            except OSError as error:  # no memory or no process left
+                log.warning("no process for a check", error=str(error))
+                return [], -signal.SIGKILL
+            self._running.add(process)
+        with process:
+            try:
+                said, _ = process.communicate(_written(worlds), self._deadline_s)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                said, _ = process.communicate()
+        with self._lock:
+            self._running.discard(process)
+        return [line for line in said.splitlines(keepends=True) if line.endswith(b"\n")], process.returncode
+
+    def _verdict(self, world: GivenWorld, line: bytes) -> WorldVerdict:
+        answer = json.loads(line)
+        if "exceeded" in answer:
+            return self._too_costly(world, f"{self._mebibytes} MiB of memory")
+        return WorldVerdict(problem=answer.get("problem", ""))
+
+    def _ended(self, world: GivenWorld, code: int, *, ready: bool) -> WorldVerdict | None:
+        """Return the verdict on the world at which the program ended; None: another try may succeed."""
+        if code == -signal.SIGXCPU:
+            return self._too_costly(world, f"{self._seconds} s of processor time")
+        if ready and code in _CRASHES:
+            fact = f"the check crashes (exit code {code}); report this world"
+            return WorldVerdict(problem=f"{world.field}: {fact}")
+        if not self._stopped:
+            log.warning("world not checked", field=world.field, code=code)
+        return None
+
+    def _too_costly(self, world: GivenWorld, budget: str) -> WorldVerdict:
+        log.warning("world too costly", field=world.field, bytes=len(world.source), budget=budget)
+        fact = f"its check takes more than the {budget} that a world has"
+        return WorldVerdict(problem=f"{world.field}: {fact}; {_REMEDY}", too_costly=True)
+
+
+def _written(worlds: Sequence[GivenWorld]) -> bytes:
+    """Return the requests for worlds, as the program reads them."""
+    requests = ({"field": world.field, "bytes": len(world.source)} for world in worlds)
+    return b"".join(
+        json.dumps(request).encode() + b"\n" + world.source
+        for request, world in zip(requests, worlds, strict=True)
+    )

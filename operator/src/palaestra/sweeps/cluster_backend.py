@@ -1,0 +1,166 @@
+"""Trials in a cluster: TrainingJobs with a label in common, which the operator and a queue run.
+
+They need no command that runs. This one creates them, reads their status, and deletes those of pruned trials.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import TypeVar
+
+from palaestra.api import TrainingJob
+from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
+from palaestra.client import Client, ClientError, NoSuchJob
+from palaestra.client.wait_progress import current
+from palaestra.cluster.errors import Gone, ServerError, TooManyRequests, Unreachable
+from palaestra.errors import PalaestraError
+from palaestra.sweeps.model import LABEL
+from palaestra.sweeps.trial import Point, RunFigures, Trial, TrialFigures, TrialProgress
+
+LOOK_S = 5.0  # the operator writes a status every 30 s at most
+DELETED_S = 300.0
+AWAY = (Gone, ServerError, TooManyRequests, Unreachable)
+QUIET_LOOKS = 6  # looks in vain before a line says so: half a minute at least
+
+Answer = TypeVar("Answer")
+
+
+class NotOfThisSweep(ClientError):
+    """A job of a trial's name exists that is not of the sweep."""
+
+
+class ClusterBackend:
+    """The TrainingJobs of a sweep in a namespace.
+
+    Args:
+        client: of the cluster and namespace.
+        sweep: its name.
+        at_once: trials at the same time; None: all, and the queue decides.
+        report: is called with a line when the API server has been away for a while, and when it is back.
+        look_s: seconds between two looks.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        sweep: str,
+        at_once: int | None,
+        report: Callable[[str], object],
+        look_s: float = LOOK_S,
+    ) -> None:
+        self._client = client
+        self._selector = f"{LABEL}={sweep}"
+        self._at_once = at_once
+        self._report = report
+        self._look_s = look_s
+        self._answered = False
+        self._begun: set[int] = set()
+        self._jobs: Mapping[str, TrainingJob] = {}
+        self._curves: dict[tuple[int, int], tuple[Point, ...]] = {}
+
+    def check(self, job: TrainingJob) -> None:
+        """Check that the job of a trial is for the namespace.
+
+        Raises:
+            PalaestraError: it names another one.
+        """
+        named = job.metadata.namespace if "namespace" in job.metadata.model_fields_set else None
+        if named not in {None, self._client.namespace}:
+            raise PalaestraError(
+                f"metadata.namespace: is {named}, and the sweep is for {self._client.namespace}; "
+                "choose the namespace with -n"
+            )
+
+    def has_room(self) -> bool:
+        """Return whether another trial can begin."""
+        return self._at_once is None or len(self._begun) < self._at_once
+
+    def begin(self, trial: Trial) -> None:
+        """Create the job of a trial, unless it exists.
+
+        Raises:
+            NotOfThisSweep: a job of this name is not of the sweep.
+            ApiError: the API server refuses it, or gives no answer to the first request of this command.
+        """
+        self._answer_of(lambda: self._create(trial))
+        self._begun.add(trial.number)
+
+    def wait(self) -> None:
+        """Return after some seconds with the newest status of every job; ask a busy API server again."""
+        time.sleep(self._look_s)
+        jobs = self._answer_of(lambda: self._client.list(self._selector))
+        self._jobs = {job.metadata.name: job for job in jobs}
+
+    def look(self, trial: Trial) -> TrialFigures:
+        """Return the figures of a trial by the status of its job; a job that was deleted has failed."""
+        job = self._jobs.get(trial.name)
+        if job is None:
+            self._begun.discard(trial.number)
+            return TrialFigures(state=TrialProgress.FAILED)
+        runs = tuple(self._figures(trial, replica) for replica in job.status.replicas)
+        if not current(job) or job.status.phase not in TERMINAL:
+            return TrialFigures(state=TrialProgress.RUNNING, runs=runs)
+        self._begun.discard(trial.number)
+        done = job.status.phase is Phase.SUCCEEDED
+        return TrialFigures(state=TrialProgress.COMPLETE if done else TrialProgress.FAILED, runs=runs)
+
+    def prune(self, trial: Trial) -> None:
+        """Delete the job of a trial, if it exists, and wait until its pods are gone."""
+        self._begun.discard(trial.number)
+        self._answer_of(lambda: self._delete(trial))
+
+    def _create(self, trial: Trial) -> None:
+        with suppress(NoSuchJob):
+            found = self._client.get(trial.name)
+            if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
+                raise NotOfThisSweep(
+                    f"job {trial.name}: exists in namespace {self._client.namespace}, not of this sweep; "
+                    "give the sweep another name"
+                )
+        self._client.apply(trial.job)
+
+    def _delete(self, trial: Trial) -> None:
+        with suppress(NoSuchJob):
+            self._client.delete(trial.name, deadline_s=DELETED_S)
+
+    def _answer_of(self, ask: Callable[[], Answer]) -> Answer:
+        """Return the answer of the API server; once it has answered, ask again while it is away.
+
+        A server that has never answered may be the wrong one, so its first error is raised.
+        """
+        looks = 0
+        while True:
+            try:
+                answer = ask()
+                break
+            except AWAY as error:
+                if not self._answered:
+                    raise
+                looks += 1
+                if looks == QUIET_LOOKS:
+                    self._report(
+                        f"the API server has not answered for a while ({error}); "
+                        "the trials run on without this command, which asks again"
+                    )
+            time.sleep(self._look_s)
+        self._answered = True
+        if looks >= QUIET_LOOKS:
+            self._report("the API server answers again")
+        return answer
+
+    def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
+        """Return the figures of a replica; each change of them is a point of its curve."""
+        key = (trial.number, status.index)
+        curve = self._curves.get(key, ())
+        rate, mean = status.success_rate, status.mean_return
+        last = (curve[-1].success_rate, curve[-1].mean_return) if curve else (None, None)
+        if status.step is not None and (rate, mean) != last:
+            curve = (*curve, Point(step=status.step, success_rate=rate, mean_return=mean))
+            self._curves[key] = curve
+        return RunFigures(
+            curve=curve,
+            success_rate=rate,
+            ended=status.phase in TERMINAL,
+            succeeded=status.phase is Phase.SUCCEEDED,
+            reason=status.message or "",
+        )

@@ -1,0 +1,135 @@
+"""A search by Optuna: it suggests trials from the results of others, and prunes.
+
+The search is kept in a journal file, so the same command continues it. A trial that was running when the
+search was interrupted is suggested once more, under its old number, and its runs resume.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.storages import JournalStorage
+from optuna.storages.journal import JournalFileBackend
+from optuna.trial import TrialState
+
+from palaestra.sweeps import grid
+from palaestra.sweeps.model import Distribution, Optuna, Sweep
+from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
+
+JOURNAL = "optuna.journal"
+NUMBER = "trial"  # attribute of Optuna's trial: the number in the sweep, which a resumed trial keeps
+
+
+class OptunaSearch:
+    """The trials that Optuna suggests."""
+
+    def __init__(self, sweep: Sweep, folder: Path) -> None:
+        """Open the journal in the sweep's folder; begin it if there is none."""
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        self._sweep = sweep
+        self._space = {field: _space(values) for field, values in sweep.spec.random.items()}
+        self._study = _study(sweep, folder)
+        self._asked: dict[int, optuna.Trial] = {}
+        self._reported: dict[int, set[int]] = {}
+        self._known: dict[int, Trial] = {}
+        for old in self._study.get_trials(deepcopy=False):
+            self._know(old.user_attrs.get(NUMBER), _values(old))
+        self._suggest_again()
+
+    @property
+    def known(self) -> Sequence[Trial]:
+        """Return all trials that were suggested, in order."""
+        return [self._known[number] for number in sorted(self._known)]
+
+    @property
+    def left(self) -> int:
+        """Return the number of trials to suggest, with those to suggest once more."""
+        waits = self._study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
+        return len(waits) + max((self._sweep.spec.trials or 0) - len(self._known), 0)
+
+    def next(self) -> Trial | None:
+        """Return the next trial; None after as many as the sweep wants."""
+        if not self.left:
+            return None
+        asked = self._study.ask(self._space)
+        number = asked.user_attrs.get(NUMBER, len(self._known))
+        asked.set_user_attr(NUMBER, number)
+        self._asked[number] = asked
+        return self._know(number, asked.params)
+
+    def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
+        """Report the medians over the seeds so far; return whether Optuna prunes the trial."""
+        self._report(trial, figures)
+        return self._asked[trial.number].should_prune()
+
+    def learn(self, trial: Trial, figures: TrialFigures) -> None:
+        """Report the median result; a trial without one has failed."""
+        self._report(trial, figures)  # a short trial may have ended before it was looked at
+        asked, value = self._asked.pop(trial.number), figures.median(self._sweep.spec.objective)
+        if figures.state is TrialProgress.PRUNED:
+            self._study.tell(asked, state=TrialState.PRUNED)
+        elif figures.state is TrialProgress.COMPLETE and value is not None:
+            self._study.tell(asked, value)
+        else:
+            self._study.tell(asked, state=TrialState.FAIL)
+
+    def _suggest_again(self) -> None:
+        """Enqueue each trial that was running; one without a number was never begun, and is dropped."""
+        waits = self._study.get_trials(states=(TrialState.WAITING,))
+        enqueued = {old.user_attrs.get(NUMBER) for old in waits}
+        for running in self._study.get_trials(states=(TrialState.RUNNING,)):
+            # In this order, a kill between the two writes leaves both trials, and the next start ends one.
+            if running.user_attrs.get(NUMBER) not in {None, *enqueued}:
+                self._study.enqueue_trial(_values(running), user_attrs=running.user_attrs)
+            self._study.tell(running.number, state=TrialState.FAIL)
+
+    def _report(self, trial: Trial, figures: TrialFigures) -> None:
+        """Report the medians over the seeds that are new."""
+        asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
+        for step, value in figures.common(self._sweep.spec.objective).items():
+            if step not in reported:
+                asked.report(value, step)
+                reported.add(step)
+
+    def _know(self, number: int | None, values: Mapping[str, Any]) -> Trial | None:
+        """Return a trial by its number; None if it was interrupted before it had one."""
+        if number is None:
+            return None
+        self._known[number] = grid.trial(self._sweep, number, dict(values))
+        return self._known[number]
+
+
+def _study(sweep: Sweep, folder: Path) -> optuna.Study:
+    storage = JournalStorage(JournalFileBackend(str(folder / JOURNAL)))
+    wanted = sweep.spec.optuna or Optuna()
+    pruner: optuna.pruners.BasePruner = optuna.pruners.NopPruner()
+    if wanted.prune:
+        pruner = optuna.pruners.MedianPruner(
+            n_startup_trials=wanted.startup_trials, n_warmup_steps=wanted.warmup_steps
+        )
+    study = optuna.create_study(
+        study_name=sweep.metadata.name,
+        storage=storage,
+        direction="maximize",
+        pruner=pruner,
+        load_if_exists=True,
+    )
+    # A sampler with the same seed would suggest its first trials once more.
+    seed = sweep.spec.seed + len(study.get_trials(deepcopy=False))
+    study.sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=wanted.startup_trials)
+    return study
+
+
+def _values(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
+    """Return the values of a trial, with those that Optuna will use when an enqueued one begins."""
+    return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
+
+
+def _space(values: Distribution) -> BaseDistribution:
+    if values.choice is not None:
+        return CategoricalDistribution(values.choice)
+    if values.whole:
+        return IntDistribution(int(values.low or 0), int(values.high or 0), log=values.log)
+    return FloatDistribution(float(values.low or 0), float(values.high or 0), log=values.log)

@@ -1,0 +1,102 @@
+"""The loop of a sweep: begin trials where there is room, look at them, note those that have ended."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from palaestra.errors import PalaestraError
+from palaestra.sweeps import trial_log
+from palaestra.sweeps.model import Objective
+from palaestra.sweeps.search import Search
+from palaestra.sweeps.table import WORDS
+from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
+
+
+class TrialBackend(Protocol):
+    """Where trials run."""
+
+    def has_room(self) -> bool:
+        """Return whether another trial can begin."""
+        ...
+
+    def begin(self, trial: Trial) -> None:
+        """Begin a trial, or resume it."""
+        ...
+
+    def wait(self) -> None:
+        """Return when a trial may have changed."""
+        ...
+
+    def look(self, trial: Trial) -> TrialFigures:
+        """Return the figures of a trial that was begun."""
+        ...
+
+    def prune(self, trial: Trial) -> None:
+        """End a trial that is not worth going on."""
+        ...
+
+
+class NoSuccess(PalaestraError):
+    """A sweep compares success rates, and its environment reports no success."""
+
+
+def carry_out(
+    search: Search, place: TrialBackend, folder: Path, objective: Objective, report: Callable[[str], object]
+) -> None:
+    """Run trials until the search has no more.
+
+    Args:
+        search: chooses the trials.
+        place: runs them.
+        folder: that of the sweep; each trial that ends is noted there.
+        objective: the figure that is compared.
+        report: is called with a line for each trial that begins or ends.
+
+    Raises:
+        NoSuccess: a trial was evaluated, and has no success rate to compare.
+    """
+    active: dict[int, Trial] = {}
+    for figures in trial_log.ended(folder).values():
+        _refuse_without_success(figures, objective)
+    while True:
+        while place.has_room() and (trial := search.next()) is not None:
+            active[trial.number] = trial
+            report(f"{trial.name}: {_shown(trial)}")
+            place.begin(trial)
+        if not active and place.has_room():  # without room, a pruned trial is still ending
+            return
+        place.wait()
+        for trial in tuple(active.values()):
+            figures = place.look(trial)
+            if figures.state is TrialProgress.RUNNING and search.hopeless(trial, figures):
+                place.prune(trial)
+                figures = replace(figures, state=TrialProgress.PRUNED)
+            if figures.state is not TrialProgress.RUNNING:
+                trial_log.note(folder, trial.number, figures)
+                search.learn(trial, figures)
+                del active[trial.number]
+                report("; ".join(_ending(trial, figures, objective, search.left + len(active))))
+            _refuse_without_success(figures, objective)
+
+
+def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None:
+    """Return if the figures can be compared, or are still to come."""
+    if objective is Objective.SUCCESS_RATE and figures.lacks(objective):
+        raise NoSuccess(
+            "spec.objective: SuccessRate is compared, and the environment reports no success; write "
+            "objective: MeanReturn, or set is_success in the info of an episode's last step"
+        )
+
+
+def _ending(trial: Trial, figures: TrialFigures, objective: Objective, left: int) -> Iterator[str]:
+    """Yield the state of a trial, the reason or the result, and the number of trials to come."""
+    yield f"{trial.name}: {figures.state}"
+    yield from figures.reasons()
+    if (value := figures.median(objective)) is not None:
+        yield f"{WORDS[objective]} {value:.3g}"
+    yield f"{left} trial{'s' * (left != 1)} left"
+
+
+def _shown(trial: Trial) -> str:
+    return ", ".join(f"{field} = {value}" for field, value in trial.changes.items())

@@ -1,0 +1,62 @@
+"""The order of trials: which one comes next, and whether one is worth going on."""
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
+
+
+class Search(Protocol):
+    """Chooses trials, and learns from those that have ended."""
+
+    @property
+    def known(self) -> Sequence[Trial]:
+        """Return all trials that are known by now, in order."""
+        ...
+
+    @property
+    def left(self) -> int:
+        """Return the number of trials that `next` has not returned yet."""
+        ...
+
+    def next(self) -> Trial | None:
+        """Return the next trial; None if there is none, or none before another has ended."""
+        ...
+
+    def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
+        """Return whether a trial that runs should be pruned."""
+        ...
+
+    def learn(self, trial: Trial, figures: TrialFigures) -> None:
+        """Note the end of a trial."""
+        ...
+
+
+class InTurn:
+    """Every trial of a list, in order, without those that are complete."""
+
+    def __init__(self, trials: Iterable[Trial], ended: Mapping[int, TrialFigures]) -> None:
+        self.known: Sequence[Trial] = tuple(trials)
+        self._left: deque[Trial] = deque(
+            trial
+            for trial in self.known
+            if not (old := ended.get(trial.number)) or old.state is TrialProgress.FAILED
+        )
+
+    @property
+    def left(self) -> int:
+        """Return the number of trials that are not begun."""
+        return len(self._left)
+
+    def next(self) -> Trial | None:
+        """Return the next trial."""
+        return self._left.popleft() if self._left else None
+
+    def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
+        """Return False: each trial counts."""
+        del trial, figures
+        return False
+
+    def learn(self, trial: Trial, figures: TrialFigures) -> None:
+        """Return at once: the list stays as it is."""

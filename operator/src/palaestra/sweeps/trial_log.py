@@ -1,0 +1,92 @@
+"""The folder of a sweep: the Sweep that it was begun with, and the trials that have ended.
+
+<dir>/<sweep>/sweep.yaml        the Sweep, with its job
+<dir>/<sweep>/trials.jsonl      a line for each trial that has ended
+<dir>/<sweep>/optuna.journal    the search, if Optuna makes it
+<dir>/<sweep>/<sweep>-<n>/      on this machine: the runs of trial n, one folder a seed
+<dir>/<sweep>/table.txt, curves.png     the result
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from palaestra.local.errors import RunRefused
+from palaestra.local.files import storage, write
+from palaestra.sweeps.model import Sweep
+from palaestra.sweeps.trial import Point, RunFigures, TrialFigures, TrialProgress
+
+RECORD = "sweep.yaml"
+TRIALS = "trials.jsonl"
+MUTABLE = {"trials"}
+_COMPARING = {"objective"}  # trials.jsonl has both figures; a search by Optuna has learned from one of them
+
+
+def begin(folder: Path, sweep: Sweep) -> None:
+    """Write the Sweep into its folder; one that is there must be the same.
+
+    `trials` may differ, and `objective` too unless Optuna searches.
+
+    A line of `trials.jsonl` that a crash has cut is removed, so that the next one begins a line.
+
+    Raises:
+        Refused: the folder has another sweep.
+        StorageFailed: it cannot be written.
+    """
+    record = sweep.model_dump(mode="json", by_alias=True, exclude_none=True)
+    path = folder / RECORD
+    if path.exists():
+        before = yaml.safe_load(path.read_bytes())
+        mutable = MUTABLE if sweep.spec.optuna else MUTABLE | _COMPARING
+        if changes := [field for field in _fields(before, record) if field not in mutable]:
+            named = ", ".join(f"spec.{field}" for field in changes)
+            raise RunRefused(
+                f"{named}: not as when the sweep in {folder} was begun; "
+                "change it back, give the sweep another name, or choose another folder with --dir"
+            )
+    write(path, yaml.safe_dump(record, sort_keys=False).encode())
+    _remove_cut_line(folder / TRIALS)
+
+
+def ended(folder: Path) -> Mapping[int, TrialFigures]:
+    """Return the trials that have ended, by number; the last line about a trial counts."""
+    path = folder / TRIALS
+    if not path.exists():
+        return {}
+    *lines, _ = path.read_text().split("\n")
+    return {line["trial"]: _figures(line) for line in map(json.loads, lines)}
+
+
+def note(folder: Path, number: int, figures: TrialFigures) -> None:
+    """Append the end of a trial.
+
+    Raises:
+        StorageFailed: it cannot be written.
+    """
+    line = {"trial": number, **asdict(figures)}
+    with storage(folder / TRIALS), (folder / TRIALS).open("a") as file:
+        file.write(json.dumps(line) + "\n")
+
+
+def _remove_cut_line(path: Path) -> None:
+    if path.exists():
+        with storage(path), path.open("rb+") as file:
+            file.truncate(file.read().rfind(b"\n") + 1)
+
+
+def _fields(before: Any, now: Mapping[str, Any]) -> list[str]:
+    old = before.get("spec", {}) if isinstance(before, dict) else {}
+    new = now["spec"]
+    return [field for field in sorted(old.keys() | new.keys()) if old.get(field) != new.get(field)]
+
+
+def _figures(line: Mapping[str, Any]) -> TrialFigures:
+    runs = tuple(
+        RunFigures(**{**run, "curve": tuple(Point(**point) for point in run["curve"])})
+        for run in line["runs"]
+    )
+    return TrialFigures(state=TrialProgress(line["state"]), runs=runs)

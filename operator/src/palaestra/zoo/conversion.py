@@ -1,0 +1,93 @@
+"""One entry of a file of RL-Baselines3-Zoo as a TrainingJob."""
+
+import re
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from palaestra.api import API_VERSION, KIND, validate
+from palaestra.api.trainer import OWN_TASKS
+from palaestra.api.yaml_io import write
+from palaestra.zoo.draft import Draft
+from palaestra.zoo.hyperparameter_file import ZooError, algorithm_of, entry_of, read_file
+from palaestra.zoo.mapping import note_together, put
+
+_LONGEST_NAME = 48
+_OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has hyperparameters of its own for it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converted:
+    """A TrainingJob from an entry.
+
+    Attributes:
+        text: the job as YAML; its comments have the notes.
+        notes: one line for each thing that the job does not do exactly as Zoo.
+    """
+
+    text: str
+    notes: tuple[str, ...]
+
+
+def convert(text: str, name: str, *, env: str | None = None, algorithm: str | None = None) -> Converted:
+    """Return the TrainingJob of one entry.
+
+    Args:
+        text: the content of the file.
+        name: the path of the file, of which the last part names the algorithm.
+        env: id of the environment; None: the only one in the file.
+        algorithm: name of the algorithm; None: the file's.
+
+    Raises:
+        ZooError: the file has no such entry, or its algorithm is not usable here.
+        SpecErrors: a value of the entry is out of the bounds of a TrainingJob.
+    """
+    environment, entry, chosen = entry_of(read_file(text, name), name, env)
+    draft = Draft(
+        entry=entry, environment=environment, algorithm={"name": algorithm_of(algorithm, name, entry)}
+    )
+    if chosen != environment:
+        draft.note("--env", f"{name} does not name {environment}; as in Zoo, it gets the entry {chosen}")
+    for word, value in entry.items():
+        put(draft, word, value)
+    note_together(draft)
+    if draft.steps is None:
+        raise ZooError(f"{name}: the entry {chosen} has no n_timesteps; add it")
+    _note_the_environment(draft)
+    job = {
+        "apiVersion": API_VERSION,
+        "kind": KIND,
+        "metadata": {"name": _job_name(draft)},
+        "spec": draft.spec(),
+    }
+    validate(job, name)
+    return Converted(text=_commented(job, draft, name), notes=tuple(draft.notes))
+
+
+def _note_the_environment(draft: Draft) -> None:
+    if draft.environment == _OWN_DEFAULTS:
+        draft.note(
+            "defaults",
+            f"for {_OWN_DEFAULTS}, hyperparameters that the entry leaves out have defaults of Palaestra; "
+            "docs/trainingjob.md lists them, so write the values that you want",
+        )
+    elif draft.environment not in OWN_TASKS:
+        draft.note(
+            "environment",
+            f"{draft.environment} must accept robot or scene to use a simulator (docs/your-environment.md); "
+            "change environment.id, simulators[].world and trainer.robot to yours",
+        )
+
+
+def _job_name(draft: Draft) -> str:
+    """Return a DNS label of algorithm and environment."""
+    words = re.sub("[^a-z0-9]+", "-", f"{draft.name}-{draft.environment}".lower()).strip("-")
+    return words[:_LONGEST_NAME].strip("-")
+
+
+def _commented(job: dict[str, Any], draft: Draft, name: str) -> str:
+    file = ascii(PurePath(name).name).strip("'")
+    lines = [f"{draft.environment} of {file}, a file of RL-Baselines3-Zoo, by `palaestra from-zoo`."]
+    if draft.notes:
+        lines += ["What differs:", *(f"- {note}" for note in draft.notes)]
+    return "".join(f"# {line}\n" for line in lines) + write(job)

@@ -1,0 +1,78 @@
+"""The places of a server for connections: bounded in all and for one peer, and the newest gets one.
+
+A kubelet's probe sends its request as soon as it is connected. So a connection that is still waited for gives
+up its place to a new one, the oldest of its peer first, so that a peer with many starves only itself. A
+connection whose request is being answered keeps its place.
+"""
+
+import contextlib
+import socket
+import threading
+from dataclasses import dataclass
+
+MOST_CONNECTIONS = 32
+MOST_OF_PEER = 16
+
+
+@dataclass(slots=True)
+class _Place:
+    """The place of one connection: its peer's address, and whether its request is being answered."""
+
+    peer: str
+    answering: bool = False
+
+
+class ConnectionSlots:
+    """The connections that have a place; safe to use from several threads.
+
+    Args:
+        most: how many connections have a place.
+        most_of_peer: how many of them one peer may have.
+    """
+
+    def __init__(self, most: int = MOST_CONNECTIONS, most_of_peer: int = MOST_OF_PEER) -> None:
+        self._most = most
+        self._most_of_peer = most_of_peer
+        self._lock = threading.Lock()
+        self._taken: dict[socket.socket, _Place] = {}  # the oldest first
+
+    def take(self, connection: socket.socket, peer: str) -> bool:
+        """Give a new connection a place, and close another for it if need be; return whether it has one."""
+        with self._lock:
+            if (crowd := self._crowd(peer)) is not None:
+                idle = next((one for one in crowd if not self._taken[one].answering), None)
+                if idle is None:
+                    return False
+                self._drop(idle)
+            self._taken[connection] = _Place(peer)
+            return True
+
+    def answering(self, connection: socket.socket, *, now: bool) -> None:
+        """Note that the request of a connection is being answered, or no more."""
+        with self._lock:
+            if place := self._taken.get(connection):
+                place.answering = now
+
+    def leave(self, connection: socket.socket) -> None:
+        """Free the place of a connection, if it still has one."""
+        with self._lock:
+            self._taken.pop(connection, None)
+
+    def clear(self) -> None:
+        """Close every connection, also those whose request is being answered."""
+        with self._lock:
+            for connection in list(self._taken):
+                self._drop(connection)
+
+    def _crowd(self, peer: str) -> list[socket.socket] | None:
+        """Return the connections of which one has to go before `peer` gets a place; None: there is room."""
+        of_peer = [one for one, place in self._taken.items() if place.peer == peer]
+        if len(of_peer) >= self._most_of_peer:
+            return of_peer
+        return list(self._taken) if len(self._taken) >= self._most else None
+
+    def _drop(self, connection: socket.socket) -> None:
+        """Close a connection; the thread that waits for it ends."""
+        del self._taken[connection]
+        with contextlib.suppress(OSError):  # the peer has closed it
+            connection.shutdown(socket.SHUT_RDWR)

@@ -1,0 +1,146 @@
+"""The course of one life: it decides the fate of each request and message.
+
+Pure: it only counts, and knows no socket, process or clock. A fault that names a service and happens at a
+step or reset lasts from then on; so does a hang of a service.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from palaestra_sim.faults.kinds import (
+    RESET_PATHS,
+    STEP_PATH,
+    FaultEvent,
+    Hang,
+    InjectedFault,
+    Late,
+    Lost,
+    Slow,
+    SlowStart,
+    StartRefused,
+    WrongShape,
+    WrongValue,
+)
+from palaestra_sim.faults.schedule import FaultSchedule
+
+Damage = WrongValue | WrongShape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ruling:
+    """The fate of a request or a message.
+
+    Attributes:
+        lost: it is dropped.
+        delay_s: how long it waits.
+        damages: the faults of the answer, or of the message.
+        effects: what happens to the process first, in this order.
+    """
+
+    lost: bool = False
+    delay_s: float = 0.0
+    damages: tuple[Damage, ...] = ()
+    effects: tuple[InjectedFault, ...] = ()
+
+
+UNHARMED = Ruling()
+
+
+class FaultState:
+    """The counts of this life so far, and the rulings that follow from them."""
+
+    def __init__(self, schedule: FaultSchedule) -> None:
+        self._schedule = schedule
+        self._counts: Counter[FaultEvent] = Counter()
+        self._calls: Counter[InjectedFault] = Counter()
+        self._stepping: str | None = None
+        self._lasting: set[InjectedFault] = set()
+        self._messages: tuple[InjectedFault, ...] = ()
+
+    @property
+    def schedule(self) -> FaultSchedule:
+        """Return the faults with their times."""
+        return self._schedule
+
+    def start(self) -> tuple[StartRefused | None, float]:
+        """Return the fault that keeps the stub from starting, if any, and the delay of the start."""
+        number = self._schedule.life.number
+        found = self._schedule.at(FaultEvent.START, number)
+        refused = next((finding for finding in found if isinstance(finding, StartRefused)), None)
+        delays = (
+            self._schedule.delay_s(finding, number) for finding in found if isinstance(finding, SlowStart)
+        )
+        return refused, sum(delays)
+
+    def request(self, robot: str, path: str) -> Ruling:
+        """Return the ruling on a request to `path`, below the robot's name."""
+        delay_s, effects = 0.0, []
+        number, happening = self._count(robot, path)
+        for fault in happening:
+            if fault.service:
+                self._lasting.add(fault)
+            elif isinstance(fault, Slow):
+                delay_s += self._schedule.delay_s(fault, number)
+            elif not fault.topic:
+                effects.append(fault)
+        return self._with_service_faults(path, delay_s, tuple(effects))
+
+    def message(self, path: str) -> Ruling:
+        """Return the ruling on a message of the topic `path`; with a leading slash it belongs to no robot."""
+        number = self._counts[FaultEvent.STEP]
+        faults = [message for message in self._messages if _matches(path, message.topic)]
+        if not faults:
+            return UNHARMED
+        return Ruling(
+            lost=any(isinstance(fault, Lost) for fault in faults),
+            delay_s=sum(self._schedule.delay_s(fault, number) for fault in faults if isinstance(fault, Late)),
+            damages=tuple(fault for fault in faults if isinstance(fault, Damage)),
+        )
+
+    def closed(self, robot: str) -> None:
+        """Record that a robot's controller ended; then the steps of another robot count."""
+        if self._stepping == robot:
+            self._stepping = None
+
+    def _count(self, robot: str, path: str) -> tuple[int, tuple[InjectedFault, ...]]:
+        """Return the number of a step or reset that a request asks for, and the faults that happen at it."""
+        event = FaultEvent.RESET if path in RESET_PATHS else None
+        if path == STEP_PATH:
+            self._stepping = self._stepping or robot
+            event = FaultEvent.STEP if robot == self._stepping else None
+        if event is None:
+            return 0, ()
+        self._counts[event] += 1
+        number = self._counts[event]
+        happening = self._schedule.at(event, number)
+        if event is FaultEvent.STEP:
+            self._messages = tuple(it for it in happening if it.topic)
+        return number, happening
+
+    def _with_service_faults(self, path: str, delay_s: float, effects: tuple[InjectedFault, ...]) -> Ruling:
+        lost, damages = False, []
+        for fault in self._schedule.faults:
+            if fault.service and _matches(path, fault.service) and self._befalls(fault):
+                lost |= isinstance(fault, Hang)
+                if isinstance(fault, Slow):
+                    delay_s += self._schedule.delay_s(fault, self._calls[fault])
+                elif isinstance(fault, Damage):
+                    damages.append(fault)
+        return Ruling(lost=lost, delay_s=delay_s, damages=tuple(damages), effects=effects)
+
+    def _befalls(self, fault: InjectedFault) -> bool:
+        """Count a call of a service that `fault` names, and return whether it goes wrong."""
+        self._calls[fault] += 1
+        if fault.trigger.event is FaultEvent.CALL and self._schedule.happens(fault, self._calls[fault]):
+            if isinstance(fault, Hang):
+                self._lasting.add(fault)
+            return True
+        return fault in self._lasting
+
+
+def _matches(path: str, pattern: str) -> bool:
+    """Return whether a pattern with `*` matches a path; a global pattern matches only global paths."""
+    return path.startswith("/") == pattern.startswith("/") and fnmatchcase(path, pattern)

@@ -1,0 +1,203 @@
+"""A ROS node whose requests, answers and messages go through the course of faults.
+
+It is between the links and the node. After the header of a link, each message is forwarded, changed,
+delayed or dropped. The node below it is the same that runs without faults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from palaestra_protocol.ros.rostypes import Codec
+from palaestra_sim.faults.corruption import damaged_answer, damaged_message
+from palaestra_sim.faults.fault_state import Damage, FaultState, Ruling
+from palaestra_sim.faults.kinds import STEP_PATH
+from palaestra_sim.faults.process_faults import ProcessFaults
+from palaestra_sim.ros.links import Connection, Endpoint
+from palaestra_sim.ros.loop import Loop
+from palaestra_sim.ros.node import RosNode, ServiceEnd
+from palaestra_sim.ros.topics import PublishedTopic
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failing:
+    """The course and the effects that the nodes of one stub share."""
+
+    course: FaultState
+    effects: ProcessFaults
+
+
+class FaultyNode(RosNode):
+    """A RosNode with injected faults.
+
+    Args:
+        loop: watches its sockets.
+        name: the node's name and the prefix of its relative paths.
+        master_uri: the master.
+        failing: shared by all nodes of a stub.
+    """
+
+    def __init__(self, loop: Loop, name: str, master_uri: str, failing: Failing) -> None:
+        super().__init__(loop, name, master_uri)
+        self._failing = failing
+        self._held_steps = 0
+        self._master_lost = False
+
+    def lose_master(self) -> None:
+        """Keep the names registered at the master when this node is closed."""
+        self._master_lost = True
+
+    def close(self) -> None:
+        """Close like a RosNode, but unregister no names at a lost master."""
+        self._failing.course.closed(self.name)
+        if self._master_lost:
+            self.abandon()
+        else:
+            super().close()
+
+    def request(self, end: ServiceEnd, payload: bytes) -> None:
+        """Take a request; during a slow step it waits, as during any step."""
+        if self._held_steps:
+            self._waiting.append((end, payload))
+        else:
+            super().request(end, payload)
+
+    def take_waiting(self) -> None:
+        """Handle the waiting requests, unless a slow step is in progress."""
+        if not self._held_steps:
+            super().take_waiting()
+
+    def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
+        """Take a request from a link, and forward, delay or drop it by the ruling of the course."""
+        ruling = self._failing.course.request(self.name, path)
+        if not self._failing.effects.happen(ruling.effects) or ruling.lost:
+            return
+        answers.damages = ruling.damages
+        if ruling.delay_s > 0.0:
+            self._hold(path, ruling, answers, pass_on)
+        else:
+            pass_on()
+
+    def _hold(self, path: str, ruling: Ruling, answers: _Answers, pass_on: Callable[[], None]) -> None:
+        held = int(path == STEP_PATH)
+        self._held_steps += held
+
+        def release() -> None:
+            self._held_steps -= held
+            if not answers.closed:
+                pass_on()
+            self.later(0.0, self.take_waiting)
+
+        self.later(ruling.delay_s, release)
+
+    def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        if "service" in header:
+            return self._greet_faulty_client(link, header)
+        name = header.get("topic", "")
+        messages = _Messages(self, link, self._failing.course, self._path(name), self._topics.get(name))
+        return super()._greet(messages, header)
+
+    def _greet_faulty_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        name = header["service"]
+        known = self._services.get(name)
+        answers = _Answers(link, None if known is None else known[0].response)
+        return _Requests(self, self._path(name), answers, super()._greet(answers, header))
+
+    def _path(self, name: str) -> str:
+        """Return a name in the form that faults use: below the robot's, or with a leading slash."""
+        return name.removeprefix(f"/{self.name}/")
+
+
+class _Requests:
+    """Takes one client's requests to one service."""
+
+    def __init__(self, node: FaultyNode, path: str, answers: _Answers, endpoint: Endpoint) -> None:
+        self._node = node
+        self._path = path
+        self._answers = answers
+        self._endpoint = endpoint
+
+    def receive(self, payload: bytes) -> None:
+        self._node.receive(self._path, self._answers, lambda: self._endpoint.receive(payload))
+
+    def lost(self) -> None:
+        self._endpoint.lost()
+
+
+class _Answers:
+    """A client's link, on which the answer to the current request may be damaged.
+
+    Attributes:
+        link: the link itself.
+        damages: of the next answer.
+    """
+
+    def __init__(self, link: Connection, response: Codec | None) -> None:
+        self.link = link
+        self.damages: tuple[Damage, ...] = ()
+        self._response = response
+
+    @property
+    def closed(self) -> bool:
+        return self.link.closed
+
+    def send(self, data: bytes) -> None:
+        damages, self.damages = self.damages, ()
+        if damages and self._response is not None:
+            data = damaged_answer(self._response, data, damages)
+        self.link.send(data)
+
+    def send_newest(self, data: bytes) -> None:
+        self.link.send_newest(data)
+
+    def finish(self) -> None:
+        self.link.finish()
+
+    def close(self) -> None:
+        self.link.close()
+
+
+class _Messages:
+    """A subscriber's link, on which messages may be lost, late or damaged.
+
+    Attributes:
+        link: the link itself.
+    """
+
+    def __init__(
+        self, node: FaultyNode, link: Connection, course: FaultState, path: str, topic: PublishedTopic | None
+    ) -> None:
+        self.link = link
+        self._node = node
+        self._course = course
+        self._path = path
+        self._topic = topic
+
+    @property
+    def closed(self) -> bool:
+        return self.link.closed
+
+    def send(self, data: bytes) -> None:
+        self.link.send(data)
+
+    def send_newest(self, data: bytes) -> None:
+        ruling = self._course.message(self._path)
+        if ruling.lost:
+            return
+        if ruling.damages and self._topic is not None:
+            data = damaged_message(self._topic.type.name, data, ruling.damages, self._topic.reading)
+        if ruling.delay_s > 0.0:
+            self._node.later(ruling.delay_s, lambda: self._send_late(data))
+        else:
+            self.link.send_newest(data)
+
+    def finish(self) -> None:
+        self.link.finish()
+
+    def close(self) -> None:
+        self.link.close()
+
+    def _send_late(self, data: bytes) -> None:
+        if not self.closed:
+            self.link.send_newest(data)

@@ -1,0 +1,167 @@
+"""Find the services and topics of a world: its controllers start on nodes that only record, without sockets.
+
+So a fault that names a path that does not exist is refused before the start, instead of never happening.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from fnmatch import filter as matching
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from palaestra_sim.faults.fault_state import FaultState
+from palaestra_sim.faults.kinds import InjectedFault
+from palaestra_sim.faults.options import Ordered
+from palaestra_sim.faults.parser import FaultError
+from palaestra_sim.faults.schedule import FaultSchedule, Life
+from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
+from palaestra_sim.ros_interfaces import Fields, Handler
+
+_ENABLES = ("/enable", "/recognition_enable")
+_HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs from job to job
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownPaths:
+    """The services and topics of a world.
+
+    Attributes:
+        simulator: the name of its first robot, without the part that differs from job to job.
+        services: the type of each, by its path below the robot's name.
+        topics: in the same way, those of sensors only once they are enabled.
+    """
+
+    simulator: str
+    services: Mapping[str, str]
+    topics: Mapping[str, str]
+
+
+def survey(load: Load, world_path: Path) -> KnownPaths:
+    """Return the services and topics of the world in that file, loaded by `load`.
+
+    Raises:
+        WorldError: the file is wrong, or has something that cannot be simulated.
+        OSError: it cannot be read.
+    """
+    nodes: list[_Listener] = []
+
+    def make_node(name: str) -> _Listener:
+        nodes.append(_Listener(name))
+        return nodes[-1]
+
+    simulator = RunningSimulator(world_path, load, make_node)
+    simulator.start()
+    for node in nodes:
+        node.enable_all(simulator.simulation.basic_step_ms)
+    return KnownPaths(
+        simulator=_HASH.sub("", nodes[0].name) if nodes else "",
+        services={path: type_name for node in nodes for path, type_name in node.types.items()},
+        topics={path: type_name for node in nodes for path, type_name in node.topics.items()},
+    )
+
+
+def begin(ordered: Ordered, load: Load, world_path: Path) -> FaultState:
+    """Return the course of a life with the given faults, in the world that `load` loads.
+
+    Raises:
+        FaultError: a fault names a path that the world does not have.
+        WorldError: the world is wrong.
+        OSError: it cannot be read.
+    """
+    found = survey(load, world_path)
+    check(ordered.faults, found)
+    life = Life(seed=ordered.seed, simulator=found.simulator, number=ordered.life)
+    return FaultState(FaultSchedule(faults=ordered.faults, life=life))
+
+
+def check(faults: Iterable[InjectedFault], found: KnownPaths) -> None:
+    """Check that the paths of every fault exist.
+
+    Raises:
+        FaultError: the world has no such service or topic.
+    """
+    for fault in faults:
+        for what, path, known in (
+            ("service", fault.service, found.services),
+            ("topic", fault.topic, found.topics),
+        ):
+            if path and not matching(known, path):
+                near = difflib.get_close_matches(path, known, cutoff=0.4) or sorted(known)[:3]
+                fact = f"the world has no {what} {path}"
+                raise FaultError(f"fault {fault.text}: {fact}; name another, such as {', '.join(near)}")
+
+
+class _Silent:
+    """A publisher without subscribers."""
+
+    heard = False
+
+    def send(self, fields: Fields) -> None:
+        """Send it to nobody."""
+
+    def send_stamped(self, fields: Fields) -> None:
+        """Send it to nobody."""
+
+    def send_value(self, value: float) -> None:
+        """Send it to nobody."""
+
+
+class _Listener:
+    """A node that records its services and topics."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.blocked: Callable[[], bool] = lambda: False
+        self.current_call: object | None = None
+        self.services: dict[str, Handler] = {}
+        self.types: dict[str, str] = {}
+        self.topics: dict[str, str] = {}
+
+    def enable_all(self, period_ms: int) -> None:
+        """Enable every sensor, because only then its topic exists; a device that refuses has none."""
+        for path, handler in self.services.items():
+            if path.endswith(_ENABLES):
+                with contextlib.suppress(ServiceFailed):
+                    handler(SimpleNamespace(value=period_ms))
+
+    def serve(self, path: str, type_name: str, handler: Handler) -> None:
+        """Record a service."""
+        self.services[path] = handler
+        self.types[path] = type_name
+
+    def together(self) -> contextlib.AbstractContextManager[None]:
+        """Do nothing: nothing is registered."""
+        return contextlib.nullcontext()
+
+    def advertise(
+        self,
+        path: str,
+        type_name: str,
+        *,
+        latched: bool = False,
+        template: Fields | None = None,
+        reading: str = "",
+    ) -> _Silent:
+        """Record a topic."""
+        del latched, template, reading
+        self.topics[path] = type_name
+        return _Silent()
+
+    def withdraw(self, publisher: Any) -> None:
+        """Keep the topic in the record."""
+
+    def answer(self, call: Any, fields: Fields) -> None:
+        """Answer nobody."""
+
+    def later(self, delay_s: float, callback: Callable[[], None]) -> None:
+        """Never call back: nothing is stepped here."""
+
+    def close(self) -> None:
+        """Close nothing."""

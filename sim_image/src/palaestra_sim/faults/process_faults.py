@@ -1,0 +1,100 @@
+"""The effects of faults on the process: signals, memory, the end. Other modules decide when."""
+
+from __future__ import annotations
+
+import logging
+import resource
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from palaestra_sim.faults.kinds import (
+    Crash,
+    Exit,
+    Hang,
+    InjectedFault,
+    MasterLostFault,
+    MemoryGrowth,
+    NamesLost,
+)
+
+_MIB = 1024 * 1024
+
+log = logging.getLogger(__name__)
+
+
+class Endings(Protocol):
+    """The effects for which the whole process is needed."""
+
+    def end(self, status: int) -> None:
+        """Close everything and end with that exit code."""
+        ...
+
+    def lose_master(self) -> None:
+        """End as if the ROS master no longer answered."""
+        ...
+
+    def lose_names(self) -> None:
+        """Unregister every name at the master, and continue."""
+        ...
+
+
+class ProcessFaults:
+    """Applies faults to this process.
+
+    Args:
+        endings: of the process.
+    """
+
+    def __init__(self, endings: Endings) -> None:
+        self._endings = endings
+        self._kept: list[bytes] = []
+        self._kept_mib = 0.0
+        self._effects: Mapping[type[InjectedFault], Callable[[Any], bool]] = {
+            Crash: self._crash,
+            Exit: self._exit,
+            Hang: self._hang,
+            MasterLostFault: self._lose_master,
+            MemoryGrowth: self._grow,
+            NamesLost: self._lose_names,
+        }
+
+    def happen(self, faults: Sequence[InjectedFault]) -> bool:
+        """Apply the faults in their order; return whether the stub continues."""
+        for fault in faults:
+            if not isinstance(fault, MemoryGrowth):
+                log.warning("fault: %s", fault.text)
+            if not self._effects[type(fault)](fault):
+                return False
+        return True
+
+    def _crash(self, fault: Crash) -> bool:
+        # A core file in the work folder would only take space.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+        if fault.signal is not signal.SIGKILL:
+            signal.signal(fault.signal, signal.SIG_DFL)
+        signal.raise_signal(fault.signal)  # to this thread, so that nothing more is answered
+        return False
+
+    def _exit(self, fault: Exit) -> bool:
+        self._endings.end(fault.code)
+        return False
+
+    def _hang(self, _fault: Hang) -> bool:
+        signal.raise_signal(signal.SIGSTOP)
+        return True  # somebody sent SIGCONT
+
+    def _lose_master(self, _fault: MasterLostFault) -> bool:
+        self._endings.lose_master()
+        return False
+
+    def _lose_names(self, _fault: NamesLost) -> bool:
+        self._endings.lose_names()
+        return True
+
+    def _grow(self, fault: MemoryGrowth) -> bool:
+        if self._kept_mib + fault.mib <= fault.most_mib:
+            self._kept_mib += fault.mib
+            # Pages of zeros would be shared, and no memory taken.
+            self._kept.append(b"\1" * int(fault.mib * _MIB))
+        return True

@@ -1,0 +1,65 @@
+"""A camera in MuJoCo: see `Eye`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from palaestra_sim.mujoco.renderer import Renderer
+from palaestra_sim.scene.camera_interface import Corners, Lens
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+
+_BLACK: Final = bytes((0, 0, 0, 255))
+
+
+class MujocoCamera:
+    """A place and a lens, and the pictures of the world from there."""
+
+    def __init__(self, pictures: Renderer, place: Frame, lens: Lens) -> None:
+        self._pictures = pictures
+        self._place = place
+        self._lens = lens
+
+    def open(self) -> None:
+        """Get ready to draw."""
+        self._pictures.open()
+
+    def colors(self) -> memoryview:
+        """Return blue, green, red and alpha of each pixel."""
+        return self._pictures.colors(self._place, self._lens)
+
+    def depths(self, nearest_m: float, resolution_m: float) -> memoryview:
+        """Return the distance of each pixel."""
+        depths = self._pictures.depths(self._place, self._lens)
+        depths[depths < nearest_m] = math.inf
+        if resolution_m > 0.0:
+            depths = np.round(depths / np.float32(resolution_m)) * np.float32(resolution_m)
+        return memoryview(depths).cast("B")
+
+    def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
+        """Return where each owner is visible."""
+        numbers = self._pictures.segments(self._place, self._lens)
+        owners = [owner(thing.node) for thing in self._pictures.things]
+        known = list(dict.fromkeys(it for it in owners if it is not None))
+        # By the number of a thing, the number of its owner; the last one is for pixels without a thing.
+        table = np.array([*(-1 if it is None else known.index(it) for it in owners), -1])
+        of_owner = table[numbers]
+        return {known[at]: _corners(of_owner == at) for at in np.unique(of_owner).tolist() if at >= 0}
+
+    def painted(self, color: Callable[[SceneNode], bytes | None]) -> memoryview:
+        """Return a picture in which each shape has one color."""
+        numbers = self._pictures.segments(self._place, self._lens)
+        colors = [color(thing.node) or _BLACK for thing in self._pictures.things]
+        table = np.frombuffer(b"".join((*colors, _BLACK)), np.uint8).reshape(-1, len(_BLACK))
+        pixels: Any = table[numbers]
+        return memoryview(pixels).cast("B")
+
+
+def _corners(mask: Any) -> Corners:
+    """Return the rectangle around the pixels of a mask."""
+    rows, columns = np.nonzero(mask)
+    return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1

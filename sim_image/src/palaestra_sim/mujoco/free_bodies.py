@@ -1,0 +1,62 @@
+"""A loose thing in MuJoCo: a body on a free joint."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from palaestra_sim.scene.dynamic_solids import BodyState, DynamicFrame
+from palaestra_sim.scene.geometry import Pose, quaternion_to_matrix, to_quaternion
+
+_PLACE: Final = 7  # numbers of a free joint: a position, and a quaternion w, x, y, z
+_SPEED: Final = 6  # a velocity in world axes, and a turning in the body's
+
+
+class FreeBody:
+    """One loose thing of a model; its place follows it.
+
+    Attributes:
+        place: its frame in the scene.
+        number: of its body in the model.
+    """
+
+    def __init__(self, place: DynamicFrame, model: Any, data: Any, number: int) -> None:
+        self.place = place
+        self.number = number
+        joint = model.body_jntadr[number]
+        at, speed = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        self._where = data.qpos[at : at + _PLACE]
+        self._speed = data.qvel[speed : speed + _SPEED]
+
+    def begin(self, course: BodyState, changed: dict[DynamicFrame, None]) -> None:
+        """Begin at a place with a speed; what clients do to the place puts it among `changed`."""
+        self._write(course.pose)
+        self._move(course)
+        self.place.put = False
+        self.place.changed = changed
+        if self.place.speed is not None:
+            changed[self.place] = None
+        self.place.follow = self._course
+
+    def take(self) -> None:
+        """Take what clients did to it: put it somewhere, or pushed it."""
+        place = self.place
+        if place.put:
+            self._write(place.ground_pose)
+            place.put = False
+        if place.speed is not None:
+            self._move(BodyState(self._course().pose, *place.speed))
+            place.speed = None
+
+    def _course(self) -> BodyState:
+        x, y, z, qw, qx, qy, qz = self._where.tolist()
+        pose = Pose((x, y, z), quaternion_to_matrix((qx, qy, qz, qw)))
+        vx, vy, vz, *turning = self._speed.tolist()
+        return BodyState(pose, (vx, vy, vz), pose.turned((turning[0], turning[1], turning[2])))
+
+    def _write(self, pose: Pose) -> None:
+        x, y, z, w = to_quaternion(pose.rotation)
+        self._where[:] = (*pose.position, w, x, y, z)
+
+    def _move(self, course: BodyState) -> None:
+        """Write the speed of a course, whose turning is in world axes."""
+        self._speed[:] = (*course.velocity, *course.pose.inverse.turned(course.turning))

@@ -1,0 +1,86 @@
+"""Rays of MuJoCo that see shapes: the lidars of one robot, on the model that pictures are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.rays import bundles, origins_and_directions
+from palaestra_sim.mujoco.renderer import Renderer
+from palaestra_sim.mujoco.visual_model import PASSED, VisualModel
+from palaestra_sim.scene.physics import Figure
+from palaestra_sim.scene.sensor_rays import Beam
+
+_GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
+
+
+class LidarBeams:
+    """The beams of one robot; beams that begin at one point are cast together.
+
+    A beam passes its robot, and what contains its origin: from inside, a surface is not drawn either.
+    """
+
+    def __init__(self, pictures: Renderer, figure: Figure, beams: Sequence[Beam]) -> None:
+        self._pictures = pictures
+        self._figure = figure
+        self._reach = np.array([beam.reach_m for beam in beams])
+        self._origins, self._directions = origins_and_directions(beams)
+        self._bundles = bundles(self._origins)
+        self._own: tuple[VisualModel | None, Any] = (None, np.empty(0, int))
+
+    def cast(self) -> list[float]:
+        """Return how far each beam travels now, in meters; its full reach if it meets nothing."""
+        visible = self._pictures.placed()
+        pose = self._figure.place.world_pose
+        turned = np.array(pose.rotation).reshape(3, 3)
+        origins = self._origins @ turned.T + pose.position
+        directions = self._directions @ turned.T
+        distances = np.empty(len(self._reach))
+        passed = [self._own_geoms(visible)]
+        visible.model.geom_group[passed[0]] = PASSED
+        for first, end in self._bundles:
+            distances[first:end] = _cast(visible, origins[first], directions[first:end], passed)
+        visible.model.geom_group[np.concatenate(passed)] = 0
+        missed = (distances < 0.0) | (distances > self._reach)
+        travelled: list[float] = np.where(missed, self._reach, distances).tolist()
+        return travelled
+
+    def _own_geoms(self, visible: VisualModel) -> Any:
+        """Return the numbers of the geoms that the robot carries; they are looked up once for each model."""
+        if self._own[0] is not visible:
+            carrier = self._figure.place
+            places = [thing.place for thing in visible.things]
+            own = [at for at, place in enumerate(places) if place is not None and carrier in place.chain()]
+            self._own = (visible, np.array(own, dtype=int))
+        return self._own[1]
+
+
+def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any]) -> Any:
+    """Return the distances to what faces the beams; adds the geoms that contain the origin to `passed`."""
+    count = len(directions)
+    hits, distances, normals = np.empty(count, np.int32), np.empty(count), np.empty((count, 3))
+    while True:
+        mujoco.mj_multiRay(
+            visible.model,
+            visible.data,
+            origin,
+            directions.ravel(),
+            _GROUPS,
+            True,
+            -1,
+            hits,
+            distances,
+            normals.ravel(),
+            count,
+            mujoco.mjMAXVAL,
+        )
+        from_inside = (distances >= 0.0) & (np.sum(normals * directions, axis=1) > 0.0)
+        around = np.unique(hits[from_inside])
+        around = around[visible.model.geom_type[around] != mujoco.mjtGeom.mjGEOM_MESH.value]
+        if not len(around):
+            return distances
+        visible.model.geom_group[around] = PASSED
+        passed.append(around)

@@ -1,0 +1,146 @@
+"""Sensors and actuators of a model for which Webots has no device.
+
+They are devices too, below `mujoco/`, where no device of Webots has its name. A sensor publishes its numbers
+as MuJoCo has them; an actuator takes MuJoCo's control.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final, Never
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.ros_interfaces import Fields, Row
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
+
+FOLDER: Final = "mujoco/"  # of the names of such devices
+_BODY: Final = int(mujoco.mjtTrn.mjTRN_BODY)
+_MUSCLE: Final = int(mujoco.mjtGain.mjGAIN_MUSCLE)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class MujocoSensor:
+    """A sensor of several numbers; `value` has those of the last sample.
+
+    Attributes:
+        type_name: of the sensor in the model, such as framelinvel.
+        numbers: a view of its value in the model.
+    """
+
+    name: str
+    type_name: str
+    numbers: Any
+    model: str = ""
+    value: tuple[float, ...] = ()
+
+    def sample(self) -> None:
+        """Take the numbers of this moment."""
+        self.value = tuple(self.numbers.tolist())
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class MujocoActuator:
+    """An actuator that is no motor, such as a muscle or an adhesion.
+
+    Attributes:
+        controls: of all actuators of the model.
+        number: of this one among them.
+        low, high: the least and the greatest control; infinite if the model has no limits.
+    """
+
+    name: str
+    controls: Any
+    number: int
+    low: float = -math.inf
+    high: float = math.inf
+    model: str = ""
+    _wanted: float | None = field(default=None, init=False)
+
+    @property
+    def control(self) -> float:
+        """Its control, as the last command or else the model has it."""
+        return float(self.controls[self.number]) if self._wanted is None else self._wanted
+
+    def set_control(self, value: float) -> bool:
+        """Set the control from the next basic step on, within its limits; False if it is not finite."""
+        if not math.isfinite(value):
+            return False
+        self._wanted = max(self.low, min(self.high, value))
+        return True
+
+    def command(self) -> None:
+        """Write the control that a client has set into the model."""
+        if self._wanted is not None:
+            self.controls[self.number] = self._wanted
+
+    def reset(self) -> None:
+        """Return to the state of a new world, without a command."""
+        self._wanted = None
+
+
+def actuator_of(model: Any, data: Any, number: int, name: str) -> MujocoActuator:
+    """Return the device of an actuator that is no motor."""
+    low, high = -math.inf, math.inf
+    if model.actuator_ctrllimited[number]:
+        low, high = model.actuator_ctrlrange[number].tolist()
+    return MujocoActuator(name=name, controls=data.ctrl, number=number, low=low, high=high)
+
+
+def type_name_of(model: Any, number: int) -> str:
+    """Return the type of a sensor as a model has it, such as framelinvel."""
+    name: str = mujoco.mjtSensor(int(model.sensor_type[number])).name
+    return name.removeprefix("mjSENS_").lower()
+
+
+def actuator_type_of(model: Any, number: int) -> str:
+    """Return the type of an actuator that is no motor: adhesion, muscle or general."""
+    if model.actuator_trntype[number] == _BODY:
+        return "adhesion"
+    return "muscle" if model.actuator_gaintype[number] == _MUSCLE else "general"
+
+
+def _topics(sensor: MujocoSensor) -> tuple[DeviceTopic, ...]:
+    count = len(sensor.numbers)
+    layout = {"dim": [{"label": sensor.type_name, "size": count, "stride": count}]}
+    topic = DeviceTopic(
+        name="value",
+        type_name="std_msgs/Float64MultiArray",
+        source=sensor,
+        constants={"layout": layout},
+        reading="data",
+        stamped=False,
+    )
+    return (topic,)
+
+
+def _services(actuator: MujocoActuator) -> tuple[Row, ...]:
+    def set_control(request: Any) -> Fields:
+        return {"success": actuator.set_control(request.value)}
+
+    return (
+        ("set_control", "set_float", set_control),
+        ("get_control", "get_float", lambda _: {"value": actuator.control}),
+        ("get_min_control", "get_float", lambda _: {"value": actuator.low}),
+        ("get_max_control", "get_float", lambda _: {"value": actuator.high}),
+    )
+
+
+def _in_no_world(_part: DevicePart) -> Never:
+    raise TypeError("a world file of Webots has no such node")
+
+
+MUJOCO_SENSOR: Final = DeviceType(
+    node="MujocoSensor",
+    name="sensor",
+    fields="",
+    read=_in_no_world,
+    topics=_topics,
+)
+MUJOCO_ACTUATOR: Final = DeviceType(
+    node="MujocoActuator",
+    name="actuator",
+    fields="",
+    read=_in_no_world,
+    services=_services,
+)

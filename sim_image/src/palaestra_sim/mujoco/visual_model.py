@@ -1,0 +1,156 @@
+"""The model of what is visible: one geom for each shape, a camera, two lights, and the sky."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.scene.geometry import Vector, to_quaternion
+from palaestra_sim.scene.meshes import Mesh
+from palaestra_sim.scene.visuals import Drawn
+
+_GEOMS: Final = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "ball": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
+}
+# Neither shadows nor smoothed edges, and few corners: 10 times as fast without a graphics card.
+_QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks": 10, "numquads": 1}
+_AMBIENT: Final = 0.45
+_FROM_CAMERA: Final = 0.25
+_FROM_ABOVE: Final = 0.30
+SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, where z points up
+SKY: Final = 1  # the group of its geom, the last one of the model
+PASSED: Final = 2  # the group of what a lidar does not see, while it looks
+
+
+@dataclass(slots=True, eq=False)
+class VisualModel:
+    """A compiled model, and what is needed to draw it.
+
+    Attributes:
+        things: by the number of their geom; the last geom is the sky.
+        positions, rotations: of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
+        sun: the direction of its light.
+        scene, option, camera: of MuJoCo's visualizer.
+    """
+
+    things: tuple[Drawn, ...]
+    model: Any
+    data: Any
+    positions: Any
+    rotations: Any
+    sun: Vector
+    scene: Any
+    option: Any
+    camera: Any
+
+
+def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
+    """Return the model of these things.
+
+    Args:
+        things: all that is visible, but for the sky.
+        sky: its color, red, green and blue from 0 to 1.
+        sun: the direction of its light.
+    """
+    spec = mujoco.MjSpec()
+    for name, value in _QUALITY.items():
+        setattr(spec.visual.quality, name, value)
+    _light(spec, sun)
+    spec.worldbody.add_camera(name="eye")
+    meshes: dict[tuple[Mesh, Vector], str] = {}
+    for thing in things:
+        _add(spec, thing, meshes)
+    _hang_sky(spec)
+    spec.stat.extent = 1.0  # the ends of the frustum are multiples of it
+    model = spec.compile()
+    model.stat.extent = 1.0
+    model.geom_rgba[-1] = (*sky, 1.0)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_camlight(model, data)
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FIXED.value
+    camera.fixedcamid = 0
+    return VisualModel(
+        things=tuple(things),
+        model=model,
+        data=data,
+        positions=data.geom_xpos.copy(),
+        rotations=data.geom_xmat.reshape(-1, 3, 3).copy(),
+        sun=sun,
+        scene=mujoco.MjvScene(model, maxgeom=len(things) + 8),
+        option=mujoco.MjvOption(),
+        camera=camera,
+    )
+
+
+def _light(spec: Any, sun: Vector) -> None:
+    headlight = spec.visual.headlight
+    headlight.ambient = [_AMBIENT] * 3
+    headlight.diffuse = [_FROM_CAMERA] * 3
+    headlight.specular = [0.0] * 3
+    light = spec.worldbody.add_light(dir=sun, diffuse=[_FROM_ABOVE] * 3, specular=[0.0] * 3, castshadow=False)
+    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+
+
+def _hang_sky(spec: Any) -> None:
+    """Add the sky, a board behind everything: MuJoCo's own costs more time than all the rest."""
+    material = spec.add_material(name="sky")
+    material.emission = 0.5  # replaced before each picture
+    spec.worldbody.add_geom(
+        name="sky",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[1.0, 1.0, 1.0],
+        material="sky",
+        group=SKY,
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def glow(forward: Sequence[float], sun: Vector) -> float:
+    """Return the emission with which the sky has its own color, if a camera looks `forward`."""
+    from_above = max(0.0, sum(a * b for a, b in zip(forward, sun, strict=True)))
+    return 1.0 - _AMBIENT - _FROM_CAMERA - _FROM_ABOVE * from_above
+
+
+def _add(spec: Any, thing: Drawn, meshes: dict[tuple[Mesh, Vector], str]) -> None:
+    x, y, z = (length / 2.0 for length in thing.size)
+    kind = _GEOMS[thing.kind]
+    shape: dict[str, Any] = {"size": [x, y, z]}
+    if thing.kind in {"cylinder", "capsule"}:
+        shape["size"] = [x, z if thing.kind == "cylinder" else max(z - x, 1e-6), 0.0]
+    elif thing.mesh is not None:
+        shape = {"meshname": _mesh(spec, thing.mesh, thing.size, meshes)}
+    qx, qy, qz, qw = to_quaternion(thing.local.rotation)
+    spec.worldbody.add_geom(
+        type=kind,
+        pos=thing.local.position,
+        quat=[qw, qx, qy, qz],
+        rgba=thing.color,
+        contype=0,
+        conaffinity=0,
+        **shape,
+    )
+
+
+def _mesh(spec: Any, mesh: Mesh, scale: Vector, meshes: dict[tuple[Mesh, Vector], str]) -> str:
+    name = meshes.get((mesh, scale))
+    if name is None:
+        name = meshes[mesh, scale] = f"mesh {len(meshes)}"
+        spec.add_mesh(
+            name=name,
+            scale=scale,
+            uservert=np.ravel(mesh.points),
+            userface=np.ravel(mesh.triangles),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+    return name

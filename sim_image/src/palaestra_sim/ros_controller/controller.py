@@ -1,0 +1,236 @@
+"""The `ros` controller of one robot: its services, its steps, and what it publishes after them.
+
+The real controller's main loop is a thread that polls; this one is a few rules:
+
+- `time_step` is refused unless it is 0 or a positive multiple of the basic step. While it is pending, the
+  robot is `blocked`: Webots holds a mutex that every other service needs.
+- Messages come after the answer, once a step, for every enabled sensor that is due: (count * step) % period
+  is 0. They go to the subscribers that are connected at that moment.
+- The count goes up before the step is made, and the step of the last accepted call counts. Elapsed time is a
+  product, not a sum, so changing the step disturbs the phase of longer periods.
+
+With `lost_wakeup`, a step that is requested while the loop still handles the one before is made and answered,
+but its messages never come. Without it, the messages of the one before go out first.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from palaestra_sim.ros.node import LATER
+from palaestra_sim.ros_controller.backend import Backend
+from palaestra_sim.ros_controller.handles import Handles
+from palaestra_sim.ros_controller.host import Host
+from palaestra_sim.ros_controller.inputs import inputs
+from palaestra_sim.ros_controller.services.devices import (
+    Outlet,
+    device_services,
+    services_below,
+    stream_outlet,
+)
+from palaestra_sim.ros_controller.services.logs import NodeLog
+from palaestra_sim.ros_controller.services.robot import RobotServices
+from palaestra_sim.ros_controller.services.scene_fields import FieldServices
+from palaestra_sim.ros_controller.services.scene_nodes import NodeServices
+from palaestra_sim.ros_controller.services.supervisor import SupervisorServices
+from palaestra_sim.ros_interfaces import (
+    NodeInterface,
+    PublisherInterface,
+    Service,
+    UnsimulatedError,
+    topic_name,
+)
+from palaestra_sim.scene.arguments import ControllerArguments
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.stepping import Stepping
+
+_MODEL_NAME = "/model_name"
+_CLOCK = "/clock"
+
+
+class RosController:
+    """The controller of one robot, from `start` to `close`.
+
+    Attributes:
+        blocked: whether a step is pending, so that all other requests have to wait.
+    """
+
+    def __init__(
+        self, host: Host, stepping: Stepping, handles: Handles, robot: Robot, node: NodeInterface
+    ) -> None:
+        self._host = host
+        self.simulation: Backend = handles.simulation
+        self._handles = handles
+        self.robot = robot
+        self.node = node
+        self.blocked = False
+        self._arguments: ControllerArguments = host.arguments(robot)
+        self._options = host.options
+        self._host_clock = host.clock
+        self._stepping = stepping
+        self._outlets = {
+            name: Outlet(
+                node,
+                name,
+                topics,
+                kind.accepts(device),
+                partial(kind.enabled, device),
+                kind.sensor and f"{kind.sensor}/",
+            )
+            for name, (kind, device) in robot.parts.devices.rows.items()
+            if (topics := kind.topics(device))
+        }
+        self._streams = tuple(
+            stream_outlet(node, name, stream)
+            for name, (kind, device) in robot.parts.devices.rows.items()
+            for stream in kind.streams(device)
+        )
+        self._inputs = {it: Outlet(node, it.name, it.topics, it.enable) for it in inputs(robot)}
+        outlets = (*self._outlets.values(), *self._streams, *self._inputs.values())
+        self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
+        self._log = NodeLog(node)
+        self._clock: PublisherInterface | None = None
+        self._basic_ms = self.simulation.basic_step_ms
+        self._step_ms = self._basic_ms  # of the last accepted time_step
+        self._count = 0
+        self._call: object | None = None
+        self._answer: Any = None
+        self._asking = False  # the request for the step is still being handled
+        self._heard = True  # the main loop saw the last step
+        self._publish_due = False
+        self._published_s = -math.inf
+        self._paced_until_s = -math.inf
+        self._asked_ms = 0
+        self._closed = False
+
+    def start(self) -> None:
+        """Advertise everything, `robot/get_device_list` last."""
+        self.node.blocked = lambda: self.blocked
+        with self.node.together():
+            self._advertise()
+        if self.robot.parts.node.flag("synchronization", True):
+            self._stepping.join(self.robot)
+
+    def _advertise(self) -> None:
+        node = self.node
+        self._log.open()
+        self._serve(*self._log.table())
+        model_name = node.advertise(_MODEL_NAME, "std_msgs/String", latched=True)
+        model_name.send({"data": node.name})
+        if self._arguments.clock:
+            self._clock = node.advertise(_CLOCK, "rosgraph_msgs/Clock")
+        services = RobotServices(self._host, self.simulation, self.robot)
+        self._serve(Service("robot/time_step", "webots_ros/set_int", self._time_step))
+        self._serve(*services.table())
+        if self.robot.parts.node.flag("supervisor", False):
+            self._serve(*SupervisorServices(self._host, self._handles, self.robot).table())
+            self._serve(*NodeServices(self._host, self._handles).table())
+            self._serve(*FieldServices(self._handles).table())
+        self._serve_devices()
+        if self._arguments.auto_publish:
+            self._enable_all()
+        self._serve(services.device_list())
+
+    def close(self) -> None:
+        """End: no step waits for this robot any more, and its services and topics are gone."""
+        self._closed = True
+        self._publish_due = False
+        self._stepping.leave(self.robot)
+        self.node.close()
+
+    def publish(self) -> None:
+        """Send the messages of the last step, if they were not sent yet."""
+        if not self._publish_due:
+            return
+        self._publish_due = False
+        if self._clock is not None:
+            seconds, rest_ms = divmod(self.simulation.time_ms, 1000)
+            self._clock.send({"clock": {"secs": seconds, "nsecs": rest_ms * 1_000_000}})
+        elapsed_ms = self._count * self._step_ms
+        for feed in self._feeds:
+            if feed.publishers:
+                feed.publish(elapsed_ms)
+        if self._options.lost_wakeup:
+            self._published_s = self._host_clock()
+
+    def _enable_all(self) -> None:
+        """Enable every device that can be; log why another one cannot."""
+        for name, outlet in self._outlets.items():
+            try:
+                outlet.enable(self._basic_ms, self._basic_ms)
+            except UnsimulatedError as error:
+                self._log.error(f"{topic_name(name)}/enable: {error}")
+
+    def _serve(self, *services: Service) -> None:
+        for path, type_name, handler in services:
+            self.node.serve(path, type_name, self._log.reporting(path, handler))
+
+    def _serve_devices(self) -> None:
+        for name, (kind, device) in self.robot.parts.devices.rows.items():
+            self._serve(*device_services(kind, device, self.robot.parts.devices.shafts.get(name)))
+            if name in self._outlets:
+                self._serve_outlet(self._outlets[name])
+        for outlet in self._streams:
+            self._serve_outlet(outlet)
+        for it, outlet in self._inputs.items():
+            self._serve_outlet(outlet)
+            self._serve(*services_below(it.name, it.rows))
+            self._serve(*services_below(f"palaestra/{it.name}", it.own_rows))
+
+    def _serve_outlet(self, outlet: Outlet) -> None:
+        self._serve(*outlet.services(lambda: self._step_ms))
+
+    def _time_step(self, request: Any) -> Any:
+        step_ms = request.value
+        if step_ms < 0 or step_ms % self._basic_ms:
+            return {"success": False}
+        self._heard = self._loop_hears()
+        self._count = self._count + 1 if step_ms else 0
+        self._call = self.node.current_call
+        self._answer = LATER
+        self.blocked = self._asking = True
+        self._asked_ms = step_ms or self._basic_ms
+        self._stepping.ask(self.robot, self._asked_ms, self._stepped)
+        self._step_ms = step_ms or self._step_ms
+        self._asking = False
+        return self._answer
+
+    def _loop_hears(self) -> bool:
+        """Return whether the main loop will see that the count went up; it may be too busy."""
+        if not self._options.lost_wakeup:
+            self.publish()
+            return True
+        busy = self._host_clock() - self._published_s < self._options.publish_delay_s
+        return not (self._publish_due or busy)
+
+    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
+        """Handle the end of a step: answer now, or after the real time that the step has to take."""
+        delay_s = self._delay_s() if done else 0.0
+        if delay_s > 0.0:
+            self.node.later(delay_s, lambda: self._finish(done))
+        else:
+            self._finish(done)
+
+    def _finish(self, done: bool) -> None:  # noqa: FBT001 - passed on
+        self.blocked = False
+        self._publish_due = self._publish_due or (done and self._heard)
+        if self._publish_due:
+            self.node.later(self._options.publish_delay_s, self.publish)
+        if self._asking:
+            self._answer = {"success": done}
+        elif not self._closed:
+            self.node.answer(self._call, {"success": done})
+
+    def _delay_s(self) -> float:
+        """Return the rest of the real time that the step has to take."""
+        delay_s = self._options.step_sleep_s
+        if self.simulation.mode is Mode.REAL_TIME:
+            now_s = self._host_clock()
+            # After a pause of the client, only one basic step is made up, not all that it missed.
+            owed_s = now_s - self._basic_ms / 1000.0
+            self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
+            delay_s = max(delay_s, self._paced_until_s - now_s)
+        return delay_s

@@ -1,0 +1,79 @@
+"""The handles of nodes and fields that clients of a supervisor hold.
+
+Handles are numbers that look like the addresses of Webots. They are valid for one load of a world; a service
+refuses a handle of another load. (In Webots such a handle is a dangling pointer: the controller may crash.
+Never keep one.)
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.ros_controller.backend import Backend
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.tree.fields import NodeField
+
+_FIRST_ADDRESS: Final = 0x5580_0000_0000  # where Linux puts the heap of a position-independent program
+_LOAD_SPACING: Final = 0x0001_0000_0000
+_SPACING: Final = 0x90
+
+
+class NoSuchHandleError(SimError, LookupError):
+    """This load of the world never returned that handle; Webots would crash or worse."""
+
+
+class Handles:
+    """The handles of one load of a world.
+
+    Args:
+        simulation: of that world.
+        load: how many worlds were loaded before: makes handles of different loads different.
+    """
+
+    def __init__(self, simulation: Backend, load: int = 0) -> None:
+        self.simulation = simulation
+        self.tree = simulation.tree
+        self._next = _FIRST_ADDRESS + (load + 1) * _LOAD_SPACING
+        self._held: dict[int, SceneNode | NodeField] = {}
+        self._handles: dict[SceneNode | NodeField, int] = {}
+
+    def of(self, held: SceneNode | NodeField | None) -> int:
+        """Return the handle of a node or field; 0 for None."""
+        if held is None:
+            return 0
+        handle = self._handles.get(held)
+        if handle is None:
+            handle = self._handles[held] = self._next
+            self._held[handle] = held
+            self._next += _SPACING
+        return handle
+
+    def node(self, handle: int) -> SceneNode:
+        """Return the node of a handle.
+
+        Raises:
+            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a node.
+        """
+        held = self._held.get(handle)
+        if not isinstance(held, SceneNode) or self._is_gone(held):
+            raise NoSuchHandleError(f"node {handle:#x} does not exist; get a new handle")
+        return held
+
+    def field(self, handle: int) -> NodeField:
+        """Return the field of a handle.
+
+        Raises:
+            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a field.
+        """
+        held = self._held.get(handle)
+        if not isinstance(held, NodeField) or self._is_gone(held.node):
+            raise NoSuchHandleError(f"field {handle:#x} does not exist; get a new handle")
+        return held
+
+    def _is_gone(self, node: SceneNode) -> bool:
+        return self.tree.of_number(node.number) is not node
+
+    def field_of(self, node: SceneNode, name: str) -> NodeField | None:
+        """Return a node's field; None if a node of this type has none of that name."""
+        return self.tree.field_of(node, name, self.simulation)

@@ -1,0 +1,177 @@
+"""Battery, keyboard and joystick: what every robot has in its controller and none in the world.
+
+Nobody sits at a simulator in a pod, so clients press the keys: the services below `palaestra/` are ours, and
+Webots has none of them. They belong to the front, so they work with every simulator behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+from palaestra_sim.ros_interfaces import Fields, Handler, Row
+from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_steps
+from palaestra_sim.scene.robot import Robot
+
+_MOST_KEYS: Final = 7  # that Webots reports at once
+_AXES: Final = 6  # of the joystick that our services plug in, a gamepad with two sticks and two triggers
+_POVS: Final = 1
+_BYTE: Final = (-128, 127)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Input:
+    """A pseudo device, as a row of the table of devices has it.
+
+    Attributes:
+        rows: services beside `enable` and `get_sampling_period`, below its name.
+        own_rows: services that Webots does not have, below `palaestra/` and its name.
+    """
+
+    name: str
+    topics: tuple[DeviceTopic, ...] = ()
+    enable: Enable = whole_steps
+    rows: tuple[Row, ...] = ()
+    own_rows: tuple[Row, ...] = ()
+
+
+def inputs(robot: Robot) -> tuple[Input, ...]:
+    """Return the pseudo devices of a robot."""
+    battery = DeviceTopic(name="value", type_name="webots_ros/Float64Stamped", source=robot.battery)
+    return Input(name="battery_sensor", topics=(battery,)), _keyboard(), _joystick()
+
+
+@dataclass(slots=True, eq=False)
+class _Pressed:
+    """The keys or buttons that are pressed, in the order in which they went down."""
+
+    most: int
+    value: list[int] = field(default_factory=list)
+
+    def press(self, key: int) -> bool:
+        """Press a key; return False if it is none, or too many are pressed."""
+        if key in self.value:
+            return True
+        if key < 0 or len(self.value) >= self.most:
+            return False
+        self.value.append(key)
+        return True
+
+    def release(self, key: int) -> bool:
+        """Release a key, -1 for all; return False if it is not pressed."""
+        if key == -1:
+            self.value.clear()
+            return True
+        if key not in self.value:
+            return False
+        self.value.remove(key)
+        return True
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return the services that press and release."""
+        return (
+            ("press", "set_int", lambda request: {"success": self.press(request.value)}),
+            ("release", "set_int", lambda request: {"success": self.release(request.value)}),
+        )
+
+
+def _keyboard() -> Input:
+    keys = _Pressed(_MOST_KEYS)
+    key = DeviceTopic(name="key", type_name="webots_ros/Int32Stamped", source=keys, many=True)
+    return Input(name="keyboard", topics=(key,), own_rows=keys.rows())
+
+
+@dataclass(slots=True, eq=False)
+class _Joystick:
+    """A gamepad, connected by the first service of ours that is called."""
+
+    buttons: _Pressed = field(default_factory=lambda: _Pressed(_BYTE[1]))
+    axes: list[int] = field(default_factory=lambda: [0] * _AXES)
+    povs: list[int] = field(default_factory=lambda: [0] * _POVS)
+    connected: bool = False
+
+    def count(self, parts: Sequence[int]) -> int:
+        """Return how many it has; -1, as libController, while nothing is connected."""
+        return len(parts) if self.connected else -1
+
+    def turn(self, parts: list[int], values: Sequence[float]) -> bool:
+        """Set axes or points of view, from the first on; return False if that is impossible."""
+        low, high = _BYTE
+        if len(values) > len(parts) or not all(low <= value <= high for value in values):
+            return False
+        parts[: len(values)] = [int(value) for value in values]
+        return True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """One axis or point of view; its value is a list of one, or empty while nothing is connected."""
+
+    joystick: _Joystick
+    parts: list[int]
+    index: int
+
+    @property
+    def value(self) -> list[int]:
+        return [self.parts[self.index]] if self.joystick.connected else []
+
+
+def _joystick() -> Input:
+    joystick = _Joystick()
+    topic = partial(DeviceTopic, type_name="webots_ros/Int8Stamped", many=True)
+    return Input(
+        name="joystick",
+        topics=(
+            topic(name="pressed_button", source=joystick.buttons),
+            *(topic(name=f"axis{i}", source=_Part(joystick, joystick.axes, i)) for i in range(_AXES)),
+            *(topic(name=f"pov{i}", source=_Part(joystick, joystick.povs, i)) for i in range(_POVS)),
+        ),
+        rows=(*_joystick_answers(joystick), *_force_feedback()),
+        own_rows=tuple(_connecting(joystick, row) for row in _joystick_moves(joystick)),
+    )
+
+
+def _joystick_answers(joystick: _Joystick) -> tuple[Row, ...]:
+    return (
+        ("get_model", "get_string", lambda _: {"value": "palaestra" if joystick.connected else ""}),
+        ("get_number_of_axes", "get_int", lambda _: {"value": joystick.count(joystick.axes)}),
+        ("get_number_of_povs", "get_int", lambda _: {"value": joystick.count(joystick.povs)}),
+        ("is_connected", "get_bool", lambda _: {"value": joystick.connected}),
+    )
+
+
+def _force_feedback() -> tuple[Row, ...]:
+    """Return the services for forces, which answer success for any joystick, as the controller does."""
+    types = {
+        "set_constant_force": "set_int",
+        "set_constant_force_duration": "set_float",
+        "set_auto_centering_gain": "set_float",
+        "set_resistance_gain": "set_float",
+        "set_force_axis": "set_int",
+    }
+    return tuple((name, type_name, lambda _: {"success": True}) for name, type_name in types.items())
+
+
+def _joystick_moves(joystick: _Joystick) -> tuple[Row, ...]:
+    def turner(parts: list[int]) -> Handler:
+        return lambda request: {"success": joystick.turn(parts, request.values)}
+
+    return (
+        *joystick.buttons.rows(),
+        ("set_axes", "set_float_array", turner(joystick.axes)),
+        ("set_povs", "set_float_array", turner(joystick.povs)),
+    )
+
+
+def _connecting(joystick: _Joystick, row: Row) -> Row:
+    """Return a row whose success connects the joystick."""
+    name, type_name, handler = row
+
+    def handle(request: Any) -> Fields:
+        answer: Fields = handler(request)
+        joystick.connected = joystick.connected or bool(answer["success"])
+        return answer
+
+    return name, type_name, handle

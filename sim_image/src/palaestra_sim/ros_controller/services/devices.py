@@ -1,0 +1,203 @@
+"""Devices over ROS: the services of each, and the feeds that publish values once they are enabled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from palaestra_sim.ros_interfaces import Fields, NodeInterface, PublisherInterface, Row, Service, topic_name
+from palaestra_sim.scene.devices.device_type import (
+    ROLES,
+    Device,
+    DeviceTopic,
+    DeviceType,
+    Enable,
+    Shaft,
+    Stream,
+    ValueSource,
+    never,
+    whole_steps,
+)
+from palaestra_sim.scene.nodes.types import type_number
+
+
+@dataclass(slots=True, eq=False)
+class Feed:
+    """One topic of a device.
+
+    A period that differs from those before adds a second publisher of the same topic, as in the controller;
+    the messages of the two are mixed.
+
+    Attributes:
+        constants: the other fields, as they are when the topic begins.
+        reading: the field of the value; "" is the last one.
+        many: whether the value is a sequence, with a message for each of its items.
+        whole: whether a value has all fields by name.
+        stamped: whether the messages have a header.
+        publishers: by period in ms.
+    """
+
+    path: str
+    type_name: str
+    template: Fields
+    constants: Fields
+    source: ValueSource | None
+    reading: str = ""
+    many: bool = False
+    whole: bool = False
+    stamped: bool = True
+    publishers: dict[int, PublisherInterface] = field(default_factory=dict)
+
+    def begin(self, node: NodeInterface, period_ms: int) -> None:
+        """Publish every `period_ms` too."""
+        if period_ms not in self.publishers:
+            template = {**self.template, **self.constants}
+            self.publishers[period_ms] = node.advertise(
+                self.path, self.type_name, template=template, reading=self.reading
+            )
+
+    def end(self, node: NodeInterface) -> None:
+        """Withdraw all publishers."""
+        for publisher in self.publishers.values():
+            node.withdraw(publisher)
+        self.publishers.clear()
+
+    def publish(self, elapsed_ms: int) -> None:
+        """Send the value to the subscribers, by each publisher that is due.
+
+        Without a subscriber the value is not read: a picture takes time to draw.
+        """
+        source = self.source
+        if source is None:
+            return
+        for period_ms, publisher in self.publishers.items():
+            if elapsed_ms % period_ms == 0 and publisher.heard:
+                for value in source.value if self.many else (source.value,):
+                    self._send(publisher, value)
+
+    def _send(self, publisher: PublisherInterface, value: Any) -> None:
+        if self.whole:
+            publisher.send_stamped(value)
+        elif not self.stamped:
+            publisher.send({self.reading: value})
+        elif self.reading:
+            publisher.send_stamped({self.reading: value})
+        else:
+            publisher.send_value(value)
+
+
+class Outlet:
+    """All topics of one device, which its `enable` begins and ends together.
+
+    Args:
+        node: that publishes.
+        device_name: as in the world.
+        topics: of the device.
+        accepts: whether it accepts a period.
+        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+        prefix: of `enable` and `get_sampling_period`, below the device.
+
+    Attributes:
+        feeds: one for each topic.
+    """
+
+    def __init__(
+        self,
+        node: NodeInterface,
+        device_name: str,
+        topics: Iterable[DeviceTopic],
+        accepts: Enable,
+        enabled: Callable[[int], None] = lambda _period_ms: None,
+        prefix: str = "",
+    ) -> None:
+        path = topic_name(device_name)
+        header = {"header": {"frame_id": f"{node.name}/{path}"}}
+        self.feeds = tuple(
+            Feed(
+                f"{path}/{it.name}",
+                it.type_name,
+                header if it.stamped else {},
+                it.constants,
+                it.source,
+                reading=it.reading,
+                many=it.many,
+                whole=it.whole,
+                stamped=it.stamped,
+            )
+            for it in topics
+        )
+        self._node = node
+        self._path = f"{path}/{prefix}"
+        self._enabled = enabled
+        self._accepts = accepts
+        self._periods_ms: set[int] = set()
+
+    def enable(self, period_ms: int, step_ms: int) -> bool:
+        """Publish every `period_ms`; 0 stops. Return whether the device accepts the period.
+
+        Raises:
+            UnsimulatedError: the device cannot begin, as a camera on a machine that cannot draw.
+        """
+        if period_ms == 0:
+            self._periods_ms.clear()
+            for feed in self.feeds:
+                feed.end(self._node)
+            self._enabled(0)
+            return True
+        if not self._accepts(period_ms, step_ms):
+            return False
+        self._enabled(min(self._periods_ms | {period_ms}))
+        self._periods_ms.add(period_ms)
+        for feed in self.feeds:
+            feed.begin(self._node, period_ms)
+        return True
+
+    def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:
+        """Return `enable` and `get_sampling_period`; `step_ms()` is the controller's last step."""
+
+        def enable(request: Any) -> dict[str, Any]:
+            return {"success": self.enable(request.value, step_ms())}
+
+        def get_sampling_period(_request: Any) -> dict[str, Any]:
+            return {"value": min(self._periods_ms, default=0)}
+
+        return (
+            Service(f"{self._path}enable", "webots_ros/set_int", enable),
+            Service(f"{self._path}get_sampling_period", "webots_ros/get_int", get_sampling_period),
+        )
+
+
+def stream_outlet(node: NodeInterface, device_name: str, stream: Stream) -> Outlet:
+    """Return the outlet of topics that have an `enable` of their own."""
+    accepts = never if stream.silent else whole_steps
+    return Outlet(node, device_name, stream.topics, accepts, stream.enabled, stream.prefix)
+
+
+def device_services(kind: DeviceType[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
+    """Return the services of a device beside `enable` and `get_sampling_period`; `shaft` is its joint."""
+    rows: tuple[Row, ...] = (
+        ("get_model", "get_string", lambda _: {"value": device.model}),
+        ("get_name", "get_string", lambda _: {"value": device.name}),
+        ("get_node_type", "get_int", lambda _: {"value": type_number(kind.node)}),
+    )
+    return services_below(topic_name(device.name), (*rows, *kind.services(device), *_neighbors(kind, shaft)))
+
+
+def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
+    """Return the services of a table, with their paths below `path`."""
+    return tuple(
+        Service(f"{path}/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
+    )
+
+
+def _neighbors(kind: DeviceType[Any], shaft: Shaft | None) -> tuple[Row, ...]:
+    """Return the services that answer the names of the other devices of a joint."""
+    if shaft is None:
+        return ()
+    names = shaft.names
+    return tuple(
+        (f"get_{role}_name", "get_string", lambda _, role=role: {"value": names.get(role, "")})
+        for role in ROLES
+        if role != kind.role
+    )

@@ -1,0 +1,80 @@
+"""The log of a controller over ROS: `/rosout`, and the services with which rqt_logger_level sets its level.
+
+Every roscpp node has them. The simulator logs what it refuses; the rest of roscpp's log is about itself.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.ros_interfaces import Fields, Handler, NodeInterface, PublisherInterface, Service
+
+_LEVELS: Final = {"debug": 1, "info": 2, "warn": 4, "error": 8, "fatal": 16}  # Source: rosgraph_msgs/Log
+_LOGGER: Final = "ros"
+
+
+class NodeLog:
+    """The log of one node.
+
+    Args:
+        node: that logs.
+        clock: seconds of real time since 1970.
+    """
+
+    def __init__(self, node: NodeInterface, clock: Callable[[], float] = time.time) -> None:
+        self._node = node
+        self._clock = clock
+        self._levels = {_LOGGER: "info", "ros.roscpp": "info", "ros.roscpp.superdebug": "warn"}
+        self._publisher: PublisherInterface | None = None
+
+    def table(self) -> tuple[Service, ...]:
+        """Return the services."""
+        return (
+            Service("get_loggers", "roscpp/GetLoggers", self._get_loggers),
+            Service("set_logger_level", "roscpp/SetLoggerLevel", self._set_logger_level),
+        )
+
+    def open(self) -> None:
+        """Advertise `/rosout`."""
+        self._publisher = self._node.advertise("/rosout", "rosgraph_msgs/Log")
+
+    def error(self, text: str) -> None:
+        """Publish an error, unless the level is higher."""
+        if self._publisher is None or _LEVELS[self._levels[_LOGGER]] > _LEVELS["error"]:
+            return
+        seconds, rest_s = divmod(self._clock(), 1.0)
+        stamp = {"secs": int(seconds), "nsecs": int(rest_s * 1e9)}
+        self._publisher.send(
+            {
+                "header": {"stamp": stamp},
+                "level": _LEVELS["error"],
+                "name": f"/{self._node.name}",
+                "msg": text,
+            }
+        )
+
+    def reporting(self, path: str, handler: Handler) -> Handler:
+        """Return a handler that logs its failures, with our errors turned into failures of the service."""
+
+        def handle(request: Any) -> Any:
+            try:
+                return handler(request)
+            except (SimError, ServiceFailed) as error:
+                self.error(f"{path}: {error}")
+                raise ServiceFailed(str(error)) from error
+
+        return handle
+
+    def _get_loggers(self, _request: Any) -> Fields:
+        return {"loggers": [{"name": name, "level": level} for name, level in self._levels.items()]}
+
+    def _set_logger_level(self, request: Any) -> Fields:
+        level = request.level.lower()
+        if level not in _LEVELS:
+            raise ServiceFailed(f"no level {request.level!r}; use {', '.join(_LEVELS)}")
+        self._levels[request.logger] = level
+        return {}

@@ -1,0 +1,55 @@
+"""What Camera and RangeFinder share: the lens, the topic of a picture, and saving it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from palaestra_sim.ros_interfaces import Fields, Handler
+from palaestra_sim.scene import picture_files
+from palaestra_sim.scene.camera_interface import MOST_PIXELS, Lens
+from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, ValueSource
+
+PIXEL_BYTES: Final = 4  # of a color, and of a distance
+
+
+def read_lens(part: DevicePart, near_m: float, far_m: float) -> Lens:
+    """Return the lens of a device; one with no pixels, or with too many, is a mistake."""
+    width, height = int(part.number("width", 64.0)), int(part.number("height", 64.0))
+    if not 0 < width <= MOST_PIXELS or not 0 < height <= MOST_PIXELS:
+        part.refuse(f"a {part.node.type_name} of {width} by {height} pixels", f"use 1 to {MOST_PIXELS}")
+        width = height = 1
+    return Lens(
+        size=(width, height),
+        field_of_view_rad=part.number("fieldOfView", 0.7854),
+        near_m=near_m,
+        far_m=far_m,
+    )
+
+
+def picture_topic(
+    name: str, source: ValueSource, lens: Lens, encoding: str, *, many: bool = False
+) -> DeviceTopic:
+    """Return the topic of pictures of four bytes a pixel."""
+    width, height = lens.size
+    constants = {"height": height, "width": width, "encoding": encoding, "step": PIXEL_BYTES * width}
+    return DeviceTopic(
+        name=name,
+        type_name="sensor_msgs/Image",
+        source=source,
+        constants=constants,
+        reading="data",
+        many=many,
+    )
+
+
+def saver(lens: Lens, silent: Callable[[], bool], pixels: Callable[[], bytes | memoryview]) -> Handler:
+    """Return a handler that saves a picture; while the device is silent it answers failure."""
+
+    def save_image(request: Any) -> Fields:
+        saved = not silent() and picture_files.save(
+            request.filename, lens.size, pixels(), quality=request.quality
+        )
+        return {"success": int(saved)}
+
+    return save_image

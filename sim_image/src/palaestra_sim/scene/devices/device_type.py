@@ -1,0 +1,358 @@
+"""What the table of devices has of each type, and what a device of it is.
+
+Nothing here knows a wire: services are data (`seam`), and a message is its type and its fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Generic, Protocol, TypeVar
+
+from palaestra_sim.ros_interfaces import Fields, Row, is_ros_name, topic_name
+from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.camera_interface import CameraInterface, Lens
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.joints import Joint
+from palaestra_sim.scene.links import Link
+from palaestra_sim.scene.motion import Motion
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.sensor_rays import Beam
+from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.validation import NodeReader
+from palaestra_sim.scene.visual_rays import Glance
+
+
+class Device(Protocol):
+    """A device of a robot. A sensor also has a `value`, which its sampler sets."""
+
+    @property
+    def name(self) -> str:
+        """Its name in the world file."""
+        ...
+
+    @property
+    def model(self) -> str:
+        """The node's `model`."""
+        ...
+
+
+DeviceT = TypeVar("DeviceT", bound=Device)
+
+
+ROLES: Final = ("motor", "brake", "position_sensor")  # of the devices of a joint
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Shaft:
+    """A joint, for the devices on it.
+
+    Attributes:
+        joint: the joint itself; None for a device that is on none.
+        motor: the first motor on it.
+        names: of the first device of each role.
+    """
+
+    joint: Joint | None = None
+    motor: Motor | None = None
+    names: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def type_number(self) -> int:
+        """What `get_type` of its devices answers: 0 for a hinge, 1 for a slider."""
+        return int(self.joint is not None and self.joint.slides)
+
+    @property
+    def position(self) -> float:
+        """Where it is, in rad or m."""
+        if self.motor is not None:
+            return self.motor.angle_rad
+        return 0.0 if self.joint is None else self.joint.now
+
+
+@dataclass(slots=True, kw_only=True)
+class DevicePart:
+    """The node of a device, while its robot is read.
+
+    Attributes:
+        reading: of the world.
+        lacks: notes that a node of the robot cannot be simulated.
+        node: of the device.
+        name: as the world file has it, else the default of its type.
+        place: its frame in the robot's; of a device on a joint, the frame of the joint.
+        shaft: the joint that it is a device of.
+        outline: the shapes with which the robot runs into things.
+        measured: the parts of the robot whose force on it is measured.
+        forces: whether the physics has forces.
+    """
+
+    reading: NodeReader
+    node: SceneNode
+    lacks: Callable[[SceneNode, str], None]
+    name: str
+    place: Frame
+    shaft: Shaft | None
+    outline: list[Shape]
+    measured: list[Link]
+    forces: bool
+
+    def number(self, name: str, default: float) -> float:
+        """Return the number of a field; `default` if the field is refused."""
+        return self.reading.number(self.node, name, default)
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return the text of a field, `default` if it has none."""
+        return self.node.text(name) or default
+
+    def inner(self, name: str) -> SceneNode | None:
+        """Return the node in a field; None if it is NULL."""
+        return next(iter(self.node.nodes(name)), None)
+
+    def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the numbers of a field of WorldInfo; `default` if it is absent or refused."""
+        world_info = self.reading.world_info
+        return default if world_info is None else self.reading.vector(world_info, name, default)
+
+    def world_text(self, name: str, default: str) -> str:
+        """Return the text of a field of WorldInfo, `default` if it has none."""
+        world_info = self.reading.world_info
+        return default if world_info is None else world_info.text(name) or default
+
+    def axis_to(self, letter: str) -> int:
+        """Return the axis of the world, 0 to 2, that points up, north or east: `U`, `N` or `E`."""
+        return self.reading.system.index(letter)
+
+    def refuse(self, fact: str, remedy: str) -> None:
+        """Note a mistake in the world."""
+        self.reading.refuse(self.node, fact, remedy)
+
+    def lack(self, fact: str) -> None:
+        """Note that this device cannot be simulated."""
+        self.lacks(self.node, fact)
+
+    def take_outline(self) -> list[Shape]:
+        """Return the shapes of its boundingObject, which become part of the robot's outline."""
+        shapes = list(bounding_shapes(self.reading, self.node, self.place))
+        self.outline += shapes
+        return shapes
+
+    def measure(self) -> Link:
+        """Return this device as a part whose force on the robot is measured."""
+        link = Link(node=self.node, place=self.place, joint=None)
+        self.measured.append(link)
+        return link
+
+
+class Carrier(Protocol):
+    """The robot that carries a device, for sampling.
+
+    Attributes:
+        body: None if nothing can run into the robot.
+    """
+
+    body: Body | None
+
+    def gauss(self, mean: float, deviation: float, /) -> float:
+        """Return the next number of the robot's own noise."""
+        ...
+
+    def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each beam travels now, in meters."""
+        ...
+
+    def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        ...
+
+    def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
+        """Return a function that returns what each infra-red beam meets now."""
+        ...
+
+    def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
+        """Return a camera at a place; None if this simulator draws nothing."""
+        ...
+
+    def device(self, name: str) -> object | None:
+        """Return one of its devices; None if it has none of that name."""
+        ...
+
+    def motion(self, place: Frame) -> Motion:
+        """Return how a place on the robot moves in the world."""
+        ...
+
+    def follow(self, place: Frame) -> Callable[[], Vector]:
+        """Return a function that returns the acceleration of a place, in world axes, in m/s2."""
+        ...
+
+
+class ValueSource(Protocol):
+    """Holds a value that a topic publishes: a sensor, or a part of one."""
+
+    @property
+    def value(self) -> Any:
+        """Of the last step: a number, or as many as the last field of the message has."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceTopic:
+    """A topic of one device.
+
+    Attributes:
+        name: below the device's name.
+        type_name: of its messages.
+        source: of the reading; None if it never has one.
+        constants: the other fields.
+        reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
+        many: whether `value` is a sequence, with a message for each of its items.
+        whole: whether a value has all fields but the header, by name.
+        stamped: whether the messages begin with a header; without one, `reading` names the field.
+    """
+
+    name: str
+    type_name: str
+    source: ValueSource | None
+    constants: Fields = field(default_factory=dict)
+    reading: str = ""
+    many: bool = False
+    whole: bool = False
+    stamped: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stream:
+    """Topics of a device that have an `enable` of their own, beside the device's.
+
+    Attributes:
+        prefix: of `enable` and `get_sampling_period`, below the name of the device.
+        topics: that it begins.
+        silent: whether no period is accepted.
+        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+    """
+
+    prefix: str
+    topics: tuple[DeviceTopic, ...]
+    silent: bool
+    enabled: Callable[[int], None]
+
+
+Sample = Callable[[], None]
+Enable = Callable[[int, int], bool]  # period and step in ms; returns whether the period is accepted
+
+
+def whole_steps(period_ms: int, step_ms: int) -> bool:
+    """Accept a period that is a multiple of the controller's last step."""
+    return period_ms % step_ms == 0
+
+
+def never(_period_ms: int, _step_ms: int) -> bool:
+    """Accept no period: Webots publishes readings of this device, and the simulator has none."""
+    return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceType(Generic[DeviceT]):
+    """A row of the table: one type of device.
+
+    Attributes:
+        node: the type of its node.
+        name: of a device whose node has none.
+        fields: of the node, written as in `catalogue`, beside `name` and, if it is one, those of a Solid.
+        without_effect: those of them that Webots applies and no simulator here does, with blanks between.
+        solid: whether a node off joints is a Solid.
+        role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
+        read: returns the device of a node.
+        sampler: returns a function that gives devices of one robot their values; None: they have none.
+        services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
+            others of the joint; and, with topics, `enable` and `get_sampling_period`.
+        topics: returns those that `enable` begins to publish.
+        streams: returns the other topics, each with an `enable` of its own.
+        attach: connects a device with the robot that carries it.
+        enable: whether a period is accepted; 0, which ends publishing, always is.
+        silent: whether a device that is attached has no readings, so that no period is accepted.
+        enabled: called with a device and its sampling period in ms, 0 for none, after that has changed.
+        sensor: the path of `enable` below the name of the device, "" for the name itself.
+    """
+
+    node: str
+    name: str
+    fields: str
+    without_effect: str = ""
+    solid: bool = True
+    role: str = ""
+    read: Callable[[DevicePart], DeviceT]
+    sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
+    services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
+    topics: Callable[[DeviceT], tuple[DeviceTopic, ...]] = lambda _: ()
+    streams: Callable[[DeviceT], tuple[Stream, ...]] = lambda _: ()
+    attach: Callable[[DeviceT, Carrier], None] = lambda _device, _robot: None
+    enable: Enable = whole_steps
+    silent: Callable[[DeviceT], bool] = lambda _: False
+    enabled: Callable[[DeviceT, int], None] = lambda _device, _period_ms: None
+    sensor: str = ""
+
+    def accepts(self, device: DeviceT) -> Enable:
+        """Return the rule by which a device accepts a sampling period."""
+        return never if self.silent(device) else self.enable
+
+    @property
+    def on_joint(self) -> bool:
+        """Whether it is a device of a joint."""
+        return bool(self.role)
+
+    @property
+    def body(self) -> bool:
+        """Whether its node is a Solid, which others may run into."""
+        return self.solid and not self.on_joint
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Devices:
+    """All devices of a robot by name, in the order of the world file.
+
+    Attributes:
+        rows: each with its row of the table.
+        nodes: their nodes.
+        shafts: of those on joints.
+    """
+
+    rows: dict[str, tuple[DeviceType[Any], Any]] = field(default_factory=dict)
+    nodes: dict[str, SceneNode] = field(default_factory=dict)
+    shafts: dict[str, Shaft] = field(default_factory=dict)
+    _by_topic: dict[str, str] = field(default_factory=dict)
+
+    def add(self, name: str, kind: DeviceType[Any], device: Any) -> None:
+        """Add a device, or exchange that of the same name."""
+        self.rows[name] = kind, device
+        self._by_topic[topic_name(name)] = name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.rows)
+
+    @property
+    def motors(self) -> dict[str, Motor]:
+        """The motors."""
+        return {name: it for name, (_, it) in self.rows.items() if isinstance(it, Motor)}
+
+    @property
+    def sensors(self) -> Mapping[str, ValueSource]:
+        """The devices that have a value."""
+        return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
+
+    def trouble_with(self, name: str) -> str | None:
+        """Return the reason to refuse another device of that name, None if there is none."""
+        if name in self.rows:
+            return f"a second device {name!r}"
+        if not is_ros_name(name):
+            return f"a device {name!r}, a name that ROS does not take"
+        path = topic_name(name)
+        same = self._by_topic.get(path)
+        return None if same is None else f"devices {same!r} and {name!r}, whose topics are both {path!r}"
+
+    def of(self, kind: DeviceType[DeviceT]) -> tuple[DeviceT, ...]:
+        """Return the devices of one type."""
+        return tuple(device for found, device in self.rows.values() if found is kind)

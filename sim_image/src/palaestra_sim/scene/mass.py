@@ -1,0 +1,67 @@
+"""What Solids consist of, as a physics with masses needs it: shapes, and their mass.
+
+A Solid without a Physics node has no mass of its own. Source: Webots reference, Physics.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.validation import NodeReader
+
+DENSITY: Final = 1000.0  # kg/m3, the default of Physics.density
+_FILLED: Final = {"box": 1.0, "cylinder": math.pi / 4.0, "ball": math.pi / 6.0}  # of the box around it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MassProperties:
+    """The mass of one Solid.
+
+    Attributes:
+        place: its frame.
+        shapes: its boundingObject.
+        mass_kg: 0 if it has no physics, or neither a mass nor a shape.
+        center: the center of mass in its frame, in meters; None: that of the shapes.
+        inertia: xx, yy, zz, xy, xz, yz about the center of mass in kg m2; None: that of the shapes.
+    """
+
+    place: Frame
+    shapes: tuple[Shape, ...] = ()
+    mass_kg: float = 0.0
+    center: Vector | None = None
+    inertia: tuple[float, ...] | None = None
+
+
+def read_matter(
+    reading: NodeReader, node: SceneNode, place: Frame, shapes: Sequence[Shape]
+) -> MassProperties:
+    """Return the mass of the Solid at `node`."""
+    mass_kg = 0.0
+    center = inertia = None
+    for physics in node.nodes("physics"):
+        mass_kg = reading.number(physics, "mass", -1.0)
+        if mass_kg < 0.0:
+            density = reading.number(physics, "density", DENSITY)
+            mass_kg = max(density, 0.0) * sum(map(volume_m3, shapes))
+        if physics.numbers("centerOfMass"):
+            center = _triple(reading.vector(physics, "centerOfMass", (0.0, 0.0, 0.0)))
+        if physics.numbers("inertiaMatrix"):
+            inertia = reading.vector(physics, "inertiaMatrix", (0.0,) * 6)
+    return MassProperties(place=place, shapes=tuple(shapes), mass_kg=mass_kg, center=center, inertia=inertia)
+
+
+def volume_m3(shape: Shape) -> float:
+    """Return the volume of a shape in m3."""
+    x, y, z = shape.size
+    return x * y * z * _FILLED[shape.kind]
+
+
+def _triple(numbers: tuple[float, ...]) -> Vector:
+    return numbers[0], numbers[1], numbers[2]

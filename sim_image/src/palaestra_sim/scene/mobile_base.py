@@ -1,0 +1,98 @@
+"""The base of a robot: its wheels at work, from the demands of their motors to the speed of the robot.
+
+The law of the wheels is in `drive`. In Webots torque and friction limit the acceleration of a robot. Here
+three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z. They are those of the Robotino
+3's own controller (Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). All three axes are
+slowed by the same factor, as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
+In a robot without physics, Webots itself limits the accelerations of the wheels: see `Motor.kinematic`.
+
+Every simulator takes the speed from here, so a robot answers its commands alike in all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import sub
+from typing import Final
+
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.wheel_kinematics import Drive
+
+ACCELERATIONS: Final = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2
+_X, _Y, _TURN = ACCELERATIONS
+
+
+class MobileBase:
+    """The wheels of a robot.
+
+    Args:
+        wheels: the motors of the wheels.
+        drive: the law of these wheels; None: they do not move the robot.
+
+    Attributes:
+        drive: as given.
+        vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
+    """
+
+    __slots__ = ("_kinematic", "_step_s", "_wheels", "drive", "omega", "vx", "vy")
+
+    def __init__(self, wheels: Sequence[Motor] = (), drive: Drive | None = None) -> None:
+        if drive is not None and len(wheels) != len(drive.to_speeds):
+            raise ValueError(f"{len(wheels)} motors do not fit a drive of {len(drive.to_speeds)} wheels")
+        self.drive = drive
+        self._wheels = tuple(wheels) if drive is not None else ()
+        self._kinematic = all(wheel.kinematic for wheel in wheels)
+        self._step_s = 0.0
+        self.halt()
+
+    def has(self, motor: Motor) -> bool:
+        """Return whether a motor turns one of the wheels."""
+        return motor in self._wheels
+
+    def halt(self) -> None:
+        """Stop all motion; the motors begin again from rest."""
+        self.vx = self.vy = self.omega = 0.0
+        for wheel in self._wheels:
+            wheel.halt()
+
+    def push(self, vx: float, vy: float, omega: float) -> None:
+        """Give the robot a speed in its own axes; its motors start from there."""
+        self.vx, self.vy, self.omega = vx, vy, omega
+        if self.drive is not None:
+            speeds = self.drive.wheel_speeds(vx, vy, omega)
+            for wheel, speed in zip(self._wheels, speeds, strict=True):
+                wheel.speed_rad_s = speed
+                wheel.changed = True
+
+    def turn(self, step_s: float) -> bool:
+        """Turn the wheels for one basic step; return whether they move the robot."""
+        law = self.drive
+        if law is None:
+            self.vx = self.vy = self.omega = 0.0
+            return False
+        changed = step_s != self._step_s
+        for wheel in self._wheels:
+            changed = changed or wheel.changed
+        if changed:
+            self._approach(step_s, law)
+        for wheel in self._wheels:
+            wheel.angle_rad += wheel.speed_rad_s * step_s
+        return bool(self.vx or self.vy or self.omega)
+
+    def _approach(self, step_s: float, law: Drive) -> None:
+        """Change the speeds of the wheels toward those that their motors demand."""
+        wheels = self._wheels
+        speeds = [wheel.speed_rad_s for wheel in wheels]
+        demands = [wheel.demand(step_s) for wheel in wheels]
+        vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
+        # In steps of the largest acceleration, which all three axes share.
+        steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
+        if steps > 1.0 and not self._kinematic:
+            demands = [
+                speed + (demand - speed) / steps for demand, speed in zip(demands, speeds, strict=True)
+            ]
+        for wheel, speed in zip(wheels, demands, strict=True):
+            wheel.speed_rad_s = speed
+            wheel.changed = not wheel.steady
+        self.vx, self.vy, self.omega = law.twist(demands)
+        self._step_s = step_s

@@ -1,0 +1,188 @@
+"""What a radar can see: Solids with a `radarCrossSection`, and what hides them. Pure geometry.
+
+A Solid is as large as the boxes around its shapes, along the axes of the radar; without shapes it is a point.
+A part outside of the field of view does not count. Floors hide nothing, and neither does the robot itself.
+Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.validation import NodeReader
+
+_NEVER: Final = (math.inf, -math.inf)
+
+
+class Bounds(NamedTuple):
+    """A box along the axes of a radar: its middle and its size in meters, in the frame of the radar."""
+
+    middle: Vector
+    size: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RadarTarget:
+    """A Solid that radars can see.
+
+    Attributes:
+        place: its frame.
+        cross_section_m2: its `radarCrossSection`.
+        shapes: its own and those of the Solids inside it.
+        nodes: itself and all inside it.
+    """
+
+    place: Frame
+    cross_section_m2: float
+    shapes: tuple[Shape, ...]
+    nodes: frozenset[SceneNode]
+
+    def seen_from(self, radar: Pose, field_of_view_rad: tuple[float, float]) -> Bounds | None:
+        """Return what of it is in a field of view, horizontal and vertical; None if nothing is.
+
+        `radar` is in the axes of the ground.
+        """
+        frame = radar.inverse
+        boxes = [_box(frame.after(shape.pose), shape) for shape in self.shapes]
+        if not boxes:
+            boxes = [Bounds(frame.carry(self.place.ground_pose.position))]
+        cut = (_cut(box, *field_of_view_rad) for box in boxes)
+        return _around([box for box in cut if box is not None])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RadarTargets:
+    """What the radars of a world can see.
+
+    Attributes:
+        targets: in the order of the world file.
+        shapes: everything that may hide them.
+    """
+
+    targets: tuple[RadarTarget, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+
+    def free_path(self, target: RadarTarget, start: Vector, robot: frozenset[SceneNode]) -> float:
+        """Return how far a ray from `start` to the origin of a target travels before something is in its way.
+
+        In meters, infinite if nothing is. `robot` has the nodes of the robot that looks.
+        """
+        end = target.place.ground_pose.position
+        way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
+        length = math.hypot(*way)
+        if length == 0.0:
+            return math.inf
+        direction = (way[0] / length, way[1] / length, way[2] / length)
+        others = (it for it in self.shapes if it.node not in target.nodes and it.node not in robot)
+        nearest = min((_entry(shape, start, direction) for shape in others), default=math.inf)
+        return nearest if nearest < length else math.inf
+
+
+def echoes_of(nodes: Collection[SceneNode]) -> RadarTargets:
+    """Return what radars can see of these nodes, as they are now."""
+    shapes: dict[SceneNode, tuple[Shape, ...]] = {}
+    targets = []
+    for node in nodes:
+        if node.place is not None and not node.left_out and node.nodes("boundingObject"):
+            shapes[node] = tuple(bounding_shapes(NodeReader(), node, node.place))
+    for node in nodes:
+        cross_section = (node.numbers("radarCrossSection") or (0.0,))[0]
+        if node.place is not None and not node.left_out and cross_section > 0.0:
+            inside = (node, *node.descendants())
+            targets.append(
+                RadarTarget(
+                    place=node.place,
+                    cross_section_m2=cross_section,
+                    shapes=tuple(shape for it in inside for shape in shapes.get(it, ())),
+                    nodes=frozenset(inside),
+                )
+            )
+    return RadarTargets(
+        targets=tuple(targets), shapes=tuple(shape for several in shapes.values() for shape in several)
+    )
+
+
+def _box(pose: Pose, shape: Shape) -> Bounds:
+    """Return the box around a shape that has this pose in the frame of the radar."""
+    x, y, z = (2.0 * shape.half_along(pose.rotation, axis) for axis in range(3))
+    return Bounds(pose.position, (x, y, z))
+
+
+def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
+    """Return what of a box is in the field of view; None if nothing is."""
+    (x, y, z), (depth, width, height) = box
+    cuts = [
+        *_beyond(x, y, width, across_rad / 2.0),
+        *_beyond(x, z, height, up_rad / 2.0),
+    ]
+    if any(cut is None for cut in cuts):
+        return None
+    left, right, top, bottom = (cut or 0.0 for cut in cuts)
+    if across_rad > math.pi / 2.0:
+        return box  # Webots does not cut there
+    middle = (x, y + (right - left) / 2.0, z + (bottom - top) / 2.0)
+    return Bounds(middle, (depth, max(0.0, width - left - right), max(0.0, height - top - bottom)))
+
+
+def _beyond(ahead: float, aside: float, size: float, half_rad: float) -> Iterator[float | None]:
+    """Yield how much is beyond each edge, of the positive side first; None if all of it is."""
+    for side in (-aside, aside):
+        inside = math.sin(half_rad) * ahead + math.cos(half_rad) * side
+        yield None if inside < -size / 2.0 else max(0.0, size / 2.0 - inside)
+
+
+def _around(boxes: Sequence[Bounds]) -> Bounds | None:
+    if not boxes:
+        return None
+    low, high = (
+        [fold(middle[axis] + sign * size[axis] / 2.0 for middle, size in boxes) for axis in range(3)]
+        for fold, sign in ((min, -1.0), (max, 1.0))
+    )
+    (x, y, z), (depth, width, height) = (
+        [(b + a) / 2.0 for a, b in zip(low, high, strict=True)],
+        [b - a for a, b in zip(low, high, strict=True)],
+    )
+    return Bounds((x, y, z), (depth, width, height))
+
+
+def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
+    """Return how far a ray travels until it is in a shape; infinite if it never is."""
+    frame = shape.pose.inverse
+    origin, way = frame.carry(start), frame.turned(direction)
+    half = [length / 2.0 for length in shape.size]
+    if shape.kind == "ball":
+        spans = [_in_ball(origin, way, half[0])]
+    elif shape.kind == "cylinder":
+        spans = [_in_ball(origin[:2], way[:2], half[0]), _in_slab(origin[2], way[2], half[2])]
+    else:
+        spans = [_in_slab(*of_axis) for of_axis in zip(origin, way, half, strict=True)]
+    enter, leave = max(span[0] for span in spans), min(span[1] for span in spans)
+    return max(enter, 0.0) if enter <= leave and leave >= 0.0 else math.inf
+
+
+def _in_slab(origin: float, way: float, half: float) -> tuple[float, float]:
+    """Return from where to where along a ray it is between two planes."""
+    if way == 0.0:
+        return (-math.inf, math.inf) if abs(origin) <= half else _NEVER
+    ends = (-half - origin) / way, (half - origin) / way
+    return min(ends), max(ends)
+
+
+def _in_ball(origin: Sequence[float], way: Sequence[float], radius: float) -> tuple[float, float]:
+    """Return from where to where along a ray it is in a ball, or in a circle of the plane."""
+    a = sum(it * it for it in way)
+    b = sum(it * at for it, at in zip(way, origin, strict=True))
+    c = sum(at * at for at in origin) - radius * radius
+    if a == 0.0:
+        return (-math.inf, math.inf) if c <= 0.0 else _NEVER
+    root = b * b - a * c
+    if root < 0.0:
+        return _NEVER
+    return (-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a

@@ -1,0 +1,107 @@
+"""The place of a robot with a body: the current pose of this body."""
+
+from __future__ import annotations
+
+from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import (
+    AxisAngle,
+    Matrix,
+    Pose,
+    Vector,
+    from_axis_angle,
+    multiply,
+    to_axis_angle,
+    transposed,
+    turned,
+)
+
+
+class RobotFrame(Frame):
+    """The frame of a robot with a body, which drives upright, at the height at which it was placed.
+
+    It is at the top of the world, which never moves or turns, so the body's pose is the place's. The body is
+    in the axes of the ground.
+    """
+
+    moves = True
+
+    def __init__(self, top: Frame | None, translation: Vector, rotation: AxisAngle, body: Body) -> None:
+        super().__init__(top, translation, rotation)
+        self._body = body
+        self._height_m = 0.0
+        self.rotation = rotation
+        self.translation = translation
+
+    @property
+    def translation(self) -> Vector:
+        """X and y of the body, and the height of the world file or of the last write; in the file's axes."""
+        return self.from_ground((self._body.x, self._body.y, self._height_m))
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        x, y, self._height_m = self.to_ground(value)
+        self._body.place(x, y, self._body.heading_rad)
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """The heading of the body; in a world whose z axis points up, about this axis."""
+        heading = (0.0, 0.0, 1.0, self._body.heading_rad)
+        if self.axes is None:
+            return heading
+        return to_axis_angle(multiply(transposed(self.axes), from_axis_angle(heading)))
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        rotation = from_axis_angle(value)
+        if self.axes is not None:
+            rotation = multiply(self.axes, rotation)
+        self._body.place(self._body.x, self._body.y, Pose(rotation=rotation).heading_rad)
+
+    @property
+    def height_m(self) -> float:
+        """The height of its origin in the world."""
+        return self._height_m
+
+
+class TurnedFrame(Frame):
+    """The frame that the file gives a robot, turned in the one that has z up.
+
+    Clients read and write the frame of the file, and move the other one with it.
+
+    Args:
+        upright: the frame with z up.
+        turn: of the frame of the file in it.
+    """
+
+    def __init__(self, upright: Frame, turn: Matrix) -> None:
+        super().__init__(upright, (0.0, 0.0, 0.0), to_axis_angle(turn))
+        self._upright = upright
+        self._turn = turn
+
+    @property
+    def pose(self) -> Pose:
+        """The frame, in the one with z up."""
+        return Pose(rotation=self._turn)
+
+    @property
+    def translation(self) -> Vector:
+        """Both frames have one origin."""
+        return self._upright.translation
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        self._upright.translation = value
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """The rotation of the frame of the file, in the frame around the robot."""
+        return turned(self._upright.rotation, self._turn)
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        self._upright.rotation = turned(value, transposed(self._turn))
+
+    def return_to_start(self) -> None:
+        """Return with the frame that has z up."""
+        self._upright.return_to_start()

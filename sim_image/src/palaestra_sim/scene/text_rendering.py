@@ -1,0 +1,41 @@
+"""Texts as pixels, in the one font that Pillow comes with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from palaestra_sim.scene.image_buffer import Point
+from palaestra_sim.scene.picture_files import pillow
+
+
+class Font(NamedTuple):
+    """How a text is drawn: the height of its letters in pixels, and whether their edges are smooth."""
+
+    size: int = 8
+    smooth: bool = True
+
+
+def letters(text: str, corner: Point, font: Font, size: tuple[int, int]) -> Iterator[tuple[Point, int]]:
+    """Yield the pixels of a text, each with the share of it that is covered, from 1 to 255.
+
+    Args:
+        text: one line or more.
+        corner: of its upper left letter.
+        font: of all letters.
+        size: of the picture; nothing is yielded outside of it.
+
+    Raises:
+        UnsimulatedError: Pillow is missing.
+    """
+    mask = pillow("Image").new("L", size)
+    brush = pillow("ImageDraw").Draw(mask)
+    brush.fontmode = "L" if font.smooth else "1"
+    shapes = pillow("ImageFont").load_default(font.size)
+    line_height = sum(shapes.getmetrics())
+    for number, line in enumerate(text.split("\n")):
+        brush.text((corner[0], corner[1] + number * line_height), line, fill=255, font=shapes)
+    for at, share in enumerate(mask.tobytes()):
+        if share:
+            row, column = divmod(at, size[0])
+            yield (column, row), share

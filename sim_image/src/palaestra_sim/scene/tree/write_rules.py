@@ -1,0 +1,134 @@
+"""Refuse writes of fields that have an effect in Webots but none here.
+
+Otherwise a client that randomizes a world would read back its writes, but train in a world that stays the
+same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.nodes.types import is_base_type
+
+# Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
+_ACTING: Final = DEVICES.keys() | frozenset(
+    (
+        "ContactProperties",
+        "Group",
+        "HingeJoint",
+        "HingeJointParameters",
+        "Physics",
+        "Pose",
+        "Robot",
+        "Solid",
+        "Track",
+        "Transform",
+        "WorldInfo",
+    )
+)
+# A running controller has taken the names of its devices already.
+_FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
+_ELSEWHERE: Final = "write it into the world file, or use driver webots"
+_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # they act only by what is inside
+_PLACING: Final = frozenset(("translation", "rotation"))
+_SIZES: Final = {
+    "Box": ("size",),
+    "Capsule": ("height", "radius"),
+    "Cylinder": ("height", "radius"),
+    "Sphere": ("radius",),
+}
+_MOUNTED: Final = frozenset(kind.node for kind in DEVICES.values() if not kind.on_joint)
+
+
+def require_effect(node: SceneNode, field: str) -> None:
+    """Check that a write of the node's field `field` has the same effect as in Webots.
+
+    Raises:
+        UnsimulatedError: it would have no effect.
+    """
+    if node.outline:
+        takes_effect = resizes(node, field)
+    else:
+        takes_effect = _is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)
+    if not takes_effect:
+        part = " of a boundingObject" if node.outline else ""
+        raise UnsimulatedError(
+            f"{node.type_name}.{field}{part} cannot be changed while the simulator runs; {_ELSEWHERE}"
+        )
+
+
+def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> None:
+    """Check that nodes, added to the node's field `field`, act as in Webots.
+
+    Raises:
+        UnsimulatedError: they would not.
+    """
+    where = f"{node.type_name}.{field}"
+    if node.outline or len(node.twins) > 1:
+        part = "part of a boundingObject" if node.outline else "used several times (USE)"
+        raise UnsimulatedError(f"nothing can be added to {where}, which is {part}; {_ELSEWHERE}")
+    if not any(_acts(inside) for it in added for inside in (it, *it.descendants())):
+        return
+    if node.type_name == "Robot" or _on_robot(node):
+        raise UnsimulatedError(f"no {added[0].type_name} can be added to a robot; {_ELSEWHERE}")
+    if field != "children":
+        raise UnsimulatedError(f"no {added[0].type_name} can be added to {where}; {_ELSEWHERE}")
+    _require_no_client(added, "added")
+
+
+def require_removable(node: SceneNode) -> None:
+    """Check that the node can be removed with the effect that this has in Webots.
+
+    Raises:
+        UnsimulatedError: that is not the case.
+    """
+    if node.parent is None or node.type_name in {"WorldInfo", "Viewpoint"}:
+        raise UnsimulatedError(f"the {node.type_name} of a world cannot be removed; keep it")
+    if node.outline:
+        raise UnsimulatedError(f"no part of a boundingObject can be removed; {_ELSEWHERE}")
+    if _on_robot(node) and any(_acts(it) for it in (node, *node.descendants())):
+        raise UnsimulatedError(f"no {node.type_name} can be removed from a robot; {_ELSEWHERE}")
+    _require_no_client([node], "removed")
+
+
+def _require_no_client(nodes: Iterable[SceneNode], done: str) -> None:
+    for node in nodes:
+        for inside in (node, *node.descendants()):
+            if inside.type_name == "Robot" and inside.text("controller") == "ros":
+                raise UnsimulatedError(
+                    f"a robot with the controller ros cannot be {done} while the simulator runs; {_ELSEWHERE}"
+                )
+
+
+def _acts(node: SceneNode) -> bool:
+    return (node.type_name in _ACTING or not is_base_type(node.type_name)) and node.type_name not in _HOLDING
+
+
+def resizes(node: SceneNode, field: str) -> bool:
+    """Return whether a write changes the size of a standing obstacle, and of nothing on a robot."""
+    return field in _SIZES.get(node.type_name, ()) and not any(_on_robot(twin) for twin in node.twins)
+
+
+def _is_drawn_only(node: SceneNode, field: str) -> bool:
+    return node.type_name not in _ACTING or field in _FOR_PEOPLE
+
+
+def _reaches_robot(node: SceneNode, field: str) -> bool:
+    return node.type_name == "Robot" and field in {"battery", "customData"}
+
+
+def _moves(node: SceneNode, field: str) -> bool:
+    """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
+    if field not in _PLACING or node.place is None or not node.place.placeable:
+        return False
+    if node.type_name == "Robot" or not _on_robot(node):
+        return True
+    return not any(it.type_name in _MOUNTED for it in (node, *node.descendants()))
+
+
+def _on_robot(node: SceneNode) -> bool:
+    return any(around.type_name == "Robot" for around in node.ancestors())

@@ -1,0 +1,276 @@
+"""Rays of sensors that see shapes: infra-red DistanceSensors everywhere, lidars where nothing draws. Pure.
+
+A ray stops at the first surface that faces it. It passes the robot that carries the sensor, and what contains
+its origin. Source of the reflection: docs/reference/distancesensor.md of Webots, "Infra-Red Sensors".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import Final, NamedTuple
+
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Pose, Vector, turn
+from palaestra_sim.scene.meshes import Mesh
+from palaestra_sim.scene.sensor_rays import Beam
+from palaestra_sim.scene.visuals import Drawn, View
+
+_PARALLEL: Final = 1e-12
+
+
+class Glance(NamedTuple):
+    """How far a ray travels.
+
+    Attributes:
+        distance_m: to the shape, or the reach of the ray if it meets none.
+        reflection: the share of infra-red light that the shape returns; 1 for none.
+    """
+
+    distance_m: float
+    reflection: float
+
+
+class VisualRays:
+    """The rays of one sensor-carrying robot, against all that is visible.
+
+    Args:
+        view: what of the world is visible.
+        carrier: the place of the robot.
+        beams: in the frame of the robot.
+    """
+
+    def __init__(self, view: View, carrier: Frame, beams: Sequence[Beam]) -> None:
+        self._view = view
+        self._carrier = carrier
+        self._bundles = [
+            (origin, [(direction, reach_m) for _, direction, reach_m in rays])
+            for origin, rays in groupby(map(_ray, beams), key=itemgetter(0))
+        ]
+        self._seen = (-1, -1)
+        self._standing: list[_Target] = []
+        self._moving: list[_Target] = []
+
+    def cast(self) -> list[Glance]:
+        """Return what each ray meets now."""
+        self._refresh()
+        for target in self._moving:
+            target.place()
+        targets = [*self._standing, *self._moving]
+        pose = self._carrier.world_pose
+        return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
+
+    def _refresh(self) -> None:
+        """Place what does not move by itself, if anything was changed or put elsewhere."""
+        seen = (self._view.changes, self._view.moves)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        self._standing, self._moving = [], []
+        for thing in self._view.things():
+            chain = [] if thing.place is None else list(thing.place.chain())
+            if self._carrier in chain:
+                continue
+            of_its_kind = self._moving if any(place.moves for place in chain) else self._standing
+            of_its_kind.append(_Target(thing))
+
+
+class _Target:
+    """A visible shape, where it was when it was placed last."""
+
+    __slots__ = ("_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
+
+    def __init__(self, thing: Drawn) -> None:
+        self._thing = thing
+        self.hit = _surface(thing)
+        self.radius_m = _radius(thing)
+        self.reflection = reflection(thing)
+        self.place()
+
+    def place(self) -> None:
+        """Take the pose of this moment."""
+        thing = self._thing
+        frame = Pose() if thing.place is None else thing.place.world_pose
+        pose = frame.after(thing.local)
+        self.inward = pose.inverse
+        self.center = pose.position
+        up = pose.rotation[6:]
+        box_m = sum(abs(share) * length / 2.0 for share, length in zip(up, thing.size, strict=True))
+        self.half_height_m = self.radius_m if thing.mesh else box_m
+
+
+def reflection(thing: Drawn) -> float:
+    """Return the share of infra-red light that a shape returns, 0.2 to 1."""
+    red, _, _, opaque = thing.color
+    return 0.2 + 0.8 * red * opaque * (1.0 - 0.5 * thing.roughness)
+
+
+def _ray(beam: Beam) -> tuple[Vector, Vector, float]:
+    """Return origin, unit direction and reach of a beam, in the robot's frame."""
+    x, y, across, along = beam.ray
+    stretch = math.hypot(1.0, beam.slope)
+    direction = (across / stretch, along / stretch, beam.slope / stretch)
+    return (x, y, beam.height_m), direction, beam.reach_m
+
+
+def _bundle(
+    targets: Sequence[_Target], pose: Pose, origin: Vector, rays: Sequence[tuple[Vector, float]]
+) -> Iterator[Glance]:
+    """Yield what rays of one origin meet; origin and directions are in the frame of `pose`."""
+    start = pose.carry(origin)
+    farthest = max(reach_m for _, reach_m in rays)
+    near = []
+    for target in targets:
+        offset = _minus(target.center, start)
+        beyond = _dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
+        if beyond < 0.0 or math.hypot(*offset) - target.radius_m < farthest:
+            near.append((target, *offset, target.radius_m, beyond, target.inward.carry(start)))
+    near.sort(key=itemgetter(5))  # the nearest hides most
+    level = [row for row in near if abs(row[3]) <= row[0].half_height_m]
+    for direction, reach_m in rays:
+        dx, dy, dz = towards = turn(pose.rotation, direction)
+        nearest, light = reach_m, 1.0
+        for target, x, y, z, radius_m, beyond, inside in near if dz else level:
+            along = x * dx + y * dy + z * dz
+            if along - radius_m > nearest or (beyond > 0.0 and (along < 0.0 or beyond > along * along)):
+                continue
+            distance_m = target.hit(inside, turn(target.inward.rotation, towards))
+            if distance_m < nearest:
+                nearest, light = distance_m, target.reflection
+        yield Glance(nearest, light)
+
+
+def _radius(thing: Drawn) -> float:
+    """Return the radius of the ball around the origin of its frame that contains a shape."""
+    if thing.mesh is None:
+        return math.hypot(*thing.size) / 2.0
+    return max(math.dist((0.0, 0.0, 0.0), point) for point in _scaled(thing.mesh, thing.size))
+
+
+Surface = Callable[[Vector, Vector], float]
+
+
+def _surface(thing: Drawn) -> Surface:
+    """Return a function of origin and direction in its frame, which returns the meters to its surface."""
+    half = thing.size[0] / 2.0, thing.size[1] / 2.0, thing.size[2] / 2.0
+    if thing.mesh is not None:
+        return _of_mesh(_scaled(thing.mesh, thing.size), thing.mesh)
+    match thing.kind:
+        case "ball":
+            return lambda origin, direction: _ball(origin, direction, half)
+        case "cylinder":
+            return lambda origin, direction: _cylinder(origin, direction, half)
+        case "capsule":
+            return lambda origin, direction: _capsule(origin, direction, half)
+    return lambda origin, direction: _box(origin, direction, half)
+
+
+def _box(origin: Vector, direction: Vector, half: Vector) -> float:
+    enter, leave, inside = 0.0, math.inf, True
+    for axis in (0, 1, 2):
+        at, towards, reach = origin[axis], direction[axis], half[axis]
+        outside = at >= reach or at <= -reach
+        inside = inside and not outside
+        if -_PARALLEL < towards < _PARALLEL:
+            if outside:
+                return math.inf
+            continue
+        first, second = (-reach - at) / towards, (reach - at) / towards
+        if first > second:
+            first, second = second, first
+        enter = max(enter, first)
+        leave = min(leave, second)
+        if enter > leave:
+            return math.inf
+    return math.inf if inside else enter
+
+
+def _ball(origin: Vector, direction: Vector, half: Vector) -> float:
+    """Return the meters to an ellipsoid, which is a ball of radius 1 in a frame of its sizes."""
+    ox, oy, oz = (at / size for at, size in zip(origin, half, strict=True))
+    dx, dy, dz = (towards / size for towards, size in zip(direction, half, strict=True))
+    return _root(dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0)
+
+
+def _root(square: float, half_linear: float, constant: float) -> float:
+    """Return the first root of a ray's equation; infinite behind the origin, inside, or without one."""
+    under = half_linear * half_linear - square * constant
+    if constant < 0.0 or under < 0.0 or square < _PARALLEL:
+        return math.inf
+    first = (-half_linear - math.sqrt(under)) / square
+    return first if first >= 0.0 else math.inf
+
+
+def _cylinder(origin: Vector, direction: Vector, half: Vector) -> float:
+    """Return the meters to a cylinder around z, whose outline is an ellipse where its sizes differ."""
+    ox, oy, dx, dy = origin[0] / half[0], origin[1] / half[1], direction[0] / half[0], direction[1] / half[1]
+    apart = ox * ox + oy * oy - 1.0
+    if apart < 0.0 and abs(origin[2]) < half[2]:
+        return math.inf
+    side = _root(dx * dx + dy * dy, ox * dx + oy * dy, apart)
+    found = side if abs(origin[2] + side * direction[2]) <= half[2] else math.inf
+    if abs(direction[2]) > _PARALLEL:
+        end = (-math.copysign(half[2], direction[2]) - origin[2]) / direction[2]
+        if end >= 0.0 and math.hypot(ox + end * dx, oy + end * dy) <= 1.0:
+            found = min(found, end)
+    return found
+
+
+def _capsule(origin: Vector, direction: Vector, half: Vector) -> float:
+    """Return the meters to a capsule around z; `half` counts its caps."""
+    radius = half[0]
+    straight = max(half[2] - radius, 0.0)
+    ox, oy, oz = origin
+    dx, dy, dz = direction
+    if math.dist(origin, (0.0, 0.0, max(-straight, min(straight, oz)))) < radius:
+        return math.inf
+    side = _root(dx * dx + dy * dy, ox * dx + oy * dy, ox * ox + oy * oy - radius * radius)
+    found = side if abs(oz + side * dz) <= straight else math.inf
+    for cap in (-straight, straight):
+        at = oz - cap
+        found = min(found, _root(1.0, ox * dx + oy * dy + at * dz, ox * ox + oy * oy + at * at - radius**2))
+    return found
+
+
+def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
+    return [(x * scale[0], y * scale[1], z * scale[2]) for x, y, z in mesh.points]
+
+
+def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
+    """Return the surface of triangles, of which both sides are seen."""
+    corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
+
+    def nearest(origin: Vector, direction: Vector) -> float:
+        return min((_triangle(origin, direction, *three) for three in corners), default=math.inf)
+
+    return nearest
+
+
+def _triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
+    """Return the meters to a triangle, as in Möller and Trumbore (1997)."""
+    first, second, apart = _minus(b, a), _minus(c, a), _minus(origin, a)
+    across = _cross(direction, second)
+    volume = _dot(first, across)
+    if abs(volume) < _PARALLEL:
+        return math.inf
+    u = _dot(apart, across) / volume
+    turned = _cross(apart, first)
+    v = _dot(direction, turned) / volume
+    if u < 0.0 or v < 0.0 or u + v > 1.0:
+        return math.inf
+    distance = _dot(second, turned) / volume
+    return distance if distance >= 0.0 else math.inf
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,280 @@
+"""From the nodes of a world to what cameras see: shapes, each with a color and the place that carries it.
+
+Pure. Textures, lights and mesh files are not read: a shape has one color. A stand-in has the shapes of its
+outline, in the color of its first appearance. What a scale distorts keeps its angles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle
+from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.old_axes import standing
+
+Kind = Literal["box", "ball", "cylinder", "capsule", "mesh"]
+Color = tuple[float, float, float, float]  # red, green, blue, alpha, from 0 to 1
+
+_WHITE: Final = (1.0, 1.0, 1.0)
+_STAND_IN: Final = (0.72, 0.70, 0.66)
+_FLOOR: Final = (0.45, 0.46, 0.47)  # of a stand-in; its walls have another color
+_PATTERN: Final = (0.7, 0.7, 0.7)  # of a texture or a PROTO's appearance that is not read
+_MATERIAL: Final = (0.8, 0.8, 0.8)  # Source: Material.diffuseColor of Webots
+_NIGHT: Final = (0.0, 0.0, 0.0)  # Source: Background.skyColor of Webots
+_DAY: Final = (0.62, 0.76, 0.92)  # of a sky that is a texture
+_SHEET_M: Final = 0.002  # a plane is a box of this height; its upper side is the plane
+_LARGEST_M: Final = 1e5
+_PLACING: Final = frozenset(("translation", "rotation"))
+_LOOKING: Final = _PLACING | {"scale"}
+# What the look of a shape, or of the sky, is written in.
+_LOOKS: Final = frozenset(
+    (
+        "Appearance",
+        "Background",
+        "Box",
+        "Capsule",
+        "Cone",
+        "Coordinate",
+        "Cylinder",
+        "ElevationGrid",
+        "IndexedFaceSet",
+        "Material",
+        "PBRAppearance",
+        "Plane",
+        "Shape",
+        "Sphere",
+    )
+)
+_HOLDING: Final = ("children", "endPoint")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drawn:
+    """One visible shape.
+
+    Attributes:
+        kind: "ball" is an ellipsoid if its sizes differ.
+        size: x, y, z in meters; of what is round 2 r, 2 r, height. A mesh is scaled by it.
+        color: of all of it.
+        local: its frame in that of `place`, in meters of the world.
+        place: that carries it; None: the world.
+        node: the Shape, or the stand-in.
+        mesh: of kind "mesh".
+        roughness: of a PBRAppearance, 0 to 1.
+    """
+
+    kind: Kind
+    size: Vector
+    color: Color
+    local: Pose
+    place: Frame | None
+    node: SceneNode
+    mesh: Mesh | None = None
+    roughness: float = 0.0
+
+
+def drawn(root: SceneNode) -> Iterator[Drawn]:
+    """Yield what is visible of a node and all inside it, with the fields and places of this moment."""
+    yield from _inside(root, _Frame())
+
+
+class View:
+    """What of a world is visible, and how often it has changed.
+
+    Attributes:
+        root: of the world.
+        changes: how often something has come, gone, or got another look.
+        moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
+    """
+
+    def __init__(self, root: SceneNode) -> None:
+        self.root = root
+        self.changes = 0
+        self.moves = 0
+
+    def written(self, node: SceneNode, field: str) -> None:
+        """Count the write of a field, if it is visible."""
+        if field in _PLACING and node.place is not None:
+            self.moves += 1
+        elif node.stand_in or node.type_name in _LOOKS or field in _LOOKING:
+            self.changes += 1
+
+    def things(self) -> tuple[Drawn, ...]:
+        """Return what is visible now."""
+        return tuple(drawn(self.root))
+
+    def sky(self) -> Vector:
+        """Return the color of the background, red, green and blue from 0 to 1."""
+        for node in self.root.nodes():
+            if node.type_name == "Background":
+                return _triple(_mixed(node, "skyColor", _NIGHT))
+            if "TexturedBackground" in {node.type_name, node.proto_name}:
+                return _DAY
+        return _NIGHT
+
+
+class _Frame(NamedTuple):
+    """A frame in that of a place, and by how much it makes what is in it larger, along its axes."""
+
+    place: Frame | None = None
+    pose: Pose = Pose()
+    scale: Vector = (1.0, 1.0, 1.0)
+
+    def at(self, position: Vector) -> Pose:
+        """Return the frame around a position in this one."""
+        x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
+        return self.pose.after(Pose((x, y, z)))
+
+    def within(self, node: SceneNode) -> _Frame:
+        """Return the frame of a node in this one."""
+        scale = (1.0, 1.0, 1.0) if node.stand_in else _numbers(node, "scale", (1.0, 1.0, 1.0))
+        place = node.place
+        if place is not None:
+            # An even scale is the place's own.
+            x, y, z = scale if len(set(scale)) > 1 else (1.0, 1.0, 1.0)
+            return _Frame(place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
+        turned = _numbers(node, "rotation", (0.0, 0.0, 1.0, 0.0))
+        pose = self.at(_triple(_numbers(node, "translation", (0.0, 0.0, 0.0))))
+        x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
+        rotation = from_axis_angle((turned[0], turned[1], turned[2], turned[3]))
+        return _Frame(self.place, pose.after(Pose(rotation=rotation)), (x, y, z))
+
+
+def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
+    if node.type_name == "Shape":
+        look = _of_shape(node)
+        for geometry in node.nodes("geometry"):
+            yield from _geometry(geometry, frame, look, node)
+    elif node.left_out and node.type_name != "Robot":
+        return
+    elif node.stand_in:
+        yield from _stand_in(node, frame.within(node))
+    else:
+        inner = frame.within(node)
+        for name in _HOLDING:
+            for child in node.nodes(name):
+                yield from _inside(child, inner)
+
+
+def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
+    looks = [it for it in node.inside() if it.type_name in {"Appearance", "PBRAppearance"}]
+    look = _look(looks[0]) if looks else None
+    for outline in node.nodes("boundingObject"):
+        for pose in outline.nodes():
+            for geometry in pose.nodes():
+                plain = _FLOOR if geometry.type_name == "Plane" else _STAND_IN
+                yield from _geometry(geometry, frame.within(pose), look or _Look((*plain, 1.0)), node)
+
+
+class _Look(NamedTuple):
+    color: Color
+    roughness: float = 0.0
+
+
+def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
+    """Yield the shape of a geometry; nothing for one whose numbers are none, or that is in another file."""
+    solid = _solid(node, frame.pose)
+    if solid is None or look.color[3] <= 0.0:
+        return
+    x, y, z = (length * factor for length, factor in zip(solid.size, frame.scale, strict=True))
+    if node.type_name == "Plane":
+        z = _SHEET_M
+    if min(x, y, z) > 0.0:
+        yield Drawn(
+            kind=solid.kind,
+            size=(x, y, z),
+            color=look.color,
+            local=solid.pose,
+            place=frame.place,
+            node=owner,
+            mesh=solid.mesh,
+            roughness=look.roughness,
+        )
+
+
+class _Solid(NamedTuple):
+    kind: Kind
+    size: Vector
+    pose: Pose
+    mesh: Mesh | None = None
+
+
+def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
+    """Return the solid of a geometry in a frame; None if it has none."""
+    diameter = 2.0 * _number(node, "radius", 1.0)
+    match node.type_name:
+        case "Box":
+            return _Solid("box", _triple(_numbers(node, "size", (0.1, 0.1, 0.1))), pose)
+        case "Sphere":
+            return _Solid("ball", (diameter, diameter, diameter), pose)
+        case "Cylinder":
+            height = _number(node, "height", 2.0)
+            return _Solid("cylinder", (diameter, diameter, height), standing(node, pose))
+        case "Capsule":
+            height = _number(node, "height", 2.0) + diameter
+            return _Solid("capsule", (diameter, diameter, height), standing(node, pose))
+        case "Plane":
+            x, y = _numbers(node, "size", (1.0, 1.0))
+            below = standing(node, pose).after(Pose((0.0, 0.0, -_SHEET_M / 2.0)))
+            return _Solid("box", (x, y, _SHEET_M), below)
+    found = _mesh(node, pose)
+    return None if found is None else _Solid("mesh", (1.0, 1.0, 1.0), *found)
+
+
+def _mesh(node: SceneNode, pose: Pose) -> tuple[Pose, Mesh] | None:
+    mesh: Mesh | None = None
+    match node.type_name:
+        case "Cone":
+            pose = standing(node, pose)
+            mesh = cone(_number(node, "bottomRadius", 1.0), _number(node, "height", 2.0))
+        case "IndexedFaceSet":
+            mesh = face_set(node)
+        case "ElevationGrid":
+            pose = standing(node, pose)
+            mesh = elevation_grid(node)
+    return None if mesh is None else (pose, mesh)
+
+
+def _of_shape(shape: SceneNode) -> _Look:
+    look = next(iter(shape.nodes("appearance")), None)
+    return _Look((*_WHITE, 1.0)) if look is None else _look(look)
+
+
+def _look(look: SceneNode) -> _Look:
+    """Return the look of an Appearance, of a PBRAppearance, or of a PROTO for one."""
+    if look.type_name == "Appearance":
+        material = next(iter(look.nodes("material")), None)
+        if material is None:
+            return _Look((*(_PATTERN if look.nodes("texture") else _WHITE), 1.0))
+        return _Look(_mixed(material, "diffuseColor", _MATERIAL))
+    if look.type_name == "PBRAppearance":
+        color = _mixed(look, "baseColor", _PATTERN if look.nodes("baseColorMap") else _WHITE)
+        return _Look(color, min(1.0, max(0.0, _number(look, "roughness", 0.0))))
+    return _Look(_mixed(look, "colorOverride", _PATTERN))
+
+
+def _mixed(node: SceneNode, field: str, default: tuple[float, float, float]) -> Color:
+    red, green, blue = (min(1.0, max(0.0, share)) for share in _numbers(node, field, default))
+    return red, green, blue, 1.0 - min(1.0, max(0.0, _number(node, "transparency", 0.0)))
+
+
+def _numbers(node: SceneNode, field: str, default: tuple[float, ...]) -> tuple[float, ...]:
+    """Return as many finite numbers as `default` has; `default` if the field has others."""
+    numbers = node.numbers(field)
+    if numbers is None or len(numbers) != len(default):
+        return default
+    fit = all(math.isfinite(number) and abs(number) <= _LARGEST_M for number in numbers)
+    return numbers if fit else default
+
+
+def _number(node: SceneNode, field: str, default: float) -> float:
+    return _numbers(node, field, (default,))[0]
+
+
+def _triple(numbers: Sequence[float]) -> Vector:
+    return numbers[0], numbers[1], numbers[2]

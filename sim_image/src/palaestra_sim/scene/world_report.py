@@ -1,0 +1,168 @@
+"""What the stub makes of a world, for its author: `palaestra-stub --check`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final, Protocol
+
+from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.device_type import DeviceType
+from palaestra_sim.scene.devices.distance_sensor import DistanceSensor, DistanceSensorType
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.nodes.types import is_base_type
+from palaestra_sim.scene.old_axes import of_old_axes
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.tree.field_types import without_effect
+from palaestra_sim.scene.tree.scene_tree import SceneTree
+
+_ROLLS_AND_TURNS: Final = 2
+_MOST_NAMES: Final = 8  # of devices in one line
+
+
+class Described(Protocol):
+    """A loaded world."""
+
+    tree: SceneTree
+
+    @property
+    def robots(self) -> Sequence[Robot]:
+        """Its robots."""
+        ...
+
+    @property
+    def forces(self) -> bool:
+        """Whether the nodes of the world have masses and frictions that matter."""
+        ...
+
+    @property
+    def left_out(self) -> Sequence[WorldError]:
+        """Nodes that were left out, each with its place."""
+        ...
+
+
+def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
+    """Yield lines about robots, stand-ins, and all that was left out.
+
+    The world is read with everything left out that the simulator lacks, so that the rest can be described; or
+    with what the user has `chosen` to leave out.
+    """
+    for robot in simulation.robots:
+        yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
+    stand_ins = Counter(node.proto_name for node in simulation.tree.nodes.values() if node.stand_in)
+    if stand_ins:
+        yield f"stand-ins, which stand still: {_counted(stand_ins)}"
+    if release := _old_release(simulation):
+        yield f"a world of {release}: its nodes are turned to the axes of today, as by Webots"
+    silent = silent_devices(simulation.robots)
+    if silent:
+        yield f"devices without readings, whose enable answers failure: {silent}"
+    for difference in differences(simulation):
+        yield f"differs from Webots: {difference}"
+    if error := refusal(simulation.tree.ignored):
+        yield from str(error).splitlines()
+    if error := refusal(lacks(simulation)):
+        yield "left out:" if chosen else "cannot be simulated; --leave-out leaves it out:"
+        yield from str(error).splitlines()
+
+
+def _old_release(simulation: Described) -> str:
+    """Return the release of a world whose nodes have other axes than today; "" for another one."""
+    first = next(iter(simulation.tree.root.nodes()), None)
+    if first is None or first.origin is None or not of_old_axes(first):
+        return ""
+    return first.origin.source.header().split()[-2]
+
+
+def lacks(simulation: Described) -> list[WorldError]:
+    """Return what was left out because the simulator lacks it."""
+    return [each for each in simulation.left_out if each not in simulation.tree.ignored]
+
+
+def silent_devices(robots: Iterable[Robot]) -> str:
+    """Return how many devices have no readings here, by type; "" if all have."""
+    return _counted(
+        Counter(
+            kind.node
+            for robot in robots
+            if robot.parts.arguments is not None
+            for kind, device in robot.parts.devices.rows.values()
+            if kind.silent(device)
+        )
+    )
+
+
+def differences(simulation: Described) -> Iterator[str]:
+    """Yield what devices and obstacles of this world have other values for than in Webots."""
+    robots = [robot.parts for robot in simulation.robots if robot.parts.arguments is not None]
+    devices = [row for robot in robots for row in robot.devices.rows.values()]
+    types = Counter(it.type for _, it in devices if isinstance(it, DistanceSensor))
+    lidars = sum(kind.node == "Lidar" for kind, _ in devices)
+    outlines = [node for node in simulation.tree.nodes.values() if node.outline]
+    meshes = sum(node.type_name == "IndexedFaceSet" for node in outlines)
+    yield from _not_in_webots(devices)
+    yield from _without_effect(simulation)
+    if infrared := types[DistanceSensorType.INFRA_RED]:
+        yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
+    if lidars:
+        yield f"{lidars} Lidar: rays pass the robot itself"
+    if meshes:
+        yield f"{meshes} IndexedFaceSet as boundingObject: the box around its points"
+    rays = (
+        beam
+        for _, it in devices
+        if isinstance(it, DistanceSensor) and it.type != DistanceSensorType.INFRA_RED
+        for beam in it.beams
+    )
+    sloped = any(not beam.level for beam in rays)
+    if sloped and not any(node.type_name == "Plane" for node in outlines):
+        yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _not_in_webots(devices: Iterable[tuple[DeviceType[Any], Any]]) -> Iterator[str]:
+    """Yield a line for each type of device that Webots does not have, with the names of its devices."""
+    names: dict[str, list[str]] = {}
+    for kind, device in devices:
+        if not is_base_type(kind.node):
+            names.setdefault(kind.node, []).append(device.name)
+    for type_name, of_type in sorted(names.items()):
+        more = ", ..." if len(of_type) > _MOST_NAMES else ""
+        named = ", ".join(of_type[:_MOST_NAMES])
+        yield f"{len(of_type)} {type_name}, a type that Webots does not have: {named}{more}"
+
+
+def _without_effect(simulation: Described) -> Iterator[str]:
+    """Yield a line for each type of node with fields that have an effect in Webots alone."""
+    by_ros = [robot.parts.node for robot in simulation.robots if robot.parts.arguments is not None]
+    fields: dict[str, Counter[str]] = {}
+    for node in simulation.tree.nodes.values():
+        matters = _is_on(node, by_ros) if node.type_name in DEVICES else simulation.forces
+        if matters and not node.left_out:
+            fields.setdefault(node.type_name, Counter()).update(without_effect(node))
+    for type_name, names in sorted(fields.items()):
+        if names:
+            yield f"{max(names.values())} {type_name}: without effect: {', '.join(sorted(names))}"
+
+
+def _is_on(node: SceneNode, robots: Sequence[SceneNode]) -> bool:
+    """Return whether a device is on one of these robots."""
+    return any(around in robots for around in node.ancestors())
+
+
+def _of_robot(robot: Robot) -> Iterator[str]:
+    controller = robot.parts.node.text("controller") or "<generic>"
+    yield f'controller "{controller}"' + ("" if controller == "ros" else " does not run here")
+    drive = robot.body.base.drive if robot.body is not None else None
+    if drive is None:
+        yield "no wheels"
+    else:
+        kind = "differential" if drive.freedoms == _ROLLS_AND_TURNS else "omnidirectional"
+        yield f"{kind} drive on {len(drive.to_speeds)} wheels"
+    devices = Counter(kind.node for kind, _ in robot.parts.devices.rows.values())
+    if devices:
+        yield _counted(devices)
+
+
+def _counted(names: Counter[str]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(names.items()))

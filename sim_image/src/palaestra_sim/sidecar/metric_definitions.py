@@ -1,0 +1,35 @@
+"""Every metric of a sidecar, by name; `palaestra_sim.sidecar.metrics` reads their values.
+
+They describe the simulator's process. The trainer exports the metrics of the episodes, and Prometheus adds
+the labels of job and simulator.
+"""
+
+from palaestra_protocol.control import SidecarState
+from palaestra_protocol.metrics import Family, Label, counter, gauge
+from palaestra_sim.sidecar.simulator import FAULT_KINDS
+from palaestra_sim.sidecar.world_files import SLOTS
+
+SLOT = Label(name="slot", values=SLOTS, bound="simulator of the sidecar")
+STATE = Label(name="state", values=tuple(SidecarState))
+KIND = Label(name="kind", values=FAULT_KINDS)
+
+UP = gauge("palaestra_simulator_up", "1 if the simulator's process runs.", SLOT)
+STATES = gauge("palaestra_simulator_state", "1 for the state that the simulator is in.", SLOT, STATE)
+STARTS = counter("palaestra_simulator_starts_total", "How often the simulator was started.", SLOT)
+EXITS = counter(
+    "palaestra_simulator_unexpected_exits_total",
+    "Unexpected ends of the simulator: with an exit code, by a signal, or unknown.",
+    SLOT,
+    KIND,
+)
+MEMORY = gauge("palaestra_simulator_rss_bytes", "Memory of its processes.", SLOT)
+PROCESSOR = counter(
+    "palaestra_simulator_cpu_seconds_total", "Processor time of its processes since its last start.", SLOT
+)
+BUILD = gauge(
+    "palaestra_sidecar_build_info",
+    "Always 1; the label is the release.",
+    Label(name="version", bound="release"),
+)
+
+FAMILIES: tuple[Family, ...] = (UP, STATES, STARTS, EXITS, MEMORY, PROCESSOR, BUILD)

@@ -1,0 +1,158 @@
+"""Put the world that the simulator will run where it can run it.
+
+Only the sidecar writes names into a world. It gets a source world, from the image or from the replica's
+ConfigMap. ConfigMaps of older releases hold a generated world for each simulator; the generator makes the
+same world again from a generated one.
+"""
+
+import os
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from palaestra_protocol.control import RobotName
+from palaestra_sim.errors import RootError, SidecarError, WorldError
+from palaestra_sim.sidecar import project
+from palaestra_sim.world import MJCF, RunIdentity, builtin_path, generate, placed, rename, robots, suffix
+from palaestra_sim.world import root_of as root_around
+from palaestra_sim.world.bounded_read import read_bounded
+
+SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
+_PROJECT = "project"
+
+
+def located(world: str) -> Path:
+    """Return the path of a world: a file, or else the shipped world of that name."""
+    path = Path(world)
+    shipped = builtin_path(world) if path.name == world and not path.exists() else None
+    return shipped or path
+
+
+def read(world: Path) -> bytes:
+    """Return the bytes of a world.
+
+    Raises:
+        SidecarError: the file does not exist, or may not be read.
+    """
+    try:
+        return read_bounded(world)
+    except OSError as error:
+        raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt or .xml file") from error
+
+
+def named(
+    world: Path,
+    work: Path,
+    identity: RunIdentity,
+    *,
+    clock: bool,
+    as_project: bool = False,
+    root: Path | None = None,
+) -> Path:
+    """Write this simulator's world, made from `world`, into the folder `work`; return its path.
+
+    With `as_project`, or if the world refers to files beside it, it is written into a Webots project in
+    `work`, with links to the files around `world`. These go up to `root`; None: to the nearest folder that
+    holds all files.
+
+    Raises:
+        WorldError: the world is wrong.
+        SidecarError: it cannot be read or written; no partial file is left.
+    """
+    source = read(world)
+    make = partial(generate, source, identity, clock=clock, name=str(world))
+    path = work / file_name(identity, suffix(source))
+    return _written(world, path, make, as_project=as_project, root=root)
+
+
+def renamed(
+    world: Path, work: Path, ending: str, *, as_project: bool = False, root: Path | None = None
+) -> Path:
+    """Write a copy of `world` with `ending` appended to its ROS names into `work`; return its path.
+
+    `as_project` and `root` are as for `named`.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    source = read(world)
+    make = partial(rename, source, ending, name=str(world))
+    path = work / f"{world.stem}{ending}{suffix(source)}"
+    return _written(world, path, make, as_project=as_project, root=root)
+
+
+def root_of(world: Path, given: Path | None) -> Path:
+    """Return the folder around `world` that holds all that it names: `given`, or the nearest one.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    try:
+        return root_around(placed(world), read(world), given)
+    except RootError as error:
+        raise SidecarError(f"--root: {error}") from error
+    except OSError as error:
+        raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
+
+
+def root_of_model(world: Path, given: Path | None) -> Path | None:
+    """Return the same for a model of MuJoCo; None for another world, of which no simulator here asks it.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    return root_of(world, given) if suffix(read(world)) == MJCF else None
+
+
+def _written(
+    world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool, root: Path | None
+) -> Path:
+    """Write the result of `make` for `world` to `path`, or to a project in the folder of `path`."""
+    source, work = placed(world), path.parent
+    try:
+        generated, linked = make(), as_project and project.has_project(source)
+    except WorldError:
+        generated, linked = make(relative_addresses=True), True
+    try:
+        if as_project or linked:
+            around = root_of(world, root)
+            path = project.lay_out(source, work / _PROJECT, around, linked=linked) / path.name
+        return _write_whole(path, generated)
+    except OSError as error:
+        raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
+
+
+def file_name(identity: RunIdentity, ending: str = ".wbt") -> str:
+    """Return the name of a simulator's own world: `collect-0.wbt`, `collect-0b.wbt` for its standby."""
+    slot = "" if identity.slot == SLOTS[0] else identity.slot
+    return f"{identity.group}-{identity.index}{slot}{ending}"
+
+
+def described(source: bytes, name: str) -> tuple[RobotName, ...]:
+    """Return the robots of a world that a client can find: those with a ROS name.
+
+    Raises:
+        WorldError: the world is wrong.
+    """
+    return tuple(
+        RobotName(
+            robot=robot.robot,
+            ros_name=robot.ros_name,
+            supervisor=robot.supervisor,
+            definition=robot.definition,
+        )
+        for robot in robots(source, name)
+        if robot.ros_name
+    )
+
+
+def _write_whole(path: Path, content: bytes) -> Path:
+    """Write a file atomically."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path

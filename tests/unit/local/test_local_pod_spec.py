@@ -1,0 +1,98 @@
+"""A planned pod as this machine reads it."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.api import validate
+from palaestra.local.errors import RunRefused
+from palaestra.local.pod_spec import read_pod
+from palaestra.local.terminal import as_seen
+from palaestra.plan import Images, LocalLayout, identified, plan
+
+JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
+
+
+def template(**spec):
+    """Return the pod template of a job in a laptop's layout."""
+    layout = LocalLayout(images=Images.of_release("1"), job_directory="/runs/a")
+    job = identified(validate({**JOB, "spec": spec}), "uid")
+    return plan(job, layout).replicas[0].job["spec"]["template"]
+
+
+def test_every_planned_container_is_read_in_order():
+    """What the kubelet of a cluster would start, and nothing else."""
+    pod = read_pod(template(), "pod-1")
+
+    assert [each.name for each in pod.containers] == [
+        "ros-master",
+        "sim-collect-0",
+        "sim-evaluate-0",
+        "trainer",
+    ]
+    assert [each.sidecar for each in pod.containers] == [True, True, True, False]
+    assert pod.main.command == ("palaestra-train",)
+    assert pod.grace_s == 60
+
+
+def test_probes_are_those_of_the_plan():
+    """A startup probe for master and trainer, liveness for sidecars and trainer, on loopback."""
+    pod = read_pod(template(), "pod-1")
+
+    assert pod.init[0].startup.command[0] == "bash"
+    assert pod.init[1].liveness.url == "http://127.0.0.1:7200/healthz"
+    assert pod.main.startup.url == pod.main.liveness.url
+    assert pod.main.liveness.url == "http://127.0.0.1:9090/healthz"
+
+
+def test_the_uid_of_the_pod_is_filled_in_for_each_attempt():
+    """The downward API does it in a cluster; attempts.jsonl tells pods apart by it."""
+    assert read_pod(template(), "pod-7").main.env["PALAESTRA_POD_UID"] == "pod-7"
+
+
+def test_what_an_author_writes_reaches_the_program_as_it_stands():
+    """A kubelet would put variables in the place of some of it, so a plan says what it makes this of."""
+    texts = ("echo $$ $HOME", "$(ROS_HOME)", "$$(ROS_HOME)", "$")
+    written = {"command": list(texts), "env": [{"name": "TEXT", "value": texts[1]}]}
+
+    main = read_pod(template(trainer=written), "pod-1").main
+
+    assert main.command == texts
+    assert main.env["TEXT"] == texts[1]
+
+
+def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
+    """Leaving it out would fail later, somewhere in the trainer."""
+    secret = {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}}
+
+    with pytest.raises(RunRefused, match=r"env TOKEN of container trainer: .* give it as `value`"):
+        read_pod(template(trainer={"env": [secret]}), "pod-1")
+
+
+def test_a_second_main_container_is_refused():
+    """Whose exit code would count?"""
+    two = {"spec": {"containers": [{"name": "a", "command": ["x"]}, {"name": "b", "command": ["y"]}]}}
+
+    with pytest.raises(RunRefused, match="container b"):
+        read_pod(two, "pod-1")
+
+
+@pytest.mark.parametrize(
+    ("drawn", "seen"),
+    [
+        ("plain", "plain"),
+        ("windows\r", "windows"),
+        ("10%\r20%\r30%", "30%"),
+        ("\r\x1b[2Kinfo \x1b[32mdone\x1b[0m", "info done"),
+        ("\x1b[?25h\x1b[1Atext", "text"),
+    ],
+)
+def test_a_log_has_what_was_seen_last(drawn, seen):
+    """A progress bar that is redrawn a thousand times is no thousand lines."""
+    assert as_seen(drawn) == seen
+
+
+@given(st.text(alphabet=st.characters(exclude_characters="\x1b\r\n")))
+def test_text_without_control_sequences_is_kept(line):
+    """Nothing of a traceback may get lost."""
+    assert as_seen(line) == line

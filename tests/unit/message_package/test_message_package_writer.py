@@ -1,0 +1,134 @@
+"""`palaestra-webots-ros` in a folder: new, with an earlier package, with another's, and full."""
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.message_package.cli import main
+from palaestra_sim.message_package.files import package_files
+from palaestra_sim.message_package.package_writer import make_importable, write
+
+COMMAND = Path(sys.executable).with_name("palaestra-webots-ros")
+SYSTEM_PYTHON = "/usr/bin/python3"  # has genpy and the messages of Debian, and nothing of ours
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """Return a package that is only read."""
+    return write(tmp_path_factory.mktemp("share"))
+
+
+def contents(folder):
+    """Return the text of every file, without Python's bytecode."""
+    return {
+        str(path.relative_to(folder)): path.read_text()
+        for path in folder.rglob("*")
+        if path.is_file() and path.suffix != ".pyc"
+    }
+
+
+def python(code, *arguments):
+    """Return what a Python program prints."""
+    done = subprocess.run(
+        [SYSTEM_PYTHON, "-c", code, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    return done.stdout.strip()
+
+
+def test_the_folder_holds_every_file_of_the_package_and_nothing_besides(package):
+    """ROS's tools search every folder on ROS_PACKAGE_PATH."""
+    assert contents(package) == dict(package_files())
+    assert [path.name for path in package.parent.iterdir()] == ["webots_ros"]
+
+
+def test_the_bytecode_names_the_files_where_they_are(package):
+    """In a container it cannot be compiled again, and a traceback shows lines of files."""
+    code = "import sys; sys.path.append(sys.argv[1]); import webots_ros.srv._set_int as module\n"
+    code += "print(module.__cached__, module.set_intRequest.serialize.__code__.co_filename)"
+
+    cached, source = map(Path, python(code, package / "src").split())
+
+    assert cached.exists()
+    assert source == package / "src/webots_ros/srv/_set_int.py"
+
+
+def test_a_package_of_an_earlier_release_is_replaced_as_a_whole(tmp_path):
+    """A type that is gone would otherwise stay importable."""
+    (write(tmp_path) / "srv/gone.srv").write_text("---\n")
+
+    package = write(tmp_path)
+
+    assert contents(package) == dict(package_files())
+    assert list(tmp_path.iterdir()) == [package]
+
+
+def test_a_failed_write_leaves_the_earlier_package_as_it_was(tmp_path):
+    """Here no file may have more than 3,000 bytes, as on a disk that becomes full half-way."""
+    earlier = write(tmp_path) / "srv/earlier.srv"
+    earlier.write_text("---\n")
+
+    done = subprocess.run(
+        [COMMAND, tmp_path],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"palaestra-webots-ros: {tmp_path}: File too large; choose a folder to write to\n"
+    assert earlier.exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["webots_ros"]
+
+
+def test_a_package_of_another_origin_is_left_alone(tmp_path, capsys):
+    """It may be Webots' own, built from its sources."""
+    other = tmp_path / "webots_ros/package.xml"
+    other.parent.mkdir()
+    other.write_text("<package><name>webots_ros</name></package>")
+
+    code = main([str(tmp_path)])
+
+    assert code == 2
+    assert "webots_ros: is a package that Palaestra did not write; use it as it is" in capsys.readouterr().err
+    assert contents(tmp_path) == {"webots_ros/package.xml": other.read_text()}
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path, capsys):
+    """The remedy is another folder, or another user."""
+    (tmp_path / "share").write_text("")
+
+    code = main([str(tmp_path / "share")])
+
+    assert code == 2
+    assert f"{tmp_path}/share: File exists; choose a folder to write to" in capsys.readouterr().err
+
+
+IMPORTED = "import site, sys; site.addsitedir(sys.argv[1]); sys.path.append(sys.argv[2])\n"
+IMPORTED += "import webots_ros.srv; print(webots_ros.srv.set_int)"
+
+
+def test_a_python_whose_packages_name_it_imports_it(package, tmp_path):
+    """Without PYTHONPATH, which a notebook or a program in a pod does not have."""
+    make_importable(package, tmp_path)
+
+    assert python(IMPORTED, tmp_path, tmp_path / "nothing") == "<class 'webots_ros.srv._set_int.set_int'>"
+
+
+def test_an_installed_webots_ros_is_imported_even_if_it_comes_last(package, tmp_path):
+    """In the virtual environment our packages come before those of the distribution."""
+    make_importable(package, tmp_path)
+    installed = tmp_path / "dist-packages/webots_ros"
+    (installed / "srv").mkdir(parents=True)
+    (installed / "__init__.py").write_text("")
+    (installed / "srv/__init__.py").write_text("set_int = 'of the distribution'\n")
+
+    assert python(IMPORTED, tmp_path, tmp_path / "dist-packages") == "of the distribution"

@@ -1,0 +1,91 @@
+"""What a Workload says of its Job, as Kueue 0.19 writes it."""
+
+import pytest
+
+from palaestra.observe import why_not_admitted
+from palaestra.observe.json_access import MOST_TEXT
+from palaestra.observe.kueue import NO_WORKLOAD
+
+SHORT = "couldn't assign flavors to pod set main: insufficient unused quota for cpu in flavor any-machine"
+UNREADABLE = [
+    {"metadata": 1, "spec": "x"},
+    {"status": {"conditions": "none"}},
+    {"status": {"conditions": [{"type": "QuotaReserved", "status": "False", "message": 5}]}},
+]
+
+
+def condition(kind, status, message=""):
+    """Return a condition of a Workload."""
+    return {"type": kind, "status": status, "message": message}
+
+
+def workload(*conditions, created="2026-01-31T12:00:00Z", active=True, checks=()):
+    """Return a Workload with these conditions."""
+    return {
+        "metadata": {"name": "job-job-0-1a2b3", "creationTimestamp": created},
+        "spec": {"active": active},
+        "status": {"conditions": list(conditions), "admissionChecks": list(checks)},
+    }
+
+
+def test_what_a_job_waits_for_is_in_the_words_of_the_quota():
+    """An author may read a TrainingJob, and no Workload."""
+    assert why_not_admitted([workload(condition("QuotaReserved", "False", SHORT))]) == SHORT
+
+
+def test_long_words_are_bounded_and_on_one_line():
+    """Kueue allows 32,768 characters; a status has a bound."""
+    words = why_not_admitted([workload(condition("QuotaReserved", "False", "a\nb " * 9000))])
+
+    assert len(words) == MOST_TEXT
+    assert words.startswith("a b a b")
+
+
+def test_the_message_for_a_job_without_a_workload_names_what_to_check():
+    """Kueue writes nothing about a Job that it does not manage."""
+    assert why_not_admitted([]) == NO_WORKLOAD
+
+
+def test_a_workload_that_somebody_deactivated_is_named_with_the_remedy():
+    """Its condition may still have the words of the time before."""
+    stopped = workload(condition("QuotaReserved", "False", SHORT), active=False)
+
+    assert why_not_admitted([stopped]) == (
+        "Workload job-job-0-1a2b3 is not active; set its spec.active to true"
+    )
+
+
+def test_checks_that_have_not_passed_are_named():
+    """The quota is there, and a controller beside Kueue has the last word."""
+    checks = [
+        {"name": "budget", "state": "Ready", "message": "paid"},
+        {"name": "machines", "state": "Pending", "message": "2 nodes are on order"},
+        {"name": "approval", "state": "Retry", "message": ""},
+    ]
+    reserved = workload(condition("QuotaReserved", "True", "Quota reserved"), checks=checks)
+
+    assert why_not_admitted([reserved]) == (
+        "AdmissionCheck machines is Pending: 2 nodes are on order; AdmissionCheck approval is Retry"
+    )
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        workload(),
+        workload(condition("QuotaReserved", "True", "Quota reserved"), condition("Admitted", "True")),
+        *UNREADABLE,
+    ],
+    ids=["new", "admitted", "text", "list", "number"],
+)
+def test_nothing_is_said_of_a_workload_that_gives_no_reason(found):
+    """It is about to; or what it holds cannot be read."""
+    assert why_not_admitted([found]) == ""
+
+
+def test_of_several_workloads_the_newest_counts():
+    """Kueue replaces the Workload of a Job that was changed."""
+    old = workload(condition("QuotaReserved", "False", "old"))
+    new = workload(condition("QuotaReserved", "False", "new"), created="2026-01-31T12:00:01Z")
+
+    assert why_not_admitted([new, old]) == "new"

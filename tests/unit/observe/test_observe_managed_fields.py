@@ -1,0 +1,34 @@
+"""The writer of a field, read from managedFields that may hold anything."""
+
+import pytest
+
+from palaestra.observe.managed_fields import suspends
+
+
+def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
+    """Return what one field manager has written."""
+    return {"manager": manager, "operation": "Update", "time": time, "fieldsV1": {"f:spec": {field: {}}}}
+
+
+def test_the_manager_of_the_field_is_found():
+    """Others own other fields."""
+    fields = [entry("palaestra", "f:backoffLimit"), entry("kueue"), entry("kubectl-edit", "f:parallelism")]
+
+    assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
+
+
+def test_of_several_managers_it_is_the_last():
+    """Two that apply the same value share a field."""
+    fields = [entry("kueue", time="2026-01-31T12:00:01Z"), entry("palaestra")]
+
+    assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [None, "kueue", [None, {}, {"manager": 1}], [{**entry("x"), "fieldsV1": {"f:spec": None}}]],
+    ids=["absent", "no list", "no entries", "no fields"],
+)
+def test_what_does_not_tell_is_nobody(fields):
+    """Anything may stand in the cluster."""
+    assert suspends({"metadata": {"managedFields": fields}}) == ""

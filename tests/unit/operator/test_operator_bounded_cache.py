@@ -1,0 +1,120 @@
+"""What no watch reports: how much of it is remembered, of which TrainingJobs, and how long."""
+
+import pytest
+
+from palaestra.cluster import Forbidden
+from palaestra.decide import accept
+from palaestra.operator.bounded_cache import REMEMBERED, BoundedCache
+from palaestra.operator.foreign_jobs import ForeignJobs
+from palaestra.operator.observer import JobObserver
+from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.world_verdicts import WorldChecker
+
+KEY, UID = ("robots", "job"), "u"
+OTHER = ("robots", "other")
+WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
+TRAINING_JOB = {
+    "apiVersion": "palaestra.dev/v1alpha1",
+    "kind": "TrainingJob",
+    "metadata": {"name": "job", "namespace": "robots", "uid": UID, "generation": 1},
+    "spec": {
+        "suspend": True,
+        "simulators": [
+            {"name": "collect", "role": "Collect", "world": WORLD},
+            {"name": "evaluate", "role": "Evaluate", "world": WORLD},
+        ],
+    },
+}
+
+
+@pytest.fixture
+def full():
+    """Return a memory that another TrainingJob has filled."""
+    memory = BoundedCache()
+    memory.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED), "words"))
+    return memory
+
+
+def test_what_a_look_leaves_takes_the_place_of_what_was_known():
+    """Nothing stays of an object that the look did not meet, so nobody has to forget it."""
+    memory = BoundedCache()
+    memory.keep(KEY, UID, {"a": 1, "b": 2})
+
+    memory.keep(KEY, UID, {"b": 3})
+
+    assert memory.known(KEY, UID) == {"b": 3}
+
+
+def test_nothing_is_known_of_a_job_that_was_made_again():
+    """It has the names of the one before, and its uid tells them apart."""
+    memory = BoundedCache()
+    memory.keep(KEY, UID, {"a": 1})
+
+    assert memory.known(KEY, "another") == {}
+    assert memory.known(KEY, UID) == {}, "the one before is gone for good"
+
+
+def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
+    """Were the oldest pushed out, then none of 5,000 that are looked at in turn would be remembered."""
+    assert full.keep(KEY, UID, {"a": 1}) == {}
+
+    assert full.known(KEY, UID) == {}
+    assert len(full.known(OTHER, UID)) == REMEMBERED
+
+
+def test_what_is_known_keeps_its_place_when_a_job_brings_more_than_there_is_room_for(full):
+    """An answer that was waited for is not lost to a newcomer that happens to come first."""
+    full.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED - 1), "words"))
+
+    kept = full.keep(OTHER, UID, {"new": "a", "newer": "b", **dict.fromkeys(range(REMEMBERED - 1), "words")})
+
+    assert kept.keys() == {"new", *range(REMEMBERED - 1)}
+
+
+def test_what_is_forgotten_makes_room(full):
+    """A TrainingJob that is deleted leaves nothing behind."""
+    full.forget(OTHER)
+
+    assert full.keep(KEY, UID, {"a": 1}) == {"a": 1}
+    assert full.known(OTHER, UID) == {}
+
+
+class Cluster:
+    """An API server and the caches beside it: one Job that somebody else has resumed, and lacks its pod."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def get(self, *_):
+        """Return the Job with who wrote its fields."""
+        self.asked += 1
+        return self.children(None, KEY)[0]
+
+    def children(self, resource, _):
+        """Return the Job; there is nothing else."""
+        if resource is not None and resource.kind != "Job":
+            return []
+        metadata = {
+            "name": "job-0", "namespace": "robots", "uid": "j", "generation": 2,
+            "ownerReferences": [{"uid": UID}], "annotations": {"palaestra.dev/suspend-set": "true"},
+        }  # fmt: skip
+        return [{"kind": "Job", "metadata": metadata, "spec": {"suspend": False}, "status": {}}]
+
+
+def test_nothing_stays_of_a_job_that_is_gone():
+    """Whatever was remembered goes with it, so that memory holds no more than the cluster."""
+    cluster, strangers, denials = Cluster(), ForeignJobs(Cluster()), RejectedCreations()
+    checking = WorldChecker(dict, print)
+    looking = JobObserver(cluster, cluster, strangers, denials, dict, checking)
+    job = accept(TRAINING_JOB)
+    denials.learn(KEY, UID, {0: Forbidden(403, "Forbidden", "exceeded quota")})
+    strangers.meet(KEY, UID, "job-1")
+    for _ in range(2):
+        looking.look(job)
+    assert cluster.asked == 1, "the manager that resumed the Job is read once for each change"
+
+    looking.forget(KEY)
+
+    assert (denials.known(KEY, UID), strangers.known(KEY, UID)) == ({}, {})
+    looking.look(job)
+    assert cluster.asked == 2

@@ -1,0 +1,287 @@
+"""When the operator asks why a Job has no pod, and when it does not."""
+
+import pytest
+
+from palaestra.cluster import NotFound
+from palaestra.operator.bounded_cache import REMEMBERED
+from palaestra.operator.foreign_jobs import ForeignJobs
+from palaestra.operator.pod_events import PodEvents
+from palaestra.operator.rate_limited_lookup import LONGEST_PAUSE_S, PATIENCE_S, RECHECK_S, Answers
+
+KEY, UID = ("robots", "job"), "job-uid"
+FAILED = {"reason": "FailedCreate", "message": "exceeded quota", "lastTimestamp": "2026-01-31T12:00:00+00:00"}
+BEFORE = {**FAILED, "message": "no such class", "lastTimestamp": "2026-01-31T11:00:00Z"}
+LAST = {"involvedObject": {"uid": "u"}, **FAILED}
+
+
+class Server:
+    """An API server of Jobs and events, and a clock beside it."""
+
+    def __init__(self):
+        self.now, self.asked, self.jobs, self.times = 100.0, 0, {}, []
+        self.about = "reason=FailedCreate"
+
+    def list(self, resource, namespace, *, fields):
+        """Return the one event that there is."""
+        assert (resource.plural, namespace) == ("events", "robots")
+        assert fields.startswith("involvedObject.uid=u")
+        assert fields.endswith(f",{self.about}")
+        self.asked += 1
+        self.times.append(self.now)
+        return [FAILED, BEFORE, {"reason": "Scheduled"}]
+
+    def get(self, resource, namespace, name):
+        """Return a Job."""
+        assert (resource.plural, namespace) == ("jobs", "robots")
+        self.asked += 1
+        if name not in self.jobs:
+            raise NotFound(404, "NotFound", name)
+        return self.jobs[name]
+
+
+@pytest.fixture
+def server():
+    """A server that counts what it is asked."""
+    return Server()
+
+
+def job(**changes):
+    """Return a Job that should have a pod."""
+    return {
+        "metadata": {"name": "job-0", "namespace": "robots", "uid": "u"},
+        "spec": {},
+        "status": {},
+        **changes,
+    }
+
+
+def pod(phase):
+    """Return its pod."""
+    return {
+        "metadata": {"uid": "p", "namespace": "robots", "ownerReferences": [{"uid": "u"}]},
+        "status": {"phase": phase},
+    }
+
+
+def events(answers):
+    """Return the events that are known."""
+    return list(answers.facts.values())
+
+
+def test_a_new_job_is_given_some_seconds(server):
+    """Nearly all have a pod at once; nobody is asked."""
+    hindrances = PodEvents(server, lambda: server.now)
+
+    found = hindrances.of(KEY, UID, [job()], [])
+
+    assert (events(found), server.asked) == ([], 0)
+    assert found.again_s == PATIENCE_S
+
+
+def test_after_that_its_events_are_read_now_and_then(server):
+    """Not at every look: a job is looked at many times a second while its pods change."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
+    server.now += PATIENCE_S
+
+    first, second = hindrances.of(KEY, UID, [job()], []), hindrances.of(KEY, UID, [job()], [])
+    assert first == second
+    assert (events(first), first.again_s, server.asked) == ([LAST], RECHECK_S, 1)
+
+
+def test_the_pauses_grow_to_five_minutes(server):
+    """A quota that is spent for a night is no news."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
+    server.now += PATIENCE_S
+
+    pauses = []
+    for _ in range(7):
+        pauses.append(hindrances.of(KEY, UID, [job()], []).again_s)
+        server.now += pauses[-1]
+
+    assert pauses == [15, 30, 60, 120, 240, 300, 300]
+    assert server.asked == 7
+
+
+def look_at(hindrances, number):
+    """Return what is known about the Job, which should have a pod, of one of many TrainingJobs."""
+    name, uid = f"job-{number}", f"u{number}"
+    raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
+    return hindrances.of(("robots", name), f"job-{uid}", [raw], [])
+
+
+def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
+    """Whatever a namespace does; a look before the turn asks nobody."""
+    hindrances = PodEvents(server, lambda: server.now)
+    due = {number: look_at(hindrances, number).again_s for number in range(1500)}
+    looks = 0
+
+    begun = server.now
+    due = {number: begun + wait_s for number, wait_s in due.items()}
+    while server.asked < 1500:
+        number = min(due, key=due.__getitem__)
+        server.now = due[number]
+        due[number] = server.now + look_at(hindrances, number).again_s
+        looks += 1
+
+    busiest = max(sum(at <= each < at + 1 for each in server.times) for at in server.times)
+    assert busiest <= 5
+    assert {bool(events(look_at(hindrances, number))) for number in range(1500)} == {True}
+    assert server.now - begun < 900
+    assert looks < 5 * 1500
+
+
+def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
+    """Those that are remembered keep their place, so that each gets its answer."""
+    hindrances = PodEvents(server, lambda: server.now)
+    for number in range(REMEMBERED):
+        look_at(hindrances, number)
+    server.now += PATIENCE_S
+
+    beyond = look_at(hindrances, REMEMBERED)
+    within = look_at(hindrances, 0)
+
+    assert (events(beyond), {uid for uid, _ in beyond.unasked}) == ([], {f"u{REMEMBERED}"})
+    assert beyond.again_s == LONGEST_PAUSE_S
+    assert [each["message"] for each in events(within)] == ["exceeded quota"]
+
+
+def test_a_job_whose_last_pod_has_failed_lacks_one(server):
+    """The second pod may be refused though the first was not."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [pod("Failed")])
+    server.now += PATIENCE_S
+
+    assert events(hindrances.of(KEY, UID, [job()], [pod("Failed")])) == [LAST]
+
+
+@pytest.mark.parametrize(
+    ("jobs", "pods"),
+    [
+        ([], []),
+        ([job()], [pod("Pending")]),
+        ([job(spec={"suspend": True})], []),
+        ([job(status={"conditions": [{"type": "Complete", "status": "True"}]})], []),
+    ],
+    ids=["no Job", "a pod", "suspended", "ended"],
+)
+def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
+    """While nothing changes, nothing is asked for."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, jobs, pods)
+    server.now += PATIENCE_S
+
+    assert hindrances.of(KEY, UID, jobs, pods) == Answers(facts={})
+    assert server.asked == 0
+
+
+def waiting_pod(**status):
+    """Return a pod that a node has taken."""
+    return {
+        "metadata": {"uid": "u", "namespace": "robots"},
+        "spec": {"nodeName": "node-1"},
+        "status": {"phase": "Pending", **status},
+    }
+
+
+def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
+    """After some seconds, as a Job: most volumes come at once."""
+    server.about = "type=Warning"
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [], [waiting_pod()])
+    assert server.asked == 0
+    server.now += PATIENCE_S
+
+    found = hindrances.of(KEY, UID, [], [waiting_pod()])
+    assert (events(found), found.again_s) == ([LAST], RECHECK_S)
+
+
+@pytest.mark.parametrize(
+    "pod",
+    [
+        {**waiting_pod(), "spec": {}},
+        waiting_pod(phase="Running"),
+        waiting_pod(conditions=[{"type": "PodReadyToStartContainers", "status": "True"}]),
+        {**waiting_pod(), "metadata": {"uid": "u", "namespace": "robots", "deletionTimestamp": "now"}},
+    ],
+    ids=["no node", "runs", "pulls images", "deleted"],
+)
+def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
+    """Its own status has the reason."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [], [pod])
+    server.now += PATIENCE_S
+
+    assert hindrances.of(KEY, UID, [], [pod]) == Answers(facts={})
+    assert server.asked == 0
+
+
+def test_a_job_that_is_made_again_is_asked_about_anew(server):
+    """What the events of the one before said is not about it, even if a test or a backup gives it its uid."""
+    hindrances = PodEvents(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
+    server.now += PATIENCE_S
+    assert events(hindrances.of(KEY, UID, [job()], [])) == [LAST]
+
+    assert hindrances.of(KEY, "another", [job()], []) == Answers(facts={}, again_s=PATIENCE_S)
+
+
+def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
+    """A name becomes free without any event that reaches us."""
+    server.jobs["job-0"] = job()
+    strangers = ForeignJobs(server, lambda: server.now)
+    strangers.meet(KEY, UID, "job-0")
+    assert strangers.among(KEY, UID, ()) == [job()]
+    del server.jobs["job-0"]
+
+    assert strangers.among(KEY, UID, ()) == [job()], "not asked at every look"
+    server.now += RECHECK_S
+    assert strangers.among(KEY, UID, ()) == []
+
+
+def test_who_is_in_the_cache_is_no_stranger(server):
+    """The name was taken by our own Job, which the cache had not heard of yet."""
+    server.jobs["job-0"] = job()
+    strangers = ForeignJobs(server, lambda: server.now)
+    strangers.meet(KEY, UID, "job-0")
+
+    assert strangers.among(KEY, UID, {"job-0"}) == []
+    assert strangers.among(KEY, UID, ()) == []
+
+
+def ended(code, uid="p", created="2026-01-31T12:00:00Z", **status):
+    """Return a pod of the Job whose trainer ended with this exit code."""
+    state = {"terminated": {"exitCode": code, "reason": "Error"}}
+    raw = pod("Failed")
+    raw["metadata"] |= {"uid": uid, "creationTimestamp": created}
+    raw["spec"] = {"containers": [{"name": "trainer"}]}
+    raw["status"] |= {"containerStatuses": [{"name": "trainer", "state": state}], **status}
+    return raw
+
+
+def asked_about(jobs, pods):
+    """Return the uids and selectors of the events that are requested."""
+    hindrances = PodEvents(Server(), lambda: 0.0)
+    return {*hindrances.of(KEY, UID, jobs, pods).facts, *hindrances.known(KEY, UID)}
+
+
+@pytest.mark.parametrize("code", [75, 137, 143])
+def test_the_signal_that_ended_the_newest_pod_is_asked_about(code):
+    """Only the kubelet's event reports that a probe failed."""
+    older = ended(code, uid="older", created="2026-01-31T11:00:00Z")
+
+    assert [each for each in asked_about([job()], [ended(code), older]) if each[1] == "reason=Killing"] == [
+        ("p", "reason=Killing")
+    ]
+
+
+TAKEN = [{"type": "DisruptionTarget", "status": "True", "reason": "Preempted"}]
+
+
+@pytest.mark.parametrize(
+    ("code", "status"), [(1, {}), (75, {"reason": "Evicted"}), (75, {"conditions": TAKEN})]
+)
+def test_an_end_that_the_pod_explains_is_not_asked_about(code, status):
+    """Each request costs the API server a list of events."""
+    assert not [each for each in asked_about([job()], [ended(code, **status)]) if each[0] == "p"]

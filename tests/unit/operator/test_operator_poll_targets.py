@@ -1,0 +1,101 @@
+"""Which pods are asked as trainers, from event to event."""
+
+import pytest
+
+from palaestra.operator.poll_targets import PollTargets
+from palaestra.plan.layout import STATUS_PORT
+
+
+def named(name, uid, owner=None, **more):
+    """Return an object of the TrainingJob `job` in `robots`."""
+    owners = [{"uid": owner}] if owner else []
+    labels = {"palaestra.dev/job": "job"}
+    metadata = {"namespace": "robots", "name": name, "uid": uid, "labels": labels, "ownerReferences": owners}
+    return {"metadata": metadata | more.pop("metadata", {}), **more}
+
+
+def pod(state="running", address="10.1.2.3", owner="job-uid", **metadata):
+    """Return a pod whose trainer's container is in a state."""
+    status = {"podIP": address, "containerStatuses": [{"name": "trainer", "state": {state: {}}}]}
+    return named("job-r0-x", "pod-uid", owner, status=status, metadata=metadata)
+
+
+@pytest.fixture
+def trainers():
+    """Return what is known of one TrainingJob with one Job."""
+    known = PollTargets()
+    known.training_job(named("job", "tj-uid"), exists=True)
+    known.job(named("job-r0", "job-uid", "tj-uid"), exists=True)
+    return known
+
+
+def test_a_pod_whose_trainer_runs_is_asked(trainers):
+    """At its address, for the job that it belongs to."""
+    trainers.pod(pod(), exists=True)
+
+    (target,) = trainers.targets()
+    assert (target.key, target.uid, target.host) == (("robots", "job"), "pod-uid", "10.1.2.3")
+    assert target.port == STATUS_PORT
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        pod(state="waiting"),
+        pod(state="terminated"),
+        pod(owner="another-uid"),
+        pod(owner=None),
+        pod(address=""),
+        pod(address="metadata.internal"),
+        pod(deletionTimestamp="2025-01-31T12:00:00Z"),
+        pod(labels={"palaestra.dev/job": "another"}),
+        named("job-r0-x", "pod-uid", "job-uid"),
+    ],
+    ids=[
+        "waits",
+        "ended",
+        "of another Job",
+        "of no Job",
+        "no address",
+        "a name",
+        "goes",
+        "labelled",
+        "empty",
+    ],
+)
+def test_any_other_pod_is_not_asked(trainers, other):
+    """A label is set by anybody; an address that is a name would have to be resolved."""
+    trainers.pod(pod(), exists=True)
+    trainers.pod(other, exists=True)
+
+    assert trainers.targets() == []
+
+
+def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
+    """Whichever of the three goes first."""
+    trainers.pod(pod(), exists=True)
+
+    trainers.job(named("job-r0", "job-uid", "tj-uid"), exists=False)
+    without_job = trainers.targets()
+    trainers.job(named("job-r0", "job-uid", "tj-uid"), exists=True)
+    trainers.training_job(named("job", "tj-uid"), exists=False)
+    without_training_job = trainers.targets()
+    trainers.training_job(named("job", "tj-uid"), exists=True)
+    trainers.pod(pod(), exists=False)
+
+    assert (without_job, without_training_job, trainers.targets()) == ([], [], [])
+
+
+def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(trainers):
+    """A user with the right to create Jobs could otherwise make the operator poll a thousand pods."""
+    trainers.job(named("job-r0", "job-uid", "stranger"), exists=True)
+    trainers.pod(pod(), exists=True)
+
+    assert trainers.targets() == []
+
+
+def test_an_address_of_ipv6_is_one(trainers):
+    """Clusters have them."""
+    trainers.pod(pod(address="fd00::1"), exists=True)
+
+    assert [each.host for each in trainers.targets()] == ["fd00::1"]

@@ -1,0 +1,52 @@
+"""Which replicas count as waiting, and for what."""
+
+import pytest
+
+from palaestra.api.reasons import ROWS, WAITING
+from palaestra.operator.waiting_metric import waits
+
+
+def status(*replicas):
+    """Return a TrainingJob whose replicas are in these states."""
+    return {"status": {"replicas": list(replicas)}}
+
+
+def test_each_replica_that_waits_counts_with_its_reason():
+    """Those of one job may wait for different things."""
+    job = status(
+        {"phase": "Pending", "reason": "ImagePull"},
+        {"phase": "Pending", "reason": "Unschedulable"},
+        {"phase": "Pending", "reason": "ImagePull", "step": 3_000_000},
+        {"phase": "Running", "reason": "SimulatorStartDeadline", "step": 0},
+    )
+
+    assert waits(job) == ("ImagePull", "Unschedulable", "ImagePull", "SimulatorStartDeadline")
+
+
+@pytest.mark.parametrize(
+    "replica",
+    [
+        {"phase": "Running", "reason": "Training", "step": 7},
+        {"phase": "Running", "reason": "SimulatorOutOfMemory", "step": 7},
+        {"phase": "Failed", "reason": "ImagePull"},
+        {"phase": "Suspended", "reason": "Queued"},
+        {"phase": "Pending", "reason": "Starting"},
+        {"phase": "Pending", "reason": ["ImagePull"]},
+        {},
+        "nonsense",
+    ],
+    ids=["trains", "mends", "ended", "queued", "starts", "list", "empty", "text"],
+)
+def test_no_other_replica_counts(replica):
+    """A queue is no trouble, and what trains or has ended waits for nothing."""
+    assert waits(status(replica)) == ()
+
+
+def test_a_job_without_a_status_has_no_replica_that_waits():
+    """Nobody has looked at it yet."""
+    assert waits({}) == ()
+
+
+def test_every_reason_to_wait_is_a_warning():
+    """An alert counts them: each has a remedy in the table of reasons."""
+    assert all(ROWS[reason].warning and ROWS[reason].remedy for reason in WAITING)

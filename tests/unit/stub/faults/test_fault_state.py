@@ -1,0 +1,168 @@
+"""What becomes of requests and messages in the course of a life."""
+
+import pytest
+
+from palaestra_sim.faults.fault_state import UNHARMED
+from palaestra_sim.faults.kinds import RESET_PATHS
+
+STEP = "robot/time_step"
+RESET = "supervisor/simulation_reset"
+
+
+def texts(ruling):
+    """Return the faults that happen to the process."""
+    return [it.text for it in ruling.effects]
+
+
+def test_a_fault_of_the_process_happens_at_its_step(course):
+    """The requests between steps are none."""
+    life = course("crash:step=2")
+
+    assert texts(life.request("robotino", STEP)) == []
+    assert life.request("robotino", "ir1/enable") == UNHARMED
+    assert texts(life.request("robotino", STEP)) == ["crash:step=2"]
+
+
+@pytest.mark.parametrize("path", sorted(RESET_PATHS))
+def test_every_way_back_to_the_start_is_a_reset(course, path):
+    """A reload brings the world back too."""
+    life = course("crash:reset=2")
+    life.request("robotino", RESET)
+
+    assert texts(life.request("robotino", path)) == ["crash:reset=2"]
+
+
+def test_a_step_of_two_robots_is_counted_once(course):
+    """The one that asked first counts, until its controller ends."""
+    life = course("crash:step=3")
+    asked = [life.request(robot, STEP) for robot in ("supervisor", "robotino", "supervisor", "robotino")]
+    assert all(it == UNHARMED for it in asked)
+
+    life.closed("supervisor")
+
+    assert texts(life.request("robotino", STEP)) == ["crash:step=3"]
+
+
+def test_a_robot_that_ends_and_did_not_count_changes_nothing(course):
+    """The count stays with the other."""
+    life = course("crash:step=2")
+    life.request("supervisor", STEP)
+    life.closed("robotino")
+
+    assert life.request("robotino", STEP) == UNHARMED
+    assert texts(life.request("supervisor", STEP)) == ["crash:step=2"]
+
+
+def test_a_slow_step_is_slow_alone(course):
+    """Two that fall together add up."""
+    life = course("slow:latency_ms=50,every=2 slow:latency_ms=30,step=4")
+
+    delays = [life.request("robotino", STEP).delay_s for _ in range(4)]
+
+    assert delays == pytest.approx([0, 0.05, 0, 0.08])
+
+
+def test_a_service_hangs_from_its_step_on(course):
+    """And others do not."""
+    life = course("hang:service=ir1/enable,step=2")
+    assert not life.request("robotino", "ir1/enable").lost
+    for _ in range(3):
+        assert not life.request("robotino", STEP).lost
+
+    assert life.request("robotino", "ir1/enable").lost
+    assert not life.request("robotino", "ir2/enable").lost
+
+
+def test_a_service_that_hung_at_a_call_never_comes_back(course):
+    """In this life."""
+    life = course("hang:service=ir1/enable,call=2")
+
+    assert [life.request("robotino", "ir1/enable").lost for _ in range(4)] == [False, True, True, True]
+
+
+def test_a_service_is_slow_at_its_calls(course):
+    """Each by itself: a slow call is over."""
+    life = course("slow:service=ir1/enable,latency_ms=50,every=2")
+
+    assert [life.request("robotino", "ir1/enable").delay_s for _ in range(4)] == [0, 0.05, 0, 0.05]
+
+
+def test_a_service_that_hangs_at_a_step_can_be_the_step_itself(course):
+    """The step that begins it is the first that is lost."""
+    life = course("hang:service=robot/time_step,step=2")
+
+    assert [life.request("robotino", STEP).lost for _ in range(3)] == [False, True, True]
+
+
+def test_a_star_counts_the_calls_of_all_its_services_together(course):
+    """Else all sensors would fail at their first call, or none."""
+    life = course("slow:service=ir*/enable,latency_ms=50,call=2")
+
+    assert life.request("robotino", "ir1/enable").delay_s == 0
+    assert life.request("robotino", "ir2/enable").delay_s == 0.05
+
+
+def test_answers_go_wrong_in_the_order_that_was_written(course):
+    """A value, then the shape."""
+    life = course("wrong_value:service=a wrong_shape:service=a,call=2")
+
+    assert len(life.request("robotino", "a").damages) == 1
+    assert len(life.request("robotino", "a").damages) == 2
+
+
+def test_messages_belong_to_the_step_before_them(course):
+    """All that come until the next step."""
+    life = course("lost:topic=ir1/value,step=2")
+    lost = []
+    for _ in range(3):
+        life.request("robotino", STEP)
+        lost.append([life.message(path).lost for path in ("ir1/value", "ir2/value", "ir1/value")])
+
+    assert lost == [[False, False, False], [True, False, True], [False, False, False]]
+
+
+def test_a_message_can_be_late_and_wrong_at_once(course):
+    """Faults of one message add up."""
+    life = course("late:latency_ms=20 late:latency_ms=30 wrong_value wrong_shape:topic=ir*")
+    life.request("robotino", STEP)
+
+    ruling = life.message("ir1/value")
+
+    assert ruling.delay_s == pytest.approx(0.05)
+    assert len(ruling.damages) == 2
+    assert not ruling.lost
+
+
+def test_a_star_is_no_global_topic(course):
+    """/clock belongs to no sensor; who means it writes its slash."""
+    sensors, clock = course("lost"), course("lost:topic=/clock")
+    for life in (sensors, clock):
+        life.request("robotino", STEP)
+
+    assert [sensors.message(path).lost for path in ("ir1/value", "/clock")] == [True, False]
+    assert [clock.message(path).lost for path in ("ir1/value", "/clock")] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "refused", "delay_s"),
+    [
+        ("start_refused", 5, True, 0.0),
+        ("start_refused:start=2", 2, True, 0.0),
+        ("start_refused:start=2", 3, False, 0.0),
+        ("slow_start:latency_ms=500,every=2", 4, False, 0.5),
+        ("crash:step=1", 1, False, 0.0),
+    ],
+)
+def test_starts_are_numbered_by_life(course, text, number, refused, delay_s):
+    """What can be ordered of a start: to be refused, or to be slow."""
+    fault, wait_s = course(text, number=number).start()
+
+    assert (fault is not None, wait_s) == (refused, delay_s)
+
+
+def test_a_life_without_anything_due_is_unharmed(course):
+    """Nothing is made up."""
+    life = course("crash:step=1000")
+
+    assert life.request("robotino", STEP) == UNHARMED
+    assert life.message("ir1/value") == UNHARMED

@@ -1,0 +1,179 @@
+"""`palaestra-stub --check`: what becomes of a world, before anything starts."""
+
+import pytest
+
+from palaestra_sim.stub.cli import main
+from palaestra_sim.world import builtin
+
+HEAD = "#VRML_SIM R2023b utf8\n"
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """`check(world)`: exit code and lines."""
+
+    def run(world, *options):
+        path = tmp_path / "my.wbt"
+        path.write_bytes(world if isinstance(world, bytes) else f"{HEAD}{world}".encode())
+        code = main([str(path), "--check", *options])
+        out, err = capsys.readouterr()
+        return code, (out or err).splitlines()
+
+    return run
+
+
+def test_a_world_that_can_start_is_described(check):
+    """Robots with their drives and devices; no ROS master is asked."""
+    assert check(builtin("arena")) == (
+        0,
+        [
+            (
+                'robot "robotino": controller "ros", omnidirectional drive on 3 wheels,'
+                " 9 DistanceSensor, 3 PositionSensor, 3 RotationalMotor, 1 TouchSensor"
+            )
+        ],
+    )
+
+
+def test_an_old_world_is_turned_and_the_check_says_so(check):
+    """It was refused; a fifth of public worlds are that old."""
+    old = b"#VRML_SIM R2020a utf8\nWorldInfo { } WoodenBox { }"
+
+    code, lines = check(old)
+
+    assert code == 0
+    assert lines[-1] == "a world of R2020a: its nodes are turned to the axes of today, as by Webots"
+
+
+def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
+    """Both differ from Webots without an error."""
+    code, lines = check('E-puck { name "a" controller "patrol" } WoodenBox { } WoodenBox { } Floor { }')
+
+    assert code == 0
+    assert lines[0].startswith(
+        'robot "a": controller "patrol" does not run here, differential drive on 2 wheels'
+    )
+    assert lines[1:] == ["stand-ins, which stand still: 1 Floor, 2 WoodenBox"]
+
+
+def test_all_that_the_stub_lacks_is_listed_at_once(check):
+    """With exit code 2, as for a start."""
+    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Minotaur { } ] }\nColosseum { }')
+
+    assert code == 2
+    assert lines[1:] == [
+        "cannot be simulated; --leave-out leaves it out:",
+        "my.wbt:2:1: the stub simulates no Colosseum (2 places, in lines 2, 4); left out",
+        "my.wbt:3:37: the stub simulates no Minotaur on a robot; left out",
+    ]
+
+
+def test_devices_without_readings_are_named(check):
+    """A world with a camera starts, and a client that waits for images would wait for ever."""
+    code, lines = check('Robot { controller "ros" children [ Camera { } RangeFinder { } LED { } ] }')
+
+    assert code == 0
+    assert lines[1:] == ["devices without readings, whose enable answers failure: 1 Camera, 1 RangeFinder"]
+
+
+def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
+    """Most worlds that were made for the ros controller have none."""
+    assert check('Robot { controller "ros" }')[0] == 0
+
+
+def test_a_node_that_uses_itself_ends_in_one_sentence(check):
+    """It was a RecursionError."""
+    code, lines = check("DEF A Group { children [ USE A ] }")
+
+    assert (code, len(lines)) == (2, 1)
+    assert "nested too deep, or one uses itself" in lines[0]
+
+
+def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
+    """Sixty lines would be 2 to the 60th nodes."""
+    monkeypatch.setattr("palaestra_sim.scene.nodes.instantiate.MAX_NODES", 500)
+    lines = [
+        f"DEF A{level} Group {{ children [ USE A{level - 1} USE A{level - 1} ] }}" for level in range(1, 60)
+    ]
+
+    code, said = check("\n".join(["DEF A0 Solid { }", *lines]))
+
+    assert (code, len(said)) == (2, 1)
+    assert "the world has more than 500 nodes; break a circle of PROTOs or of USE" in said[0]
+
+
+def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
+    """/dev/zero has no end."""
+    (tmp_path / "my.wbt").symlink_to("/dev/zero")
+
+    assert main([str(tmp_path / "my.wbt"), "--check"]) == 2
+    assert capsys.readouterr().err.endswith("my.wbt: is no regular file\n")
+
+
+def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
+    """A table may be a device without end too, or be saved by another editor."""
+    endless, latin = tmp_path / "endless.toml", tmp_path / "latin.toml"
+    endless.symlink_to("/dev/zero")
+    latin.write_bytes("# Stühle".encode("latin-1"))
+
+    for table, fact in ((endless, "is no regular file"), (latin, "this is not UTF-8; save it as UTF-8")):
+        assert check("", "--stand-ins", str(table)) == (2, [f"palaestra-stub: {table}: {fact}"])
+
+
+def test_what_is_left_out_by_choice_is_no_obstacle(check):
+    """The check named --leave-out as the remedy, and with it printed the same."""
+    world = "Colosseum { } Solid { boundingObject Cone { } }"
+
+    assert check(world)[0] == 2
+    assert check(world, "--leave-out", "Colosseum")[0] == 2
+    code, lines = check(world, "--leave-out", "all")
+
+    assert code == 0
+    assert lines[0] == "left out:"
+    assert "Colosseum" in lines[1]
+
+
+def test_a_field_that_a_proto_does_not_have_is_named_and_no_obstacle(check, tmp_path):
+    """As in Webots, which warns."""
+    folder = tmp_path / "protos"
+    folder.mkdir()
+    (folder / "Stool.proto").write_text(f"{HEAD}PROTO Stool [ field SFFloat size 1 ] {{ Solid {{ }} }}")
+
+    code, lines = check('EXTERNPROTO "protos/Stool.proto"\nStool { colour 1 }')
+
+    assert code == 0
+    assert lines == ["my.wbt:3:1: the PROTO Stool has no field colour; ignored, as by Webots"]
+
+
+def test_a_user_s_stand_ins_count(check, tmp_path):
+    """The check is of the world as it would start."""
+    table = tmp_path / "mine.toml"
+    table.write_text("[Colosseum]\nflat = true\n")
+
+    assert check("Colosseum { }", "--stand-ins", str(table))[0] == 0
+
+
+def test_a_mistake_is_an_error(check):
+    """It has no description."""
+    code, [line] = check("Solid { translation 1 }")
+
+    assert code == 2
+    assert "Solid.translation is not 3 numbers" in line
+
+
+def test_values_that_differ_from_webots_are_named(check):
+    """A policy that learns from them meets others in Webots."""
+    mesh = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 1 ] } }"
+    devices = """DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }
+        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 }"""
+    robot = f'Robot {{ controller "ros" controllerArgs ["--name=a" "--synchronize"] children [ {devices} ] }}'
+
+    code, lines = check(f"Solid {{ boundingObject {mesh} }} {robot}")
+
+    assert code == 0
+    assert lines[1:] == [
+        "differs from Webots: 1 infra-red DistanceSensor: textures do not count, rays pass the robot itself",
+        "differs from Webots: 1 Lidar: rays pass the robot itself",
+        "differs from Webots: 1 IndexedFaceSet as boundingObject: the box around its points",
+        "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
+    ]

@@ -1,0 +1,88 @@
+"""A search by Optuna: suggests, prunes, and continues where it was interrupted."""
+
+import pytest
+
+from palaestra.sweeps.optuna_search import JOURNAL, OptunaSearch
+from palaestra.sweeps.trial import TrialFigures, TrialProgress
+from tests.unit.sweeps.conftest import figures
+
+SPACE = {"seed": {"low": 1, "high": 99}, "trainer.steps": {"choice": [1000, 2000]}}
+
+
+@pytest.fixture
+def search(sweep, tmp_path):
+    """Return a builder of the same search, each time from its journal."""
+
+    def make(trials=4, **optuna):
+        return OptunaSearch(
+            sweep(random=SPACE, trials=trials, optuna={"startupTrials": 1, **optuna}), tmp_path
+        )
+
+    return make
+
+
+def test_a_trial_below_the_median_is_pruned(search) -> None:
+    """At the same step, over the medians of its seeds."""
+    found = search()
+    found.learn(found.next(), figures({5: 0.8}, {5: 0.9}))  # it ended before it was looked at
+    other = found.next()
+
+    assert not found.hopeless(other, figures({5: 0.1}, {}, ended=False))
+    assert found.hopeless(other, figures({5: 0.1}, {5: 0.2}, ended=False))
+    assert found.hopeless(other, figures({5: 0.1}, {5: 0.2}, ended=False))
+    found.learn(other, TrialFigures(state=TrialProgress.PRUNED))
+
+
+def test_nothing_is_pruned_if_the_sweep_does_not_want_it(search) -> None:
+    """Then every curve is whole."""
+    found = search(prune=False)
+    found.learn(found.next(), figures({5: 0.9}))
+
+    assert not found.hopeless(found.next(), figures({5: 0.1}, ended=False))
+
+
+def test_an_interrupted_search_suggests_its_running_trial_again_under_its_number(search) -> None:
+    """Its run directory is found by the number; then come new trials, up to as many as wanted."""
+    first = search()
+    done, running = first.next(), first.next()
+    first.learn(done, figures({5: 0.9}))
+
+    again = search()
+    resumed = again.next()
+    assert resumed == running
+    assert not again.hopeless(resumed, figures({5: 0.95}, ended=False))
+    again.learn(resumed, figures({5: 0.95}))
+    fresh = [again.next(), again.next()]
+
+    assert [trial.number for trial in fresh] == [2, 3]
+    assert again.next() is None
+    assert len({tuple(trial.changes.values()) for trial in again.known}) == 4
+    assert [trial.number for trial in again.known] == [0, 1, 2, 3]
+
+
+def test_a_kill_at_any_moment_of_a_restart_loses_no_trial(search, tmp_path) -> None:
+    """The journal is cut after each of the writes that the restart made."""
+    first, journal = search(trials=2), tmp_path / JOURNAL
+    done, running = first.next(), first.next()
+    first.learn(done, figures({5: 0.9}))
+    kept = len(journal.read_text().splitlines())
+    search(trials=2).next()
+    lines = journal.read_text().splitlines(keepends=True)
+
+    for end in range(kept, len(lines) + 1):
+        journal.write_text("".join(lines[:end]))
+        again = search(trials=2)
+        known = again.known
+        assert again.next() == running, f"after {end - kept} of {len(lines) - kept} writes"
+        assert known == again.known == [done, running]
+        assert again.next() is None
+
+
+def test_a_trial_that_fails_or_has_no_figure_has_no_value(search) -> None:
+    """The search learns nothing from it, and goes on."""
+    found = search(trials=3)
+    found.learn(found.next(), figures({5: 1.0}, succeeded=False))
+    found.learn(found.next(), figures({}))
+
+    assert found.next() is not None
+    assert found.next() is None

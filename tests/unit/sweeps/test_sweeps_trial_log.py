@@ -1,0 +1,50 @@
+"""The folder of a sweep belongs to one sweep."""
+
+import pytest
+
+from palaestra.local.errors import RunRefused
+from palaestra.sweeps import trial_log
+from palaestra.sweeps.trial import TrialFigures, TrialProgress
+
+RANDOM = {"random": {"seed": {"low": 1, "high": 9}}}
+
+
+def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path) -> None:
+    """Results of two sweeps in one table would be of none."""
+    folder = tmp_path / "s"
+    trial_log.begin(folder, sweep(**RANDOM, trials=3))
+    trial_log.begin(folder, sweep(**RANDOM, trials=5))
+
+    with pytest.raises(
+        RunRefused, match=r"spec\.random, spec\.seed: not as when the sweep in .* was begun; change"
+    ):
+        trial_log.begin(folder, sweep(random={"seed": {"low": 2, "high": 9}}, seed=2, trials=5))
+
+
+def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_from_the_first(
+    sweep, tmp_path
+) -> None:
+    """A file that is corrected must not train every trial once more."""
+    trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3))
+    trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3, objective="MeanReturn"))
+    trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}))
+
+    with pytest.raises(RunRefused, match=r"spec\.objective: not as when the sweep"):
+        trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}, objective="MeanReturn"))
+
+
+def test_a_line_that_a_crash_has_cut_spoils_no_later_one(sweep, tmp_path) -> None:
+    """Later lines would be appended to it, and the sweep could never be continued."""
+    folder = tmp_path / "s"
+    trial_log.begin(folder, sweep(**RANDOM, trials=3))
+    trial_log.note(folder, 0, TrialFigures(state=TrialProgress.COMPLETE))
+    with (folder / trial_log.TRIALS).open("a") as file:
+        file.write('{"trial": 1, "sta')
+
+    trial_log.begin(folder, sweep(**RANDOM, trials=3))
+    trial_log.note(folder, 1, TrialFigures(state=TrialProgress.FAILED))
+
+    assert {number: found.state for number, found in trial_log.ended(folder).items()} == {
+        0: TrialProgress.COMPLETE,
+        1: TrialProgress.FAILED,
+    }

@@ -1,0 +1,436 @@
+"""An environment of one's own: what it gets, and what it is refused for."""
+
+# ruff: noqa: ARG002 - gymnasium names the arguments of its methods
+
+from __future__ import annotations
+
+import math
+import re
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from palaestra_trainer.configuration import Environment
+from palaestra_trainer.environments.contract import mismatch
+from palaestra_trainer.environments.make import keywords, make_environment
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead
+from palaestra_trainer.testing import fake_arena
+
+NAME = "Hall-v0"
+PAIR = spaces.Dict({"a": spaces.Discrete(2), "image": spaces.Box(0, 255, (36, 36, 1), np.uint8)})
+
+
+class Hall(gymnasium.Env):
+    """A hall that keeps what it was given, and returns what its options say."""
+
+    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    action_space = spaces.Discrete(2)
+    seen = (0.0, 0.0)
+    dtype = np.float32
+    reward = 1.0
+
+    def __init__(self, robot, scene, size=4.0):
+        self.given = {"robot": robot, "scene": scene, "size": size}
+
+    def observe(self):
+        """Return what is seen."""
+        return np.array(self.seen, self.dtype)
+
+    def reset(self, *, seed=None, options=None):
+        """Begin."""
+        super().reset(seed=seed)
+        return self.observe(), {}
+
+    def step(self, action):
+        """Go on."""
+        return self.observe(), self.reward, False, False, {}
+
+
+@pytest.fixture
+def register():
+    """Register a class under `Hall-v0`; it is forgotten at the end."""
+
+    def as_hall(creator, **options):
+        gymnasium.register(id=NAME, entry_point=creator, **options)
+
+    yield as_hall
+    gymnasium.registry.pop(NAME, None)
+
+
+@pytest.fixture
+def made(register):
+    """Register a class and make it, as a run does."""
+
+    def make(creator, registration=(), **task):
+        register(creator, **dict(registration))
+        return make_environment(Environment(id=NAME, **task), *fake_arena())
+
+    return make
+
+
+def refused(made, creator, **task):
+    """Return the message of the refusal to make it."""
+    with pytest.raises(ConfigurationError) as refusal:
+        made(creator, **task)
+    return str(refusal.value)
+
+
+def test_an_environment_without_reward_works(made):
+    """The field has a default; only the arena's environments know what it means."""
+    env = made(Hall, options={"size": 6.0})
+
+    assert env.unwrapped.given["size"] == 6.0
+    env.reset(seed=1)
+    assert env.step(0)[1] == 1.0
+
+
+def test_an_environment_gets_what_its_signature_accepts(made):
+    """Of robot, scene and reward."""
+
+    class OnlyRobot(Hall):
+        def __init__(self, robot, reward):
+            self.given = {"robot": robot, "reward": reward}
+
+    assert set(made(OnlyRobot, reward="Sparse").unwrapped.given) == {"robot", "reward"}
+
+
+def test_an_environment_with_any_keyword_gets_all(made):
+    """It hands them on, perhaps to a base class."""
+
+    class Anything(Hall):
+        def __init__(self, **given):
+            self.given = given
+
+    assert set(made(Anything, options={"n": 1}).unwrapped.given) == {"robot", "scene", "reward", "n"}
+
+
+def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
+    """It would train beside the simulators, on nothing."""
+
+    class Alone(Hall):
+        def __init__(self, size=1.0):
+            self.given = {"size": size}
+
+    assert "Hall-v0 accepts neither robot nor scene" in refused(made, Alone)
+
+
+def test_a_reward_that_nothing_accepts_is_refused(made):
+    """Sparse was asked for, and would silently be something else."""
+    assert "environment.reward: Hall-v0 has no argument reward" in refused(made, Hall, reward="Sparse")
+
+
+def test_all_options_that_do_not_fit_are_reported_at_once(made):
+    """With the nearest name."""
+
+    class Needy(Hall):
+        def __init__(self, robot, scene, width):
+            del robot, scene, width
+
+    lines = refused(made, Needy, options={"widht": 1, "length": 2}).splitlines()
+
+    assert lines == [
+        "environment.options.widht: Hall-v0 has no such argument; did you mean width?",
+        "environment.options.length: Hall-v0 has no such argument; use one of robot, scene, width",
+        "environment.options.width: Hall-v0 needs this argument; set it, or give it a default",
+    ]
+
+
+@pytest.mark.parametrize("error", [ValueError, RuntimeError, AttributeError, OSError])
+def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configuration(made, error):
+    """Trying again would raise again, whatever the error is; its author needs the line."""
+
+    class Strict(Hall):
+        def __init__(self, robot, scene):
+            raise error("the hall is too small")
+
+    fact = f"Hall-v0 cannot be created ({error.__name__}: the hall is too small, in {__file__} line "
+
+    assert fact in refused(made, Strict)
+
+
+def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configuration(made):
+    """A constructor may ask a robot that is connected; another simulator may answer."""
+
+    class Asking(Hall):
+        def __init__(self, robot, scene):
+            raise SimulatorDead("collect-0", "its connections were closed")
+
+    with pytest.raises(SimulatorDead):
+        made(Asking)
+
+
+@pytest.mark.parametrize(
+    ("name", "fact"),
+    [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
+)
+def test_an_unknown_environment_is_refused(name, fact):
+    """Whether its name or its module is wrong."""
+    with pytest.raises(ConfigurationError, match=f"environment.id: {name} {fact}"):
+        make_environment(Environment(id=name), *fake_arena())
+
+
+def test_a_registration_of_nothing_is_refused(made):
+    """The class was renamed."""
+    assert "entry point palaestra_trainer.testing:Gone" in refused(made, "palaestra_trainer.testing:Gone")
+
+
+def test_a_name_without_version_means_the_newest(register):
+    """As in gymnasium.make."""
+    register(Hall)
+
+    assert keywords(Environment(id="Hall", options={"size": 2.0})) == {"size": 2.0}
+
+
+def test_gymnasium_s_own_options_are_its_own(made):
+    """A time limit belongs to no signature."""
+    env = made(Hall, options={"max_episode_steps": 2})
+    env.reset(seed=1)
+
+    assert [env.step(0)[3] for _ in range(2)] == [False, True]
+
+
+class NoSeed(Hall):
+    """A hall of the time before seeds."""
+
+    def reset(self):
+        """Begin."""
+        return self.observe()
+
+
+class OldStep(Hall):
+    """A hall of the time before truncation."""
+
+    def step(self, action):
+        """Go on."""
+        return self.observe(), 1.0, False, {}
+
+
+class NoInfo(Hall):
+    """A hall that returns the observation alone."""
+
+    def reset(self, *, seed=None, options=None):
+        """Begin."""
+        return self.observe()
+
+
+class NumberAsEnd(Hall):
+    """A hall whose episode ends by a number."""
+
+    def step(self, action):
+        """Go on."""
+        return self.observe(), 1.0, 0.0, False, {}
+
+
+class NoSpace(Hall):
+    """A hall without observations."""
+
+    observation_space = None
+
+
+class Wide(Hall):
+    """A hall whose observation is too long."""
+
+    seen = (0.0, 0.0, 0.0)
+
+
+class Listed(Hall):
+    """A hall whose observation is a list."""
+
+    def observe(self):
+        """Return it."""
+        return [0.0, 0.0]
+
+
+class Double(Hall):
+    """A hall that observes in double precision."""
+
+    dtype = np.float64
+
+
+class Outside(Hall):
+    """A hall that observes what its space excludes."""
+
+    seen = (0.0, 1.5)
+
+
+class TextReward(Hall):
+    """A hall that pays in words."""
+
+    reward = "much"
+
+
+@pytest.mark.parametrize(
+    ("creator", "facts"),
+    [
+        (NoSeed, ["expected reset(self, *, seed=None, options=None)", "got reset()"]),
+        (NoInfo, ["returns (observation, info)", "got a ndarray"]),
+        (OldStep, ["(observation, reward, terminated, truncated, info)", "got a tuple of 4"]),
+        (NumberAsEnd, ["got Expects `terminated` signal to be a boolean", "<class 'float'>;"]),
+        (NoSpace, ["expected an observation_space of gymnasium.spaces", "NoneType"]),
+        (Wide, ["shape (3,), not (2,)"]),
+        (Listed, ["from reset an observation of Box", "got a list"]),
+        (Double, ["dtype float64, not float32"]),
+        (Outside, ["1.5 at [1], not within -1.0 and 1.0"]),
+        (TextReward, ["reward", "str"]),
+    ],
+    ids=lambda it: getattr(it, "__name__", ""),
+)
+@pytest.mark.parametrize("limit", [None, 10])
+def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator, facts, limit):
+    """With what was expected and what came; a time limit of gymnasium's unpacks a step before."""
+
+    def first_step():
+        env = made(creator, registration={"max_episode_steps": limit})
+        env.reset(seed=1)
+        env.step(0)
+
+    with pytest.raises(ConfigurationError) as refusal:
+        first_step()
+
+    message = str(refusal.value)
+    assert message.startswith("environment.id: Hall-v0: expected ")
+    assert message.endswith("; fix the environment")
+    assert [fact for fact in facts if fact not in message] == []
+
+
+RIGHT = (np.zeros(2, np.float32), 1.0, False, False, {})
+LATER = [
+    ("no reward", (RIGHT[0], None, *RIGHT[2:]), "got a NoneType as reward, in step 3 of its episode 2"),
+    ("a truth as reward", (RIGHT[0], True, *RIGHT[2:]), "got a bool as reward"),
+    ("an array as reward", (RIGHT[0], np.ones(1), *RIGHT[2:]), "got a ndarray as reward"),
+    ("four values", RIGHT[:4], "got a tuple of 4: (ndarray, float, bool, bool), in step 3"),
+    ("no tuple", None, "got a NoneType, in step 3"),
+    ("a number as end", (*RIGHT[:2], 0, False, {}), "got a int as terminated"),
+    ("no info", (*RIGHT[:4], None), "got a NoneType as info"),
+    ("another shape", (np.zeros(3, np.float32), *RIGHT[1:]), "of another kind (shape (3,), not (2,))"),
+    ("another dtype", (np.zeros(2), *RIGHT[1:]), "of another kind (dtype float64, not float32)"),
+    ("a list", ([0.0, 0.0], *RIGHT[1:]), "of another kind (a list)"),
+]
+
+
+@pytest.mark.parametrize("limit", [None, 10])
+@pytest.mark.parametrize(("answer", "fact"), [row[1:] for row in LATER], ids=[row[0] for row in LATER])
+def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, answer, fact, limit):
+    """It was an error of a tensor, of numpy or of nothing at all, a thousand steps after the run began."""
+
+    class Later(Hall):
+        steps = resets = 0
+
+        def reset(self, *, seed=None, options=None):
+            self.steps, self.resets = 0, self.resets + 1
+            return super().reset(seed=seed, options=options)
+
+        def step(self, action):
+            self.steps += 1
+            return answer if (self.resets, self.steps) == (2, 3) else super().step(action)
+
+    env = made(Later, registration={"max_episode_steps": limit})
+    for _ in range(2):
+        env.reset(seed=1)
+        env.step(0)
+        env.step(0)
+
+    with pytest.raises(ConfigurationError, match=re.escape(fact)):
+        env.step(0)
+
+
+def test_a_later_reset_that_breaks_the_contract_is_refused(made):
+    """A reset that forgets its info in one of two branches is the commonest."""
+
+    class Later(Hall):
+        resets = 0
+
+        def reset(self, *, seed=None, options=None):
+            self.resets += 1
+            right = super().reset(seed=seed, options=options)
+            return right if self.resets == 1 else right[0]
+
+    env = made(Later)
+    env.reset(seed=1)
+
+    with pytest.raises(ConfigurationError, match="got a ndarray, in a later reset; fix the environment"):
+        env.reset(seed=2)
+
+
+def test_a_wrapper_of_the_registration_is_checked_too(made):
+    """What it makes of a right observation may be wrong."""
+
+    class Stretched(gymnasium.ObservationWrapper):
+        def observation(self, observation):
+            return np.append(observation, 0.0)
+
+    env = made(lambda robot, scene: Stretched(Hall(robot, scene)))
+
+    with pytest.raises(ConfigurationError, match="shape"):
+        env.reset(seed=1)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_numbers_that_are_not_finite_are_left_to_the_learner(made, number):
+    """They have an exit code of their own."""
+
+    class Divided(Hall):
+        seen = (number, 0.0)
+        reward = number
+
+    env = made(Divided)
+
+    env.reset(seed=1)
+    env.step(0)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, number):
+    """Its message names the key; gymnasium's does not."""
+
+    class Divided(Hall):
+        observation_space = spaces.Dict({"a": Hall.observation_space})
+
+        def observe(self):
+            return {"a": np.array([number, 0.0], np.float32)}
+
+    env = made(Divided)
+
+    env.reset(seed=1)
+    env.step(0)
+
+
+def test_a_simulator_s_fault_passes(made):
+    """It is not the environment's; the first reset is checked once it succeeds."""
+
+    class Faulty(Hall):
+        tries = 0
+
+        def reset(self, *, seed=None, options=None):
+            self.tries += 1
+            if self.tries == 1:
+                raise TimeoutError
+            return self.observe()
+
+    env = made(Faulty)
+
+    with pytest.raises(TimeoutError):
+        env.reset(seed=1)
+    with pytest.raises(ConfigurationError):
+        env.reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("space", "observation", "fact"),
+    [
+        (spaces.Box(0, 255, (2, 2), np.uint8), np.zeros((2, 2), np.uint8), ""),
+        (spaces.Box(-1.0, 1.0, ()), np.float32(0.5), ""),
+        (spaces.Discrete(3), 3, "3"),
+        (spaces.Dict({"a": spaces.Discrete(2)}), {"a": 1}, ""),
+        (PAIR, {"a": 1, "image": np.zeros((36, 36, 1))}, "image: dtype float64, not uint8"),
+        (PAIR, {"a": 2, "image": np.zeros((36, 36, 1), np.uint8)}, "a: 2"),
+        (PAIR, {"a": 1, "b": 1}, "the keys a, b, not a, image"),
+        (PAIR, np.zeros(2), "a ndarray"),
+        (spaces.MultiBinary(40), np.zeros(41, np.int8), "shape (41,), not (40,)"),
+    ],
+)
+def test_a_mismatch_is_described_in_words(space, observation, fact):
+    """The result is empty if nothing differs."""
+    assert mismatch(space, observation) == fact

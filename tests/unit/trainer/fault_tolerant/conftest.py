@@ -1,0 +1,32 @@
+"""Players of fake members."""
+
+from __future__ import annotations
+
+import pytest
+
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.simulators.budget import RestartLimit
+from palaestra_trainer.simulators.restarter import Restarter, settle
+
+
+@pytest.fixture
+def make_players():
+    """Make players of members; the rows of their steps are in `rows`, and `released` counts releases."""
+    made = []
+
+    def make(*members, restarts=10, **options):
+        keepers = [Restarter(member, RestartLimit(restarts=restarts)) for member in members]
+        rows, released = [], []
+
+        def release():
+            settle(keepers)
+            released.append(1)
+
+        players = EnvGroup(keepers, release, played=rows.append, **options)
+        players.rows, players.released = rows, released
+        made.append(players)
+        return players
+
+    yield make
+    for players in made:
+        players.close()

@@ -1,0 +1,166 @@
+"""Which policy of a run is the best, and whether it is good enough: which episodes say so."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+
+from stable_baselines3.common.save_util import load_from_zip_file
+from torch import equal
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
+from palaestra_trainer.run.best_model import best_of
+from palaestra_trainer.run_directory import drop_lines, read_lines
+
+EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # by every evaluation of the runs here
+GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}
+
+
+def lucky(seed, _reached):
+    """Succeed in the episodes by which policies are chosen, and in no other."""
+    return {"is_success": seed in EVALUATED}
+
+
+def summary(directory):
+    """Return summary.json."""
+    return json.loads(directory.summary.read_text())
+
+
+def test_a_goal_that_was_reached_by_luck_does_not_end_training(play, job, directory):
+    """Of many evaluations of a few episodes each, one reaches the goal by chance."""
+    code, _ = play(job(evaluation=GOAL), report=lucky)
+
+    result = summary(directory)
+    assert code == 0
+    assert result["steps"] == 100
+    assert [line["success_rate"] for line in read_lines(directory.evaluations)] == [1.0, 1.0, 1.0]
+    assert result["success_rate"] == 0.0
+    assert result["success_interval"] == {"low": 0.0, "high": 0.037, "episodes": 100}
+
+
+def test_each_confirmation_plays_episodes_of_its_own(play, job, directory):
+    """If all played the same ones, policies would be chosen by them in the end."""
+    _, members = play(job(evaluation=GOAL | {"confirmEpisodes": 10}), report=lucky)
+
+    confirmed = list(read_lines(directory.confirmations))
+    played = [each["seed"] for line in confirmed for each in line["played"]]
+    assert [line["step"] for line in confirmed] == [40, 80, 100]
+    assert played == [*episode_seeds(1, CONFIRM, 30)]
+    assert {*played} & EVALUATED == set()
+    assert {*played} <= {*members["evaluate-0"].env.seeds}
+
+
+def test_a_goal_that_is_confirmed_ends_training_with_the_policy_that_reached_it(play, job, directory):
+    """An earlier one with a better evaluation was not confirmed."""
+    configuration = job(steps=400, evaluation=GOAL | {"stopAtSuccessRate": 0.5, "confirmEpisodes": 10})
+    confirming = [*episode_seeds(1, CONFIRM, 20)]
+    good = {*EVALUATED, *confirming[10:]}  # the second confirmation
+
+    play(configuration, report=lambda seed, _: {"is_success": seed in good})
+
+    result = summary(directory)
+    assert (result["steps"], result["best_step"]) == (80, 80)
+    assert (result["success_rate"], result["success_interval"]["episodes"]) == (1.0, 10)
+    assert best_of(directory).step == 80
+
+
+def test_without_confirmations_an_evaluation_alone_ends_training(play, job, directory):
+    """confirmEpisodes: 0."""
+    play(job(evaluation=GOAL | {"confirmEpisodes": 0}), report=lucky)
+
+    result = summary(directory)
+    assert (result["steps"], result["success_rate"]) == (40, 1.0)
+    assert result["success_interval"]["episodes"] == 4
+    assert not directory.confirmations.exists()
+
+
+def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, job, directory):
+    """model.zip is measured, and the checkpoint goes on with what was learned last."""
+    play(job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4, "confirmEpisodes": 7}))
+
+    [line] = read_lines(directory.confirmations)
+    newest = checkpoint.newest(directory.checkpoints)
+    best, last = (
+        load_from_zip_file(path, load_data=False)[1]["policy"]
+        for path in (directory.model, newest.path / "model.zip")
+    )
+    assert (line["step"], line["confirmed_at"]) == (best_of(directory).step, summary(directory)["steps"])
+    assert line["step"] < 600
+    assert summary(directory)["success_rate"] == line["success_rate"]
+    assert not all(equal(best[name], last[name]) for name in best)
+
+
+def test_an_evaluation_keeps_its_episodes(play, job, directory):
+    """A user who doubts a rate can look at its episodes and repeat one by its seed."""
+    play(job(), report=lambda seed, reached: {"is_success": reached, "outcome": f"of-{seed}"})
+
+    line = next(read_lines(directory.evaluations))
+    assert {each["seed"] for each in line["played"]} == EVALUATED
+    assert {each["outcome"] for each in line["played"]} == {f"of-{seed}" for seed in EVALUATED}
+    assert sum(each["success"] for each in line["played"]) / 4 == line["success_rate"]
+    assert sum(each["length"] for each in line["played"]) / 4 == line["mean_length"]
+    assert line["success_interval"]["episodes"] == 4
+
+
+def test_success_that_is_never_reported_is_absent_and_not_zero(play, job, directory, last_word):
+    """An environment of one's own need not know what success is; the best policy has the best return."""
+    code, _ = play(job(), report=lambda *_: {})
+
+    result = summary(directory)
+    assert code == 0
+    assert (result["success_rate"], result["success_interval"]) == (None, None)
+    assert result["mean_return"] is not None
+    assert all(line["success_rate"] is None for line in read_lines(directory.evaluations))
+    assert last_word().success_rate is None
+
+
+def test_a_goal_without_reported_success_ends_the_run_at_its_first_evaluation(play, job, last_word):
+    """It could never be reached; trying again cannot help."""
+    code, _ = play(job(evaluation=GOAL), report=lambda *_: {})
+
+    assert code == 2
+    assert last_word().step == 40
+    assert "stopAtSuccessRate: the environment reports no success" in last_word().reason
+
+
+def test_success_that_is_reported_and_failure_that_is_not_is_a_rate(play, job, directory):
+    """Some environments set is_success only where it is true."""
+    play(job(), report=lambda seed, _: {"is_success": True} if seed == min(EVALUATED) else {})
+
+    assert next(read_lines(directory.evaluations))["success_rate"] == 0.25
+
+
+def test_a_confirmation_that_was_cut_is_made_up_for(play, job, directory):
+    """A signal must not turn a goal that was reached into one that was missed."""
+    steps = iter(range(1, 100_000))
+    in_confirmation = 4 * 8 + 3  # the corridor's episodes have eight steps at most
+
+    def cut():
+        if next(steps) == in_confirmation:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    goal = job(evaluation=GOAL)
+    code, _ = play(goal, report=lambda *_: {"is_success": True}, on_step=cut, of="evaluate-0")
+    cut_short = list(read_lines(directory.evaluations))
+    play(goal, report=lambda *_: {"is_success": True})
+
+    assert (code, cut_short) == (75, [])
+    assert (summary(directory)["steps"], summary(directory)["success_rate"]) == (40, 1.0)
+    assert [line["step"] for line in read_lines(directory.confirmations)] == [40]
+
+
+def test_the_summary_is_that_of_model_zip_also_after_a_resume(play, job, directory):
+    """The evaluation that it is from was after the checkpoint that the run went on from."""
+    configuration = job(evaluation={"everySteps": 40, "episodes": 4, "confirmEpisodes": 0})
+    play(configuration, report=lambda *_: {"is_success": True})
+    before = best_of(directory)
+    directory.summary.unlink()
+    drop_lines(directory.evaluations, lambda _: True)  # as a resume before its step does
+
+    play(configuration, report=lambda *_: {"is_success": False})
+
+    result = summary(directory)
+    assert best_of(directory) == before
+    assert (result["best_step"], result["success_rate"]) == (before.step, 1.0)

@@ -1,0 +1,131 @@
+"""Simulators are brought back to where a checkpoint was made."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import structlog
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.algorithms import make_model
+from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.resume import rejoin
+from palaestra_trainer.simulators.restarter import Restarter
+
+TINY = {"name": "A2C", "hyperparameters": {"n_steps": 5, "policy_kwargs": {"net_arch": [4]}}}
+
+
+@pytest.fixture
+def make_env(make_member):
+    """Make a vector environment of corridors; faults are given by row."""
+
+    def make(members=2, faults=()):
+        return SimulatorsVecEnv(
+            [Restarter(make_member(f"collect-{row}", **dict(faults).get(row, {}))) for row in range(members)],
+            1,
+        )
+
+    return make
+
+
+@pytest.fixture
+def saved(make_env, make_configuration):
+    """Return the state of a model that has begun, amid episodes of two members."""
+    env = make_env()
+    model = make_model(make_configuration(algorithm=TINY).algorithm, env, seed=1)
+    model.learn(10)
+    state = checkpoint.TrainingState.of(model, env.snapshot(), {"terms": [{"walk": 1.0}, {"walk": 2.0}]})
+    assert all(len(member.actions) for member in state.members)
+    return state
+
+
+def rejoined(env, saved):
+    """Return the state, and the warnings that a simulator does not repeat itself."""
+    with structlog.testing.capture_logs() as logs:
+        state = rejoin(env, saved)
+    return state, [line["event"] for line in logs if "do not repeat" in line["event"]]
+
+
+def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
+    """Then the resumed run is exact, and nothing is to be told."""
+    state, warnings = rejoined(make_env(), saved)
+
+    assert state is saved
+    assert warnings == []
+
+
+def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(make_env, saved):
+    """Physics engines seldom do; the policy must see what is, not what was."""
+    env = make_env()
+    env.seed(2)
+
+    state, warnings = rejoined(env, saved)
+
+    assert len(warnings) == 1
+    assert not np.array_equal(state.observation, saved.observation)
+    assert not state.episode_starts.any()
+
+
+def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, saved):
+    """Its rewards so far belong to no episode, and nothing is bootstrapped across; the other goes on."""
+    state, warnings = rejoined(make_env(faults={0: {"steps": [1]}}), saved)
+
+    assert warnings == []
+    assert state.episode_starts.tolist() == [True, bool(saved.episode_starts[1])]
+    assert state.rollout["terms"] == [{}, {"walk": 2.0}]
+    assert state.members[0].episode == saved.members[0].episode + 1
+    assert state.members[1].episode == saved.members[1].episode
+
+
+def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env, saved):
+    """Nothing of it was played."""
+    broken = [EpisodeState(saved.members[0].episode + 1, None), saved.members[1]]
+
+    state, warnings = rejoined(make_env(), checkpoint.TrainingState(**fields(saved) | {"members": broken}))
+
+    assert warnings == []
+    assert state.episode_starts[0]
+    assert state.members[0].episode == broken[0].episode
+
+
+@pytest.mark.parametrize("members", [1, 3])
+def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, members):
+    """A new one begins its first episode; those that are gone leave theirs."""
+    state, _ = rejoined(make_env(members), saved)
+
+    assert len(state.members) == len(state.episode_starts) == len(state.observation) == members
+    assert state.rollout["terms"] == [{"walk": 1.0}, {"walk": 2.0}, {}][:members]
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
+@pytest.mark.parametrize("collectors", [(1, 3), (3, 1)])
+def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name, collectors):
+    """With a replay buffer too, which keeps a row for each of them in mind."""
+    before, after = collectors
+    play(job(name, collectors=before))
+
+    code, _ = play(job(name, collectors=after, steps=200))
+
+    assert code == 0
+    assert json.loads(directory.summary.read_text())["steps"] >= 200
+
+
+def fields(state):
+    """Return what a state was made of."""
+    return {name: getattr(state, name) for name in state.__slots__}
+
+
+def test_an_episode_that_begins_anew_owes_no_reward_to_the_one_before(make_env, make_configuration):
+    """Rewards are normalized by the discounted return of an episode so far."""
+    env = make_env()
+    model = make_model(make_configuration(algorithm=TINY | {"normalize": {}}).algorithm, env, seed=1)
+    model.learn(10)
+    before = checkpoint.TrainingState.of(model, env.snapshot(), {"terms": [{}, {}]})
+
+    after, _ = rejoined(make_env(faults={1: {"resets": [1]}}), before)
+
+    assert all(before.running_returns)
+    assert after.running_returns.tolist() == [before.running_returns[0], 0.0]

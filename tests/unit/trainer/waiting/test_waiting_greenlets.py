@@ -1,0 +1,256 @@
+"""Turns: several works in one thread, each going on while the others wait."""
+
+from __future__ import annotations
+
+import gc
+import socket
+import threading
+import time
+import weakref
+from contextlib import ExitStack
+from functools import partial
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.waiting import shutdown_deadline
+from palaestra_trainer.waiting.greenlets import away_s, let_others, take_turns
+from palaestra_trainer.waiting.wait_time import waited_s
+
+
+@pytest.fixture
+def connections():
+    """Two connections, each with an end that asks and one that answers."""
+    with ExitStack() as stack:
+        yield [[stack.enter_context(end) for end in socket.socketpair()] for _ in range(2)]
+
+
+@given(st.lists(st.integers(0, 4), max_size=5))
+def test_results_come_in_the_order_of_the_works(pauses):
+    """However often each of them lets the others go first."""
+
+    def work(place):
+        for _ in range(pauses[place]):
+            let_others()
+        return place
+
+    assert take_turns(lambda place=place: work(place) for place in range(len(pauses))) == [
+        *range(len(pauses))
+    ]
+
+
+@given(st.lists(st.integers(1, 4), min_size=2, max_size=5))
+def test_everyone_has_a_first_turn_before_anyone_has_a_second(pauses):
+    """Answers are read in the order of the requests, and all requests are sent before the first wait."""
+    turns = []
+
+    def work(place):
+        for number in range(pauses[place]):
+            turns.append((number, place))
+            let_others()
+
+    take_turns(lambda place=place: work(place) for place in range(len(pauses)))
+
+    assert turns == sorted(turns)
+
+
+def test_alone_there_is_nobody_to_let():
+    """A notebook steps one environment, and knows nothing of turns."""
+    assert let_others() is None
+
+
+def test_turns_may_be_taken_within_a_turn():
+    """A work that has several simulators of its own is still one work."""
+
+    def pair(name):
+        return take_turns([lambda: [name, let_others()][0], name.upper])
+
+    assert take_turns([lambda: pair("a"), lambda: pair("b")]) == [["a", "A"], ["b", "B"]]
+
+
+def test_an_error_waits_for_the_others():
+    """No simulator may be left between a request and its answer."""
+    done = []
+
+    def fail():
+        let_others()
+        raise LookupError("mine")
+
+    def succeed():
+        let_others()
+        let_others()
+        done.append("second")
+
+    with pytest.raises(LookupError, match="mine"):
+        take_turns([fail, succeed])
+    assert done == ["second"]
+
+
+def test_an_interruption_ends_the_others_where_they_stand():
+    """Ctrl-C: each gets the chance to drop its connection, none goes on."""
+    told = []
+
+    def wait():
+        try:
+            let_others()
+            told.append("went on")
+        finally:
+            told.append("cleaned up")
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        take_turns([wait, interrupt, wait])
+    assert told == ["cleaned up"]
+
+
+def test_a_work_with_an_answer_goes_before_those_without(connections):
+    """A slow simulator delays only itself."""
+    (slow, answers_slowly), (quick, answers_quickly) = connections
+    told = []
+
+    def wait_long():
+        let_others(until=slow)
+        told.append("slow")
+
+    def wait_briefly():
+        answers_quickly.send(b"here")
+        let_others(until=quick)
+        told.append("quick")
+        answers_slowly.send(b"here")
+
+    take_turns([wait_long, wait_briefly])
+
+    assert told == ["quick", "slow"]
+
+
+def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connections):
+    """An order that does not depend on chance, where there is a choice."""
+    told = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        told.append(place)
+
+    for _, answers in connections:
+        answers.send(b"here")
+    take_turns([lambda: work(0), lambda: work(1)])
+
+    assert told == [0, 1]
+
+
+def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connections):
+    """It knows its deadline, and what its simulator's silence means."""
+    told = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        told.append(place)
+        connections[1][1].send(b"here")
+
+    take_turns([lambda: work(0), lambda: work(1)])
+
+    assert told == [0, 1]
+
+
+def test_a_wait_of_all_is_nobody_s_turn(connections):
+    """It counts as waiting for simulators and as part of each waiting step, whichever was asked first."""
+    began, waited = time.perf_counter(), waited_s()
+    found = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        found.append(time.perf_counter() - began - away_s())
+
+    answer = threading.Timer(0.01, lambda: [answers.send(b"here") for _, answers in connections])
+    answer.start()
+    take_turns([lambda: work(0), lambda: work(1)])
+    answer.join()
+
+    assert min(found) >= waited_s() - waited > 0
+
+
+def test_the_slow_wait_beside_each_other_too(connections):
+    """A step of fifty milliseconds takes that long, whichever simulator was asked first."""
+    began, waited = time.perf_counter(), waited_s()
+    found = []
+
+    def work(place):
+        asks, _ = connections[place]
+        let_others(until=asks)
+        asks.recv(100)
+        found.append(time.perf_counter() - began - away_s())
+
+    answer = threading.Timer(0.05, lambda: [answers.send(b"here") for _, answers in connections])
+    answer.start()
+    take_turns([lambda: work(0), lambda: work(1)])
+    answer.join()
+
+    assert min(found) >= waited_s() - waited > 0
+
+
+def test_when_patience_is_over_nobody_is_waited_for(connections):
+    """Sixteen simulators may hang when a run is asked to end."""
+    waited = waited_s()
+    shutdown_deadline.end(after_s=-1.0)
+    try:
+        take_turns([partial(let_others, until=asks) for asks, _ in connections])
+    finally:
+        shutdown_deadline.renew()
+
+    assert waited_s() - waited < 0.4
+
+
+def test_of_several_errors_the_first_work_s_is_raised(connections):
+    """Whichever simulator answered first: a repeated run must fail in the same way."""
+
+    def fail(place):
+        if place == 0:
+            let_others(until=connections[0][0])
+        raise LookupError(str(place))
+
+    with pytest.raises(LookupError, match="0"):
+        take_turns([lambda: fail(0), lambda: fail(1)])
+
+
+def test_nothing_of_a_work_outlives_it():
+    """Greenlets are used again; an observation or a traceback that one kept would fill the memory."""
+
+    class Result:
+        pass
+
+    [seen] = [weakref.ref(result) for result in take_turns([Result])]
+
+    gc.collect()
+    assert seen() is None
+
+
+def test_turns_can_be_taken_again_after_any_end():
+    """Of a step that failed or was interrupted, the next one knows nothing."""
+
+    def interrupt():
+        let_others()
+        raise KeyboardInterrupt
+
+    def fail():
+        let_others()
+        raise LookupError
+
+    for broken, error in ((interrupt, KeyboardInterrupt), (fail, LookupError)):
+        with pytest.raises(error):
+            take_turns([let_others, broken, let_others])
+        assert take_turns([lambda: 1, let_others, lambda: 3]) == [1, None, 3]
+
+
+def test_each_thread_takes_turns_of_its_own():
+    """A greenlet belongs to the thread that made it; a script may step its environments in another."""
+    take_turns([let_others, let_others])
+    found = []
+
+    thread = threading.Thread(target=lambda: found.extend(take_turns([lambda: 1, lambda: 2])))
+    thread.start()
+    thread.join()
+
+    assert found == [1, 2]

@@ -1,0 +1,198 @@
+"""The values of hyperparameters: checked against a signature, and converted to what it takes.
+
+A job cannot contain a schedule, a tuple or a class. Schedules are text, points or names of functions, see
+`schedules` and `own_schedules`, and a list stands for a tuple. Activation functions and optimizers have their
+PyTorch names, and any class that a policy takes may be written as `module:Class`.
+"""
+
+from __future__ import annotations
+
+import collections.abc
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args, get_origin
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import nn, optim
+
+from palaestra_trainer import user_imports
+from palaestra_trainer.algorithms.constructor_params import types
+from palaestra_trainer.algorithms.own_schedules import own_schedule
+from palaestra_trainer.algorithms.schedules import schedule_of
+from palaestra_trainer.configuration import nearest
+from palaestra_trainer.errors import ConfigurationError
+
+FIELD = "algorithm.hyperparameters"
+CLASSES: Mapping[str, Mapping[str, type[Any]]] = {
+    "activation_fn": {
+        it.__name__: it
+        for it in (nn.ELU, nn.GELU, nn.LeakyReLU, nn.Mish, nn.ReLU, nn.SELU, nn.SiLU, nn.Softplus, nn.Tanh)
+    },
+    "optimizer_class": {
+        it.__name__: it
+        for it in (optim.Adam, optim.AdamW, optim.NAdam, optim.RAdam, optim.RMSprop, optim.SGD)
+    },
+}
+# The classes of which an argument of a policy must be a subclass.
+BASES: Mapping[str, type[Any]] = {
+    "activation_fn": nn.Module,
+    "optimizer_class": optim.Optimizer,
+    "features_extractor_class": BaseFeaturesExtractor,
+}
+# RL-Zoo's files write the modules of PyTorch's classes, by any of the usual names.
+_MODULE = re.compile(r"^((torch|th)\.)?(nn|optim)\.(?=\w+$)")
+_GIVEN = frozenset({"self", "observation_space", "action_space", "lr_schedule", "use_sde", "return"})
+_WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text", type(None): "null"}
+
+
+def mistakes(
+    cls: type[BaseAlgorithm], policy: type[BasePolicy], hyperparameters: Mapping[str, Any]
+) -> Iterator[str]:
+    """Yield field, fact and remedy of each value that the class or its policy does not accept."""
+    known = types(cls)
+    for name, value in hyperparameters.items():
+        annotation = known.get(name, Any)
+        if _takes_schedule(annotation) and user_imports.names_class(value):
+            yield from _mistakes_of_schedule(f"{FIELD}.{name}", value)
+        elif fact := _refused(value, annotation):
+            yield f"{FIELD}.{name}: {fact}"
+        elif name == "policy_kwargs" and value:
+            yield from _mistakes_of_policy(policy, value)
+
+
+def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keyword arguments of the class for these hyperparameters.
+
+    Raises:
+        ConfigurationError: a class that they name cannot be imported.
+    """
+    known = types(cls)
+    chosen = {name: _argument(name, value, known.get(name, Any)) for name, value in hyperparameters.items()}
+    policy = chosen.get("policy_kwargs") or {}
+    chosen["policy_kwargs"] = {name: _class(name, value) or value for name, value in policy.items()}
+    return chosen
+
+
+def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None) -> type[BasePolicy]:
+    """Return the policy whose arguments a job gives: the one that it names, else the one for numbers."""
+    if isinstance(named, type):
+        return named
+    aliases = cls.policy_aliases
+    usual = next((policy for name, policy in aliases.items() if name.startswith("Mlp")), BasePolicy)
+    return aliases[named] if named else usual
+
+
+def arguments_of(policy: type[BasePolicy]) -> list[str]:
+    """Return the arguments of a policy that a job may give."""
+    return [name for name in types(policy) if name not in _GIVEN]
+
+
+def _mistakes_of_policy(policy: type[BasePolicy], given: Mapping[str, Any]) -> Iterator[str]:
+    known, names = types(policy), arguments_of(policy)
+    for name, value in given.items():
+        field = f"{FIELD}.policy_kwargs.{name}"
+        if name not in names:
+            yield f"{field}: the policy has no such argument; {nearest(name, names)}"
+        elif user_imports.names_class(value):
+            yield from _mistakes_of_class(field, value)
+        elif name in CLASSES:
+            if _class(name, value) is None:
+                yield (
+                    f"{field}: {value!r} is not known; {nearest(_bare(str(value)), dict(CLASSES[name]))}, "
+                    "or write module:Class"
+                )
+        elif name == "net_arch" and _has_shared_layers(value):
+            yield (
+                f"{field}: {value!r} is a form of Stable-Baselines3 before 1.8, where layers were shared; "
+                "write {pi: [...], vf: [...]}, or a list of numbers for both"
+            )
+        elif fact := _refused(value, known[name]):
+            yield f"{field}: {fact}"
+
+
+def _has_shared_layers(layers: Any) -> bool:
+    return isinstance(layers, list) and any(isinstance(layer, dict) for layer in layers)
+
+
+def _mistakes_of_class(field: str, name: str) -> Iterator[str]:
+    base = BASES.get(field.rpartition(".")[2], object)
+    try:
+        user_imports.class_named(name, field, base)
+    except ConfigurationError as error:
+        yield str(error)
+
+
+def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
+    try:
+        own_schedule(name, field)
+    except ConfigurationError as error:
+        yield str(error)
+
+
+def _class(argument: str, name: Any) -> type[Any] | None:
+    """Return the class for a policy's argument: `module:Class`, or a name of PyTorch's in any case.
+
+    The name may have its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
+    """
+    if user_imports.names_class(name):
+        return user_imports.class_named(
+            name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object)
+        )
+    by_name = {known.lower(): cls for known, cls in CLASSES.get(argument, {}).items()}
+    return by_name.get(_bare(name).lower()) if isinstance(name, str) else None
+
+
+def _bare(name: str) -> str:
+    """Return the name of a class without its module, if that is one of PyTorch's."""
+    return _MODULE.sub("", name, count=1)
+
+
+def _refused(value: Any, annotation: Any) -> str:
+    """Return why a value does not match an annotation, as text; "" if it does."""
+    if get_origin(annotation) is type:
+        return f"{value!r} is refused; name a class as module:Class"
+    config = ConfigDict(arbitrary_types_allowed=True)
+    try:
+        TypeAdapter(annotation, config=config).validate_python(_as_python(value, annotation), strict=True)
+    except ValidationError:
+        return f"{value!r} is refused; give {_words(annotation)}"
+    return ""
+
+
+def _argument(name: str, value: Any, annotation: Any) -> Any:
+    if _takes_schedule(annotation) and user_imports.names_class(value):
+        return own_schedule(value, f"{FIELD}.{name}")
+    return _as_python(value, annotation)
+
+
+def _as_python(value: Any, annotation: Any) -> Any:
+    if isinstance(value, list) and tuple in _kinds(annotation):
+        return tuple(value)
+    if _takes_schedule(annotation) and (schedule := schedule_of(value)):
+        return schedule
+    return value
+
+
+def _takes_schedule(annotation: Any) -> bool:
+    return collections.abc.Callable in _kinds(annotation)
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    return {get_origin(kind) or kind for kind in (annotation, *get_args(annotation))}
+
+
+def _words(annotation: Any) -> str:
+    """Return the accepted values of an annotation, in words for a person who writes YAML."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if annotation in _WORDS:
+        return _WORDS[annotation]
+    if collections.abc.Callable in {origin, annotation}:
+        return "a schedule such as lin_0.001 or [[0, 0.001], [1, 0.0001]], or module:function"
+    if origin is tuple:
+        return "a list of " + " and ".join(map(_words, parts))
+    if origin in {list, dict}:
+        return {list: "a list", dict: "a mapping"}[origin]
+    return " or ".join(map(_words, parts)) if parts else str(annotation)

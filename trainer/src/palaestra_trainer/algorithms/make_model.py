@@ -1,0 +1,155 @@
+"""Check the algorithm of a job, and make the model.
+
+Hyperparameters are keyword arguments of the class and are checked against its signature, names and values,
+so a mistake is found before a simulator is started. Each value that a job sets replaces one default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gymnasium import spaces
+from sb3_contrib import TQC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+
+from palaestra_trainer.algorithms import buffer_options, hyperparameters, limits, noise, unknown_words
+from palaestra_trainer.algorithms.device import usable
+from palaestra_trainer.algorithms.images import with_channels_first, with_network
+from palaestra_trainer.algorithms.inputs import give_copies
+from palaestra_trainer.algorithms.normalization import ValidNormalize
+from palaestra_trainer.algorithms.registry import ARENA_ENVIRONMENTS, RegisteredAlgorithm, entry_of
+from palaestra_trainer.algorithms.space_compat import named_policy, policy_of_spaces
+from palaestra_trainer.configuration import Algorithm, Device
+from palaestra_trainer.errors import ConfigurationError, fact_of
+
+
+def check(algorithm: Algorithm) -> RegisteredAlgorithm:
+    """Return the entry of the algorithm if its name and all its hyperparameters are right.
+
+    Raises:
+        ConfigurationError: one line for each unknown name, with the nearest known one, and each wrong value.
+    """
+    entry = entry_of(algorithm.name)
+    policy = hyperparameters.policy_class(entry.original, named_policy(algorithm, entry))
+    known = entry.known
+    given = algorithm.hyperparameters
+    lines = [
+        *unknown_words.mistakes(
+            algorithm.name,
+            entry,
+            hyperparameters.arguments_of(policy),
+            given,
+            hyperparameters.FIELD,
+        )
+    ]
+    plain = {
+        name: value for name, value in given.items() if name in known and name not in buffer_options.NAMES
+    }
+    lines += list(hyperparameters.mistakes(entry.original, policy, plain)) or _out_of_range(entry, plain)
+    lines += noise.mistakes(given, hyperparameters.FIELD) if entry.takes_noise else []
+    lines += buffer_options.mistakes({name: value for name, value in given.items() if name in known})
+    if given.get("n_steps", 1) != 1 and "train_freq" in known:
+        lines.append(
+            "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
+            "so only 1 works; leave it out"
+        )
+    if lines:
+        raise ConfigurationError("\n".join(lines))
+    return entry
+
+
+def _out_of_range(entry: RegisteredAlgorithm, given: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{hyperparameters.FIELD}.{name}: {fact}" for name, fact in limits.out_of_range(entry.original, given)
+    ]
+
+
+def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
+    """Refuse hyperparameters that this number of collecting simulators does not allow."""
+    if limits.needs_one_member(chosen) and members > 1:
+        raise ConfigurationError(
+            f"{hyperparameters.FIELD}.train_freq: counts in episodes, which only one collecting simulator "
+            f"allows, not {members}; count in steps, or collect in one"
+        )
+    if chosen.get("normalize_advantage") and (chosen.get("n_steps"), members) == (1, 1):
+        raise ConfigurationError(
+            f"{hyperparameters.FIELD}.n_steps: 1 step of 1 collecting simulator is 1 row, and "
+            "normalize_advantage needs 2; raise n_steps, add a simulator, or set normalize_advantage: false"
+        )
+
+
+def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
+    """Return the algorithm with all its hyperparameters: those that are given, and defaults for the rest.
+
+    Args:
+        algorithm: what the job says.
+        environment: the id of its environment, as the job says it.
+    """
+    arena = environment.rpartition(":")[2] in ARENA_ENVIRONMENTS
+    return with_defaults(algorithm, entry_of(algorithm.name).arena if arena else {})
+
+
+def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
+    """Return the algorithm with all its hyperparameters; those of `better` precede the class's defaults."""
+    known = entry_of(algorithm.name).defaults
+    return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
+
+
+def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
+    """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
+
+    Where the algorithm is to normalize, the model's own environment does, see `normalization`.
+    The hyperparameter `policy` is that of a run that began when every observation got MlpPolicy.
+
+    Raises:
+        ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
+    """
+    entry = entry_of(algorithm.name)
+    given = with_defaults(algorithm, {}).hyperparameters
+    policy = given.pop("policy", None) or policy_of_spaces(
+        algorithm, entry, env.observation_space, env.action_space
+    )
+    added = noise.action_noise(given, env) if entry.takes_noise else None
+    chosen = hyperparameters.arguments(
+        entry.original,
+        {name: value for name, value in given.items() if name not in {*noise.NAMES, *buffer_options.NAMES}},
+    )
+    chosen |= buffer_options.arguments(given, env.observation_space)
+    if entry.takes_noise:
+        chosen["action_noise"] = added
+    chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)
+    if "target_update_interval" in chosen:
+        # A vector step is num_envs steps: the target can't be updated more often than that.
+        chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
+    if algorithm.normalize:
+        if not algorithm.normalize.observations or isinstance(env.observation_space, spaces.Dict):
+            env = with_channels_first(env)
+        env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
+    _refuse_members(chosen, env.num_envs)
+    try:
+        model = entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
+    except ConfigurationError:
+        raise
+    except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # Stable-Baselines3 checks values and spaces by assertions; a policy of the job's author, or a part
+        # of one, may raise anything. A RuntimeError may be a device without memory, which a retry may have.
+        raise ConfigurationError(
+            f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
+            f"({fact_of(error)}); change them, or use another algorithm"
+        ) from error
+    _refuse_dropping_all(model)
+    give_copies(model)
+    return model
+
+
+def _refuse_dropping_all(model: BaseAlgorithm) -> None:
+    """Refuse a TQC that drops all quantiles of its critics: the mean of none is NaN."""
+    if not isinstance(model, TQC) or model.top_quantiles_to_drop_per_net < model.critic.n_quantiles:
+        return
+    raise ConfigurationError(
+        f"{hyperparameters.FIELD}.top_quantiles_to_drop_per_net: {model.top_quantiles_to_drop_per_net} of "
+        f"{model.critic.n_quantiles} quantiles of each critic leaves none; lower it, or raise "
+        "policy_kwargs.n_quantiles"
+    )

@@ -1,0 +1,66 @@
+"""The state of each algorithm beside its saved tensors: a rollout changes it, and a resume needs it.
+
+Every algorithm counts steps, and keeps its last observation and statistics of episodes; `checkpoint.state`
+keeps these, and the action noise. This table has the rest, by class: networks that a rollout changes, the
+state of an LSTM, counts. A class of a user's own has the entry of its nearest ancestor in the table. For one
+without such an ancestor, the whole policy is copied at each boundary, because a rollout may change any part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import sb3_contrib
+import stable_baselines3 as sb3
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_trainer.algorithms.reinforce import REINFORCE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutState:
+    """The attributes of an algorithm that change in a rollout, beside those that every algorithm has.
+
+    Attributes:
+        networks: networks of which a rollout changes tensors; an update may change them too.
+        memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
+        numbers: what it counts or derives from counts.
+    """
+
+    networks: tuple[str, ...] = ()
+    memories: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
+
+
+_NOTHING = RolloutState()
+_UNKNOWN = RolloutState(networks=("policy",))
+_EXPLORATION = ("exploration_rate", "_n_calls")
+BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
+    {
+        sb3.DQN: RolloutState(networks=("q_net_target",), numbers=_EXPLORATION),
+        sb3_contrib.QRDQN: RolloutState(networks=("quantile_net_target",), numbers=_EXPLORATION),
+        sb3_contrib.RecurrentPPO: RolloutState(memories=("_last_lstm_states",)),
+        **dict.fromkeys(
+            (
+                sb3.PPO,
+                sb3.A2C,
+                sb3.SAC,
+                sb3.TD3,  # DDPG is one
+                sb3_contrib.TQC,
+                sb3_contrib.TRPO,
+                sb3_contrib.CrossQ,
+                sb3_contrib.MaskablePPO,
+                REINFORCE,
+            ),
+            _NOTHING,
+        ),
+    }
+)
+
+
+def beside(model: BaseAlgorithm) -> RolloutState:
+    """Return the entry of the model's class, or of its nearest ancestor that has one."""
+    known = (BESIDE[cls] for cls in type(model).__mro__ if cls in BESIDE)
+    return next(known, _UNKNOWN)

@@ -1,0 +1,71 @@
+"""The hyperparameters that a run began with; it keeps them even if the defaults change later.
+
+All of them are in the run directory. Releases up to a5276f3 wrote no such file; their runs continue with the
+values that those releases gave every environment: the arena's, and MlpPolicy also for images.
+"""
+
+from __future__ import annotations
+
+import json
+
+from palaestra_trainer.algorithms.make_model import resolve, with_defaults
+from palaestra_trainer.algorithms.registry import entry_of
+from palaestra_trainer.configuration import Algorithm, Configuration
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory, replace_file
+
+
+def begin_with(
+    configuration: Configuration, directory: RunDirectory, before: RunDirectory | None
+) -> Algorithm:
+    """Return the algorithm of an attempt with all its hyperparameters.
+
+    Args:
+        configuration: of the run.
+        directory: of the run; the run may not have begun.
+        before: the run whose checkpoint it resumes from, its own or another; None: there is no checkpoint.
+
+    Raises:
+        ConfigurationError: the file in the run directory cannot be read.
+    """
+    if directory.hyperparameters.exists() or not (before or directory.attempts.exists()):
+        return _kept(configuration, directory) or resolve(
+            configuration.algorithm, configuration.environment.id
+        )
+    return begun_with(configuration, before or directory)
+
+
+def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorithm:
+    """Return the algorithm of a run that has begun.
+
+    Raises:
+        ConfigurationError: the file in the run directory cannot be read.
+    """
+    algorithm = configuration.algorithm
+    before = {**entry_of(algorithm.name).arena, "policy": "MlpPolicy"}
+    return _kept(configuration, directory) or with_defaults(algorithm, before)
+
+
+def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
+    """Write the algorithm with which a run begins into its directory, unless the run has begun.
+
+    Raises:
+        OSError: it could not be written.
+    """
+    if directory.hyperparameters.exists() or directory.attempts.exists():
+        return
+    text = json.dumps(algorithm.hyperparameters, indent=2) + "\n"
+    replace_file(directory.hyperparameters, lambda path: path.write_text(text, encoding="utf-8"))
+
+
+def _kept(configuration: Configuration, directory: RunDirectory) -> Algorithm | None:
+    path = directory.hyperparameters
+    try:
+        hyperparameters = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(
+            f"{path}: cannot be read ({error}); restore it, or use another run directory"
+        ) from error
+    return configuration.algorithm.model_copy(update={"hyperparameters": hyperparameters})

@@ -1,0 +1,194 @@
+"""Which algorithm fits which environment, and the policy that it gets there.
+
+Everything that does not fit is refused here, by the spaces alone, before a simulator starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
+
+from palaestra_trainer import user_imports
+from palaestra_trainer.algorithms.registry import RegisteredAlgorithm, entry_of
+from palaestra_trainer.configuration import Algorithm, Cnn, nearest
+from palaestra_trainer.errors import ConfigurationError
+
+KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
+# Pixels per side that the convolutions of each network need.
+SMALLEST: Mapping[Cnn | None, int] = {None: 36, "small": 20}
+
+
+def policy_of_spaces(
+    algorithm: Algorithm, entry: RegisteredAlgorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]
+) -> str | type[BasePolicy]:
+    """Return the policy of an algorithm for these observations and actions.
+
+    Raises:
+        ConfigurationError: the algorithm does not fit the environment; one line for each reason.
+    """
+    refuse_spaces(algorithm, seen, acted)
+    if lines := [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]:
+        raise ConfigurationError("\n".join(lines))
+    return named_policy(algorithm, entry) or _usual_policy(algorithm.name, entry, seen)
+
+
+def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
+    """Refuse observations and actions that the algorithm takes wrongly, or not at all.
+
+    Raises:
+        ConfigurationError: one line for each reason.
+    """
+    if lines := [*_about_observations(seen), *_about_actions(algorithm.name, acted)]:
+        raise ConfigurationError("\n".join(lines))
+
+
+def named_policy(algorithm: Algorithm, entry: RegisteredAlgorithm) -> str | type[BasePolicy] | None:
+    """Return the policy that the job names: an alias of the algorithm or a class; None: it names none.
+
+    Raises:
+        ConfigurationError: it is neither.
+    """
+    name = algorithm.policy
+    known = aliases(entry.original)
+    if name is None or name in known:
+        return name
+    if user_imports.names_class(name):
+        return user_imports.class_named(name, "algorithm.policy", BasePolicy)
+    raise ConfigurationError(
+        f"algorithm.policy: {algorithm.name} has no policy {name}; {nearest(name, dict(known))}, "
+        "or write module:Class"
+    )
+
+
+def aliases(cls: type[BaseAlgorithm]) -> Mapping[str, type[BasePolicy]]:
+    """Return the policies of an algorithm by their names."""
+    return cls.policy_aliases
+
+
+def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
+    """Return the images of an observation: itself, or parts of a Dict."""
+    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
+    return [part for part in parts if isinstance(part, spaces.Box) and is_image_space(part)]
+
+
+def scalable(space: spaces.Space[Any]) -> list[str] | bool:
+    """Return the keys of a Dict whose numbers may be normalized; of another space, whether its may be.
+
+    Networks scale images themselves, and the numbers of a Discrete are names.
+    """
+    if isinstance(space, spaces.Dict):
+        return [key for key, part in space.spaces.items() if scalable(part)]
+    return isinstance(space, spaces.Box) and not is_image_space(space)
+
+
+def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
+    """Refuse spaces that every algorithm of Stable-Baselines3 takes wrongly, or not at all.
+
+    Raises:
+        ConfigurationError: one line for each reason.
+    """
+    if lines := [*_about_observations(seen), *_flaws_of_action(acted)]:
+        raise ConfigurationError("\n".join(lines))
+
+
+def _about_observations(seen: spaces.Space[Any]) -> Iterator[str]:
+    parts = seen.spaces if isinstance(seen, spaces.Dict) else {"": seen}
+    if not parts:
+        yield "environment.id: its observation is a Dict without parts; add one"
+    for key, part in parts.items():
+        what = f"environment.id: its {f'observation {key}'.rstrip()}"
+        if not isinstance(part, KINDS):
+            yield (
+                f"{what} is a {type(part).__name__}, which no policy takes; use Box, Discrete, MultiDiscrete "
+                "or MultiBinary, or a Dict of these"
+            )
+        elif flaw := _flaw(part):
+            yield f"{what} {flaw}"
+
+
+def _about_actions(name: str, acted: spaces.Space[Any]) -> Iterator[str]:
+    known = entry_of(name).actions or KINDS
+    if not isinstance(acted, known):
+        kinds = " or ".join(kind.__name__ for kind in known)
+        fact = f"{name} needs {kinds} actions, not {type(acted).__name__}"
+        yield f"algorithm.name: {fact}; use another algorithm"
+    else:
+        yield from _flaws_of_action(acted)
+
+
+def _flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
+    if flaw := _flaw(acted) or _flaw_of_bounds(acted):
+        yield f"environment.id: its action {flaw}"
+
+
+def _flaw(part: spaces.Space[Any]) -> str:
+    """Return what Stable-Baselines3 would take wrongly in a space, and the remedy; "" if there is nothing."""
+    if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
+        start = np.asarray(part.start).tolist()
+        return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
+    if isinstance(part, spaces.MultiBinary) and len(part.shape) > 1:
+        return f"is a MultiBinary of shape {part.shape}; flatten it"
+    if isinstance(part, spaces.Box) and not part.shape:
+        return "is a single number of shape (); give it the shape (1,)"
+    return ""
+
+
+def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
+    """Return why a Box is no action; an observation may be one."""
+    if not isinstance(acted, spaces.Box):
+        return ""
+    if not np.issubdtype(acted.dtype, np.floating):
+        return f"is a Box of {acted.dtype}, and algorithms send fractions; use float32, or MultiDiscrete"
+    if not acted.is_bounded():
+        return "has no bounds; give its Box a finite low and high"
+    with np.errstate(over="ignore"):
+        narrow = np.isfinite(acted.high - acted.low).all()
+    return (
+        "" if narrow else f"has bounds of which {acted.dtype} cannot hold the difference; give narrower ones"
+    )
+
+
+def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
+    images = images_in(seen)
+    if algorithm.cnn and (not images or isinstance(seen, spaces.Dict)):
+        what = "is a Dict" if isinstance(seen, spaces.Dict) else "is no image"
+        return [f"algorithm.cnn: has no effect, since the environment's observation {what}; remove it"]
+    smallest = SMALLEST[algorithm.cnn]
+    sides = [image.shape[1:] if is_image_space_channels_first(image) else image.shape[:2] for image in images]
+    return [
+        f"environment.id: its images have {rows} x {columns} pixels, and CnnPolicy needs "
+        f"{smallest} x {smallest}; make them larger, or flatten them"
+        for rows, columns in sides
+        if min(rows, columns) < smallest and not _own_network(algorithm)
+    ]
+
+
+def _about_normalization(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
+    if not (algorithm.normalize and algorithm.normalize.observations) or scalable(seen):
+        return []
+    why = "CnnPolicy scales images itself" if images_in(seen) else f"a {type(seen).__name__} has no scale"
+    return [f"algorithm.normalize.observations: {why}; set it to false"]
+
+
+def _usual_policy(name: str, entry: RegisteredAlgorithm, seen: spaces.Space[Any]) -> str:
+    if isinstance(seen, spaces.Dict):
+        kind, what = "MultiInput", "a Dict"
+    else:
+        kind, what = ("Cnn", "images") if images_in(seen) else ("Mlp", "numbers")
+    for alias in aliases(entry.original):
+        if alias.startswith(kind):
+            return alias
+    raise ConfigurationError(
+        f"algorithm.name: {name} has no policy for {what}; use another algorithm, or flatten the observation"
+    )
+
+
+def _own_network(algorithm: Algorithm) -> bool:
+    policy = algorithm.hyperparameters.get("policy_kwargs") or {}
+    return algorithm.policy is not None or "features_extractor_class" in policy

@@ -1,0 +1,69 @@
+"""The remedy for a word that is not a hyperparameter of the algorithm.
+
+The most similar hyperparameter is suggested only for a misspelling. A word with a meaning of its own, such as
+`n_timesteps`, which is not `n_steps`, gets its own place instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from types import MappingProxyType
+
+from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, OF_ZOO
+from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorithm
+from palaestra_trainer.configuration import nearest
+
+_MISSPELLED = 0.85  # gama and num_steps are above, n_timesteps and n_epochs for n_steps below
+# Names of other libraries for the same value.
+_SAME: Mapping[str, str] = MappingProxyType(
+    {
+        "clip_coef": "clip_range",
+        "cliprange": "clip_range",
+        "entropy_coef": "ent_coef",
+        "lam": "gae_lambda",
+        "lambda": "gae_lambda",
+        "lr": "learning_rate",
+        "memory_size": "buffer_size",
+        "minibatch_size": "batch_size",
+        "noptepochs": "n_epochs",
+        "replay_size": "buffer_size",
+        "sgd_minibatch_size": "batch_size",
+        "target_network_update_freq": "target_update_interval",
+        "train_frequency": "train_freq",
+        "update_epochs": "n_epochs",
+        "value_coef": "vf_coef",
+    }
+)
+
+
+def mistakes(
+    algorithm: str, entry: RegisteredAlgorithm, of_policy: Container[str], given: Iterable[str], field: str
+) -> Iterator[str]:
+    """Yield field, fact and remedy of each word that is not a hyperparameter of the algorithm.
+
+    Args:
+        algorithm: its name in the job.
+        entry: its entry.
+        of_policy: the arguments of its policy.
+        given: the words that the job gives.
+        field: the field of the job with the words.
+    """
+    known = entry.known
+    unknown = [word for word in given if word not in known]
+    for word in unknown:
+        yield f"{field}.{word}: {_fact(algorithm, known, of_policy, word)}"
+    if not OF_ZOO.isdisjoint(unknown):
+        yield f"{field}: has words of RL-Baselines3-Zoo; {FROM_ZOO}"
+
+
+def _fact(algorithm: str, known: list[str], of_policy: Container[str], word: str) -> str:
+    if word in ELSEWHERE:
+        return f"is no hyperparameter here; {ELSEWHERE[word]}"
+    if word in of_policy:
+        return f"is an argument of the policy; write it in policy_kwargs.{word}"
+    fact = f"{algorithm} has no such hyperparameter"
+    if (same := _SAME.get(word)) in known:
+        return f"{fact}; write {same}"
+    if others := [name for name, other in ALGORITHMS.items() if word in other.known]:
+        return f"{fact}, unlike {', '.join(others)}; leave it out, or {nearest(word, known, 1.0)}"
+    return f"{fact}; {nearest(word, known, _MISSPELLED)}"

@@ -1,0 +1,52 @@
+"""The tensors that an algorithm changes in a rollout, as `algorithms.beside` declares them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_trainer.algorithms.rollout_state import beside
+
+
+def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
+    """Return the tensors of the networks that a rollout changes, to be copied or written to."""
+    return [
+        tensor
+        for name in beside(model).networks
+        for tensor in getattr(model, name).state_dict(keep_vars=True).values()
+    ]
+
+
+def memories(model: BaseAlgorithm) -> list[torch.Tensor]:
+    """Return the states of the model's recurrent networks; nothing writes to them later."""
+    return [state for name in beside(model).memories for state in _tensors(getattr(model, name))]
+
+
+def remember(model: BaseAlgorithm, states: Sequence[torch.Tensor]) -> None:
+    """Let the model continue with the states that `memories` returned.
+
+    A member without a state keeps the model's own; it begins an episode, and its state with it.
+    """
+    left = iter(states)
+    for name in beside(model).memories:
+        setattr(model, name, _replaced(getattr(model, name), left))
+
+
+def _tensors(states: Any) -> Iterator[torch.Tensor]:
+    if isinstance(states, torch.Tensor):
+        yield states
+        return
+    for part in states:
+        yield from _tensors(part)
+
+
+def _replaced(states: Any, left: Iterator[torch.Tensor]) -> Any:
+    """Return nested tuples of the same kinds with the tensors of `left` in their place."""
+    if isinstance(states, torch.Tensor):
+        known = next(left).to(states.device)[:, : states.shape[1]]
+        return torch.cat([known, states[:, known.shape[1] :]], dim=1)
+    parts = [_replaced(part, left) for part in states]
+    return type(states)(*parts) if hasattr(states, "_fields") else tuple(parts)

@@ -1,0 +1,88 @@
+"""A replay buffer on disk: rows as they lie in memory, in chunks that later checkpoints share.
+
+Between two checkpoints few rows change. A chunk of which none did is a hard link to the file of the
+checkpoint before, or a copy of it where the volume has no links.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from palaestra_trainer.algorithms.buffers import ValidReplayBuffer
+from palaestra_trainer.checkpoint.manifest import EXPERIENCE, SavedCheckpoint, digest_of
+from palaestra_trainer.run_directory import sync
+
+
+def write(buffer: ValidReplayBuffer, folder: Path, before: SavedCheckpoint | None) -> dict[str, str]:
+    """Write the rows in use into a checkpoint's folder; return the digest of each file by its name.
+
+    Args:
+        buffer: its `changed` chunks are those that differ from `before`.
+        folder: the new checkpoint.
+        before: an older one of the same buffer; None: every chunk is written.
+    """
+    (folder / EXPERIENCE).mkdir()
+    known = before.manifest.files if before else {}
+    digests = {}
+    for chunk in range(math.ceil(buffer.size() / buffer.chunk_rows)):
+        name = f"{EXPERIENCE}/{chunk:05}.npy"
+        if (
+            before
+            and name in known
+            and chunk not in buffer.changed
+            and _share(before.path / name, folder / name)
+        ):
+            digests[name] = known[name]
+        else:
+            _write_chunk(buffer, chunk, folder / name)
+            digests[name] = digest_of(folder / name)
+    sync(folder / EXPERIENCE)
+    return digests
+
+
+def read(buffer: ValidReplayBuffer, found: SavedCheckpoint) -> None:
+    """Put the rows of a checkpoint into an equal buffer that stands where it stood when they were written.
+
+    Rows of chunks that are lost are left out.
+
+    Raises:
+        ValueError: they are of another shape, or pickled.
+    """
+    names = sorted(name for name in found.manifest.files if name.startswith(EXPERIENCE))
+    kept = np.ones(buffer.buffer_size, dtype=bool)
+    for chunk, name in enumerate(names):
+        start = chunk * buffer.chunk_rows
+        if name in found.lost:
+            kept[start : start + buffer.chunk_rows] = False
+            continue
+        with (found.path / name).open("rb") as file:
+            buffer.fill(start, {column: np.load(file, allow_pickle=False) for column in buffer.rows(0, 0)})
+    buffer.changed.clear()
+    if found.lost:
+        buffer.keep(kept)
+
+
+def _write_chunk(buffer: ValidReplayBuffer, chunk: int, path: Path) -> None:
+    start = chunk * buffer.chunk_rows
+    with path.open("wb") as file:
+        for column in buffer.rows(start, min(start + buffer.chunk_rows, buffer.size())).values():
+            np.save(file, column, allow_pickle=False)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _share(old: Path, new: Path) -> bool:
+    """Let `new` be the same file as `old`, or a copy; return False if `old` is gone."""
+    try:
+        os.link(old, new)
+    except FileNotFoundError:
+        return False
+    except OSError:  # the volume has no links, or no more of them
+        shutil.copyfile(old, new)
+        sync(new)
+    return True

@@ -1,0 +1,121 @@
+"""Create the environment of a job, of any class.
+
+The environment gets robot, scene and reward as far as its signature accepts them. Mismatches are found here,
+before a simulator starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import gymnasium
+from gymnasium.envs.registration import (
+    EnvSpec,
+    find_highest_version,
+    get_env_id,
+    parse_env_id,
+)
+
+from palaestra_trainer import user_imports
+from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
+from palaestra_trainer.environments import wrappers
+from palaestra_trainer.environments.env_checker import held
+from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
+from palaestra_trainer.kwargs_check import AcceptedArguments
+from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.capabilities import require
+
+_OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
+
+
+def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
+    """Return the environment of a job with `robot` and `scene`; its first reset and step are checked.
+
+    Raises:
+        ConfigurationError: it is not registered, or its signature does not fit the job.
+        MissingCapability: the robot lacks one of its `needs`.
+    """
+    arguments = _checked(wanted, {"robot": robot, "scene": scene})
+    require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
+    try:
+        # `held` replaces gymnasium's wrapper, whose warnings would not end the run.
+        env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
+    except TrainerError:
+        raise
+    except Exception as error:  # the constructor is the user's code, which may raise anything
+        raise ConfigurationError(
+            f"environment.id: {wanted.id} cannot be created ({fact_of(error)}); "
+            "fix it, or change environment.options"
+        ) from error
+    return held(wrappers.wrapped(env, wanted), wanted.id)
+
+
+def keywords(wanted: Environment) -> dict[str, Any]:
+    """Return the keyword arguments that a job gives its environment, without robot and scene.
+
+    Raises:
+        ConfigurationError: it is not registered, or its signature does not fit the job.
+    """
+    given = _checked(wanted, dict.fromkeys(("robot", "scene")))
+    return {name: value for name, value in given.items() if name not in {"robot", "scene"}}
+
+
+def creator_of(name: str) -> Callable[..., Any]:
+    """Return the class or function that creates the environments of a registered name.
+
+    Raises:
+        ConfigurationError: it is not registered, or its entry point does not exist.
+    """
+    return _creator(name, _spec(name))
+
+
+def _checked(wanted: Environment, simulated: Mapping[str, Any]) -> dict[str, Any]:
+    spec = _spec(wanted.id)
+    taken = AcceptedArguments(_creator(wanted.id, spec), wanted.id)
+    offered = {**simulated, "reward": wanted.reward}
+    accepted = {name: value for name, value in offered.items() if taken.accepts(name)}
+    arguments = {**accepted, **wanted.options}
+    if mistakes := [*_mistakes(wanted, taken, {*spec.kwargs, *arguments}), *wrappers.mistakes(wanted)]:
+        raise ConfigurationError("\n".join(mistakes))
+    return arguments
+
+
+def _mistakes(wanted: Environment, taken: AcceptedArguments, given: set[str]) -> Iterator[str]:
+    if not {"robot", "scene"} & given:
+        yield (
+            f"environment.id: {wanted.id} accepts neither robot nor scene, so no simulator would be used; "
+            "add one of these arguments, or **kwargs"
+        )
+    if wanted.reward != DEFAULT_REWARD and "reward" not in given:
+        yield f"environment.reward: {wanted.id} has no argument reward; remove it, or add the argument"
+    options = [name for name in wanted.options if name not in _OF_MAKE]
+    yield from taken.mistakes("environment.options", options, given)
+
+
+def _spec(name: str) -> EnvSpec:
+    """Return the registration of a name in the syntax of `gymnasium.make`."""
+    module, _, registered = name.rpartition(":")
+    if module:
+        user_imports.module_named(module, f"environment.id: {name}")
+    try:
+        space, plain, version = parse_env_id(registered)
+        return gymnasium.spec(get_env_id(space, plain, version or find_highest_version(space, plain)))
+    except gymnasium.error.Error as error:
+        raise ConfigurationError(
+            f"environment.id: {name} cannot be created ({error}); use a registered name, "
+            "or module:name with the module that registers it"
+        ) from error
+
+
+def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
+    """Return the class or function that creates the environment."""
+    creator = spec.entry_point
+    if isinstance(creator, str):
+        found: Callable[..., Any] = user_imports.object_named(
+            creator, f"environment.id: the entry point {creator} of {name}"
+        )
+        return found
+    if creator is None:
+        raise ConfigurationError(f"environment.id: {name} is registered without entry_point; add one")
+    return creator

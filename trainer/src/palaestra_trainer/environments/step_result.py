@@ -1,0 +1,31 @@
+"""The result of a step, the same in every task: reward, end of the episode and info."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palaestra_trainer.environments.options import Episodes, time_up_terminates
+from palaestra_trainer.environments.rewards import EpisodeOutcome, Transition, reward_terms
+from palaestra_trainer.infos import OURS
+
+Result = tuple[float, bool, bool, dict[str, Any]]
+
+
+def result(step: Transition, options: Episodes, extra_steps: int) -> Result:
+    """Return reward, terminated, truncated and info of a step.
+
+    Args:
+        step: the step.
+        options: of the task.
+        extra_steps: control periods that a late sensor made necessary.
+    """
+    outcome, terms = step.outcome, reward_terms(options.reward, step)
+    info = {
+        "is_success": outcome is EpisodeOutcome.REACHED,
+        "outcome": outcome.value,
+        "reward_terms": terms,
+        OURS: {"extra_steps": extra_steps},
+    }
+    time_up, terminates = outcome is EpisodeOutcome.TIME_UP, time_up_terminates(options)
+    terminated = outcome.terminal or (time_up and terminates)
+    return sum(terms.values()), terminated, time_up and not terminates, info

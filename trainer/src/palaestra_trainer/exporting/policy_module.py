@@ -1,0 +1,185 @@
+"""A policy as one PyTorch module, from the environment's observation to an action without chance.
+
+It does everything that `TrainedPolicy.predict` does around the network: channels of images, normalization,
+and the bounds of actions. A recurrent policy takes its state as inputs and returns the next; zeros begin an
+episode. A policy of MaskablePPO takes masks as a further input, as `palaestra_trainer.environments.masks`
+says.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
+from torch import nn
+
+from palaestra_trainer.algorithms import takes_masks
+from palaestra_trainer.environments.masks import ACTION_MASKS, choices_of
+from palaestra_trainer.errors import ExportError
+from palaestra_trainer.run.policies import TrainedPolicy
+
+OBSERVATION = "observation"
+STATE = ("hidden", "cell")  # of a recurrent policy; shape (layers, observations, units)
+
+
+class Normalizer(nn.Module):
+    """What `TrainedPolicy.predict` does to a part of an observation, in its precision.
+
+    Args:
+        mean: of each number.
+        variance: of each number.
+        clip: largest absolute value of a result.
+        epsilon: added to the variance.
+    """
+
+    mean: torch.Tensor
+    variance: torch.Tensor
+
+    def __init__(self, mean: np.ndarray, variance: np.ndarray, clip: float, epsilon: float) -> None:
+        super().__init__()
+        self.clip, self.epsilon = clip, epsilon
+        self.register_buffer("mean", torch.from_numpy(np.asarray(mean, np.float64)))
+        self.register_buffer("variance", torch.from_numpy(np.asarray(variance, np.float64)))
+
+    def forward(self, part: torch.Tensor) -> torch.Tensor:
+        """Return a normalized batch."""
+        scaled = (part.double() - self.mean) / torch.sqrt(self.variance + self.epsilon)
+        return torch.clamp(scaled, -self.clip, self.clip).float()
+
+
+class PolicyModule(nn.Module):
+    """The deterministic policy, with its normalizer.
+
+    Args:
+        loaded: the policy; it is left in evaluation mode on the CPU.
+
+    Raises:
+        ExportError: an observation has the name of the input for masks.
+
+    Attributes:
+        spaces: the space of each input, as the environment returns it.
+        action_space: the space of an action.
+        choices: the number of choices of each number of an action; empty: the policy takes no masks.
+        state_shape: layers and units of the state; None: the policy has no state.
+        normalizers: one for each input, in their order; that of an input that is not normalized does nothing.
+    """
+
+    def __init__(self, loaded: TrainedPolicy) -> None:
+        super().__init__()
+        policy: Any = loaded.model.policy
+        policy.set_training_mode(False)
+        self.policy = policy
+        self.action_space: spaces.Space[Any] = loaded.model.action_space
+        self._seen = parts_of(loaded.model.observation_space)
+        self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
+        self.choices = choices_of(self.action_space) if takes_masks(loaded.model) else []
+        if self.choices and ACTION_MASKS in self.spaces:
+            raise ExportError(
+                f"the observation has a key {ACTION_MASKS}, which is the input for masks; nothing was "
+                "written; rename the key in the environment"
+            )
+        lstm = getattr(policy, "lstm_actor", None)
+        self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))
+        scales = {key or OBSERVATION: scale for key, scale in loaded.scales.items()}
+        self.normalizers = nn.ModuleList(
+            Normalizer(*scales[name]) if name in scales else nn.Identity() for name in self.spaces
+        )
+
+    @property
+    def inputs(self) -> list[str]:
+        """The names of the inputs in their order."""
+        masks = [ACTION_MASKS] if self.choices else []
+        return [*self.spaces, *masks, *(STATE if self.state_shape else ())]
+
+    @property
+    def outputs(self) -> list[str]:
+        """The names of the outputs in their order."""
+        return ["action", *(f"next_{name}" for name in STATE if self.state_shape)]
+
+    def begin(self, observations: int) -> tuple[torch.Tensor, ...]:
+        """Return the state at the start of an episode for a batch; empty if the policy has none."""
+        if self.state_shape is None:
+            return ()
+        layers, units = self.state_shape
+        return tuple(torch.zeros(layers, observations, units) for _ in STATE)
+
+    def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Return the actions for a batch, and the next state of a recurrent policy."""
+        observation = self.seen(inputs)
+        if self.state_shape is None:
+            masks = {ACTION_MASKS: inputs[-1]} if self.choices else {}
+            return (self._bounded(self.policy._predict(observation, deterministic=True, **masks)),)
+        action, state = self.policy._predict(observation, *self.memory(inputs), deterministic=True)
+        return (self._bounded(action), *state)
+
+    def seen(self, inputs: tuple[torch.Tensor, ...]) -> Any:
+        """Return the observations of a batch as the networks take them."""
+        parts = zip(self.spaces, self.normalizers, inputs, strict=False)
+        seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
+        return seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
+
+    def memory(self, inputs: tuple[torch.Tensor, ...]) -> tuple[Any, ...]:
+        """Return the state in the inputs, and which episodes begin; empty if the policy has no state."""
+        if self.state_shape is None:
+            return ()
+        hidden, cell = inputs[len(self.spaces) :]
+        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])  # none begins: its state would be zeros
+
+    def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
+        """Return a batch of images with channels first; anything else unchanged."""
+        return part.permute(0, 3, 1, 2) if self.spaces[name].shape != self._seen[name].shape else part
+
+    def _bounded(self, action: torch.Tensor) -> torch.Tensor:
+        """Return actions as the environment takes them."""
+        space = self.action_space
+        if not isinstance(space, spaces.Box):
+            return action
+        low, high = torch.from_numpy(space.low), torch.from_numpy(space.high)
+        action = action.reshape(-1, *space.shape)
+        if self.policy.squash_output:
+            return low + 0.5 * (action + 1.0) * (high - low)
+        return torch.minimum(torch.maximum(action, low), high)
+
+
+class Scoring(PolicyModule):
+    """The scores of discrete actions, of which the policy takes the best; for a comparison, never for a file.
+
+    Its one output has the name of the action. Masks change no score.
+    """
+
+    @property
+    def outputs(self) -> list[str]:
+        """The name of the scores."""
+        return ["action"]
+
+    def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Return the scores for a batch.
+
+        Raises:
+            AttributeError: the policy has none of the networks and distributions of Stable-Baselines3's.
+        """
+        observation = self.seen(inputs)
+        if hasattr(self.policy, "q_net"):
+            return (self.policy.q_net(observation),)
+        if hasattr(self.policy, "quantile_net"):
+            return (self.policy.quantile_net(observation).mean(dim=1),)
+        found = self.policy.get_distribution(observation, *self.memory(inputs))
+        one = found[0] if isinstance(found, tuple) else found
+        made = one.distributions if hasattr(one, "distributions") else one.distribution
+        return (torch.cat([part.logits for part in made], dim=1) if isinstance(made, list) else made.logits,)
+
+
+def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each key of a Dict, in its order; any other space is one part."""
+    return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
+
+
+def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:
+    """Return the space of images with channels last, as environments return them; any other unchanged."""
+    if not (isinstance(space, spaces.Box) and is_image_space(space) and is_image_space_channels_first(space)):
+        return space
+    low, high = (np.moveaxis(bound, 0, -1) for bound in (space.low, space.high))
+    return spaces.Box(low, high, dtype=np.uint8)

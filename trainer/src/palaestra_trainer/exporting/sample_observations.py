@@ -1,0 +1,106 @@
+"""Observations to compare a file with its policy on: like those of episodes, always the same.
+
+The bounds of a space say little about its episodes: they may be infinite, or the largest number of a type.
+Drawn evenly from there, every number would drive a network to its limits, where all actions are the same.
+So the numbers of a Box have several scales, from a hundredth to as far as the bounds allow. Noise looks the
+same to a network everywhere, so images have areas, of different brightness and contrast.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.preprocessing import is_image_space
+
+from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
+
+EPISODE = 100  # observations of one scale; after them a recurrent policy begins anew
+_FARTHEST = 1e4  # from the middle of a space, where its bounds allow more
+_NEAREST = 1e-2
+_DEVIATIONS = 5.0  # the same where statistics of observations are known
+_AREAS = 6  # along each side of an image
+_LARGEST_WHOLE = 2.0**62  # float64 has no number for the largest of 64 bits
+
+
+def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
+    """Return observations of each part."""
+    observations = {}
+    for number, (name, space) in enumerate(acting.spaces.items()):
+        if isinstance(space, spaces.Box) and is_image_space(space):
+            observations[name] = _images(space.shape, count, number)
+        elif isinstance(space, spaces.Box):
+            observations[name] = _numbers(space, acting.normalizers[number], count, number)
+        else:
+            space.seed(number)
+            observations[name] = np.stack([np.asarray(space.sample()) for _ in range(count)])
+    return observations
+
+
+def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
+    """Return masks that allow half of the choices and at least one of each number; shape (count, choices)."""
+    generator = np.random.default_rng(0)
+    parts = []
+    for choices in acting.choices:
+        part = generator.integers(2, size=(count, choices)).astype(np.bool_)
+        part[np.arange(count), generator.integers(choices, size=count)] = True
+        parts.append(part)
+    return np.concatenate(parts, axis=1)
+
+
+def magnitudes(acting: PolicyModule, observations: dict[str, np.ndarray]) -> np.ndarray:
+    """Return for each observation the largest number that a network gets, at least 1.
+
+    It computes with 24 bits, so the errors of its actions grow with that number.
+    """
+    found = np.ones(len(next(iter(observations.values()))))
+    for (name, space), normalize in zip(acting.spaces.items(), acting.normalizers, strict=True):
+        if isinstance(space, spaces.Box) and not is_image_space(space):
+            numbers = np.abs(observations[name].astype(np.float64)).reshape(len(found), -1).max(axis=1)
+            limit = normalize.clip if isinstance(normalize, Normalizer) else np.inf
+            found = np.maximum(found, np.minimum(numbers, limit))
+    return found
+
+
+def _images(shape: tuple[int, ...], count: int, seed: int) -> np.ndarray:
+    """Return images of a shape, whose channels are last."""
+    rows, columns, channels = shape
+    generator = np.random.default_rng(seed)
+    areas = generator.uniform(-255.0, 255.0, (count, _AREAS, _AREAS, channels))
+    brightness = generator.uniform(0.0, 255.0, (count, 1, 1, channels))
+    contrast = generator.uniform(0.0, 1.0, (count, 1, 1, 1))
+    painted: np.ndarray = np.clip(brightness + contrast * areas, 0.0, 255.0).astype(np.uint8)
+    down, across = (np.arange(side) * _AREAS // side for side in (rows, columns))
+    return painted[:, down[:, np.newaxis], across]
+
+
+def _numbers(box: spaces.Box, normalize: Any, count: int, seed: int) -> np.ndarray:
+    """Return numbers of a Box, shape (count, *box.shape)."""
+    low, high = (bound.astype(np.float64) for bound in (box.low, box.high))
+    middle, farthest = _middle(low, high, normalize)
+    far = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, *box.shape)) * _scales(farthest, count)
+    beyond = (middle + far < low) | (middle + far > high)
+    numbers: np.ndarray = np.clip(middle + np.where(beyond, -far, far), low, high)
+    if not np.issubdtype(box.dtype, np.floating):
+        numbers = np.rint(np.clip(numbers, -_LARGEST_WHOLE, _LARGEST_WHOLE))
+    return numbers.astype(box.dtype)
+
+
+def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of a Box, and how far from there numbers are drawn."""
+    if isinstance(normalize, Normalizer):
+        return normalize.mean.numpy(), _DEVIATIONS * np.sqrt(normalize.variance.numpy() + normalize.epsilon)
+    half = high / 2 - low / 2
+    narrow = half <= _FARTHEST
+    bounds = (np.where(narrow, bound, 0.0) for bound in (low, high))
+    return np.where(narrow, sum(bounds) / 2, np.clip(0.0, low, high)), np.where(narrow, half, _FARTHEST)
+
+
+def _scales(farthest: np.ndarray, count: int) -> np.ndarray:
+    """Return the scale of each observation: the largest for every other episode, fewer and fewer between."""
+    episodes = np.arange(count) // EPISODE
+    ladder = np.where(episodes % 2, (episodes // 2 % EPISODE) / max(1, episodes.max() // 2), 0.0)
+    nearest = np.minimum(1.0, _NEAREST / np.maximum(farthest, _NEAREST))
+    scales: np.ndarray = farthest * nearest ** ladder.reshape(-1, *[1] * farthest.ndim)
+    return scales

@@ -1,0 +1,136 @@
+"""One member that plays episodes for a loop that knows nothing of faults.
+
+Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
+reward 0 and `sim_fault` (`palaestra_trainer.infos`). The member is mended in the background, and the next
+episode begins once it is up.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.seeding import np_random
+
+from palaestra_trainer.copies import copied
+from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.infos import OURS, of_environment
+from palaestra_trainer.simulators.interface import Environment, Step
+from palaestra_trainer.simulators.restarter import Restarter
+
+
+class StepResult(NamedTuple):
+    """The result of one step.
+
+    Attributes:
+        step: as gymnasium's `step` returns it.
+        episode: return, length and seconds of the episode, as Stable-Baselines3's Monitor names them, if this
+            is its last step and no fault cut it; else None.
+    """
+
+    step: Step
+    episode: dict[str, float] | None = None
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """The info of the step."""
+        return self.step[4]
+
+    @property
+    def ended(self) -> bool:
+        """Whether it is the last one of its episode."""
+        return self.step[2] or self.step[3]
+
+    @property
+    def marked(self) -> dict[str, Any]:
+        """The info for Stable-Baselines3; the row of a fault has only our words."""
+        cut = self.ended and self.episode is None
+        return self.info if cut else of_environment(self.info)
+
+
+class EpisodeRunner:
+    """Plays the episodes of one member.
+
+    Attributes:
+        keeper: looks after the member.
+        playing: whether an episode is under way.
+        observation: the last one of the member.
+        reset_info: info of the last reset.
+    """
+
+    def __init__(self, keeper: Restarter) -> None:
+        self.keeper = keeper
+        self.playing = False
+        self.observation: Any = None
+        self._last: Any = None  # a copy, since the training loop may write into the original
+        self.reset_info: dict[str, Any] = {}
+        self._return, self._length, self._began = 0.0, 0, 0.0
+        self._random, _ = np_random()
+        self._next: tuple[int, dict[str, Any] | None] = (0, None)
+
+    @property
+    def env(self) -> Environment:
+        """The member's environment; another object after a standby took over."""
+        return self.keeper.member.env
+
+    def prepare(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """Choose the next episode. Without `seed`, its seed is the next one of the sequence of the last.
+
+        An episode keeps its seed if a fault makes it begin twice.
+        """
+        if seed is not None:
+            self._random, _ = np_random(seed)
+        self._next = (int(self._random.integers(2**31)) if seed is None else seed, options)
+        self.playing = False
+
+    def begin(self) -> None:
+        """Begin the chosen episode if the member is up; a fault begins to mend it, and none is under way.
+
+        Raises:
+            FaultBudgetSpent: its restart budget is used up.
+            ConfigurationError: its world lacks what the environment needs, or it cannot be restarted.
+            MasterLost: no ROS master answers.
+            Diverged: the observation is not finite.
+        """
+        if not self.keeper.up():
+            return
+        seed, options = self._next
+        try:
+            self.observation, self.reset_info = self.keeper.reset(seed, options)
+        except SimulatorFault as fault:
+            self.keeper.begin_mending(fault)
+            return
+        self._last = copied(self.observation)
+        self._return, self._length, self._began = 0.0, 0, time.monotonic()
+        self.playing = True
+
+    def step(self, action: Any) -> StepResult:
+        """Return the row of one step.
+
+        Raises:
+            ResetNeeded: no episode is under way.
+            Diverged: observation or reward is not finite.
+        """
+        if not self.playing:
+            raise ResetNeeded(f"{self.keeper.name}: no episode is under way; call reset() first")
+        self.playing = False  # also after an interrupt amid the step
+        try:
+            step = self.keeper.step(action)
+        except SimulatorFault as fault:
+            return self._cut(fault)
+        self.observation, reward, terminated, truncated, _ = step
+        self._last = copied(self.observation)
+        self._return += float(reward)
+        self._length += 1
+        self.playing = not (terminated or truncated)
+        return StepResult(step, None if self.playing else self._summary())
+
+    def _cut(self, fault: SimulatorFault) -> StepResult:
+        self.keeper.begin_mending(fault, self._length)
+        report = {"kind": fault.kind, "simulator": self.keeper.name, "fact": str(fault), "step": self._length}
+        return StepResult((self._last, 0.0, False, True, {OURS: {"sim_fault": report}}))
+
+    def _summary(self) -> dict[str, float]:
+        seconds = time.monotonic() - self._began
+        return {"r": round(self._return, 6), "l": self._length, "t": round(seconds, 6)}

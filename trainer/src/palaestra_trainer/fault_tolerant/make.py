@@ -1,0 +1,158 @@
+"""The players of tolerant environments: in a facade, in a job, or in simulators of their own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+from uuid import uuid4
+
+import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
+from palaestra_protocol.pod.enums import Role
+from palaestra_trainer.configuration import (
+    CONFIG_VARIABLE,
+    Configuration,
+    Environment,
+    SimulatorConfiguration,
+    load,
+)
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.fault_tolerant.episode_runner import StepResult
+from palaestra_trainer.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.run.custom_program import ProgramReport, reported
+from palaestra_trainer.simulators.allocation import allocate
+from palaestra_trainer.simulators.configured import require_driver
+from palaestra_trainer.simulators.connect import connect_members, robot_of, simulator_at
+from palaestra_trainer.simulators.entry_point import own_world
+from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.simulators.interface import Member, NullWatcher, Watcher
+from palaestra_trainer.simulators.notebook_simulator import (
+    NotebookMember,
+    NotebookSimulator,
+    offered_simulator,
+)
+from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.telemetry.progress_sources import follow
+
+
+def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:
+    """Return the players of one environment, whose simulators are up.
+
+    The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
+    none, or more than one is wanted, simulators of PALAESTRA_CONFIG are used. If that is not set, new ones
+    are started: stubs, or MuJoCo for `SeeTarget-v0`.
+
+    Args:
+        wanted: the environment; None: that of PALAESTRA_CONFIG.
+        number: how many simulators; None: that of the facade, or all of the role, or one.
+        role: the role of the simulators in PALAESTRA_CONFIG.
+
+    Raises:
+        ConfigurationError: the environment is missing or wrong, too few simulators with the role are free, or
+            MuJoCo is not installed.
+        FaultBudgetSpent: a simulator did not start.
+        MasterLost: no ROS master answers.
+    """
+    if number is not None and number < 1:
+        raise ConfigurationError(f"num_envs: {number} is no number of environments; give 1 or more")
+    configuration = load() if os.environ.get(CONFIG_VARIABLE) else None
+    environment = wanted or (configuration.environment if configuration else None)
+    if environment is None:
+        raise ConfigurationError(
+            f"environment: none was given, and {CONFIG_VARIABLE} is not set; give the id of an environment"
+        )
+    world, driver = own_world(environment.id)
+    place = offered_simulator(world) if number in {None, 1} else None
+    if place is not None:
+        return _in_facade(place, environment)
+    if configuration is not None:
+        return _in_job(configuration.model_copy(update={"environment": environment}), number, role)
+    require_driver(driver)
+    return _in_own(environment, number or 1, world, driver)
+
+
+def _in_facade(place: NotebookSimulator, environment: Environment) -> EnvGroup:
+    try:
+        keeper = Restarter(NotebookMember(place, environment))
+    except BaseException:
+        place.release()
+        raise
+    # The program may pause the simulator after any step, so none may end amid a restart.
+    return EnvGroup([keeper], keeper.stop, mend_at_once=True)
+
+
+def _in_job(configuration: Configuration, number: int | None, role: Role) -> EnvGroup:
+    with ExitStack() as stack:
+        entries = _allocated(stack, configuration, number, role)
+        chosen = configuration.model_copy(update={"simulators": entries})
+        members = connect_members(chosen)
+        progress = reported(configuration)
+        for entry in entries:
+            progress.add(entry.name, role)
+        follow(progress, members)
+        keepers = _started(stack, chosen, members, progress)
+        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in keepers}}
+        return EnvGroup(
+            keepers,
+            stack.pop_all().close,
+            configuration.stall_deadline_seconds,
+            played=partial(_count, progress, role),
+        )
+
+
+def _in_own(environment: Environment, number: int, world: str, driver: str) -> EnvGroup:
+    entries = tuple(
+        SimulatorConfiguration(
+            name=f"collect-{index}",
+            group="collect",
+            index=index,
+            role=Role.COLLECT,
+            driver=driver,
+            world=world,
+        )
+        for index in range(number)
+    )
+    configuration = Configuration(
+        job="own", environment=environment, steps=1, simulators=entries, robot=robot_of(world)
+    )
+    with ExitStack() as stack:
+        members = []
+        for entry in entries:
+            # A stub leaves six such digits out of the seed of its faults, so that they repeat.
+            launcher = ProcessLauncher(world, driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
+            stack.callback(launcher.close)
+            members.append(simulator_at(launcher, configuration, entry))
+        return EnvGroup(_started(stack, configuration, members, NullWatcher()), stack.pop_all().close)
+
+
+def _allocated(
+    stack: ExitStack, configuration: Configuration, number: int | None, role: Role
+) -> tuple[SimulatorConfiguration, ...]:
+    """Return the simulators that are reserved until `stack` closes; none may be given up."""
+    every = max(1, len(configuration.with_role(role)))
+    entries = []
+    for _ in range(number or every):
+        allocated = allocate(configuration, role)
+        stack.callback(allocated.lock.release)
+        entries.append(allocated.simulator.model_copy(update={"min_simulators": None}))
+    return tuple(entries)
+
+
+def _started(
+    stack: ExitStack, configuration: Configuration, members: Sequence[Member], watcher: Watcher
+) -> list[Restarter]:
+    """Return the keepers of members that are up until `stack` closes."""
+    fleet = Fleet(configuration, members, watcher)
+    stack.callback(fleet.stop)
+    fleet.start()
+    return fleet.collecting or fleet.evaluating
+
+
+def _count(progress: ProgramReport, role: Role, rows: Sequence[StepResult]) -> None:
+    infos: list[dict[str, Any]] = [
+        row.marked | ({} if row.episode is None else {"episode": row.episode}) for row in rows
+    ]
+    progress.played(role, infos)

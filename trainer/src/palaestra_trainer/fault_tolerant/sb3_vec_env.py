@@ -1,0 +1,77 @@
+"""Members as a Stable-Baselines3 VecEnv that tolerates faults."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+
+from palaestra_trainer.algorithms.space_compat import refuse_flaws
+from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.fault_tolerant.episode_runner import StepResult
+from palaestra_trainer.infos import TRUNCATED
+
+
+class FaultTolerantVecEnv(MembersVecEnv):
+    """All members step at the same time, as in `TolerantVectorEnv`.
+
+    The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
+    that Stable-Baselines3's Monitor would add. If a fault cut the episode, it has `sim_fault`
+    (`palaestra_trainer.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count it.
+
+    Args:
+        players: in the order of the rows.
+
+    Raises:
+        ConfigurationError: Stable-Baselines3 would take the environment's observations or actions wrongly.
+    """
+
+    def __init__(self, players: EnvGroup) -> None:
+        self._players = players
+        task = players.all[0].env
+        refuse_flaws(task.observation_space, task.action_space)
+        super().__init__([player.keeper for player in players.all])
+
+    def reset(self) -> VecEnvObs:
+        """Begin an episode in each member at once; return the first observations.
+
+        Raises:
+            As `EnvGroup.begin`.
+        """
+        self._players.begin(self._seeds, [options or None for options in self._options])
+        self._reset_seeds()
+        self._reset_options()
+        return self._seen()
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Step all members at once; return observations, rewards, dones and infos.
+
+        Raises:
+            As `EnvGroup.step_all`.
+        """
+        rows = self._players.step_all(list(self._actions))
+        return (
+            self._seen(),
+            np.array([row.step[1] for row in rows], np.float32),
+            np.array([row.ended for row in rows], np.bool_),
+            [_info(row) for row in rows],
+        )
+
+    def close(self) -> None:
+        """Stop the simulators and release them; safe to repeat."""
+        self._players.close()
+
+    def _seen(self) -> VecEnvObs:
+        self.reset_infos = [player.reset_info for player in self._players.all]
+        return self._stack([player.observation for player in self._players.all])
+
+
+def _info(row: StepResult) -> dict[str, Any]:
+    observation, _, terminated, truncated, _ = row.step
+    limited = row.marked | {TRUNCATED: truncated and not terminated}
+    if not row.ended:
+        return limited
+    ended = {**limited, "terminal_observation": observation}
+    return ended if row.episode is None else {**ended, "episode": row.episode}

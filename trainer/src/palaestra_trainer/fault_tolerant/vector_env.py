@@ -1,0 +1,121 @@
+"""Members as a gymnasium VectorEnv that tolerates faults."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any, SupportsIndex
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, concatenate, create_empty_array, iterate
+
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+
+Seeds = SupportsIndex | Sequence[int | None] | None
+Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
+
+
+class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
+    """All members step at the same time; an episode that ends is reset in the same step.
+
+    The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
+    ended it, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until that simulator
+    is mended, and the others wait with it: this interface has no row for a simulator that does not step.
+
+    Args:
+        players: in the order of the rows.
+    """
+
+    def __init__(self, players: EnvGroup) -> None:
+        self._players = players
+        self.num_envs = len(players.all)
+        inner = players.all[0].env
+        self.metadata = {**inner.metadata, "autoreset_mode": AutoresetMode.SAME_STEP}
+        self.render_mode = inner.render_mode
+        self.single_observation_space, self.single_action_space = inner.observation_space, inner.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    def reset(
+        self, *, seed: Seeds = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode in each member at once; return the first observations and infos.
+
+        Args:
+            seed: of the first member; the next ones have `seed + 1` and so on. Or one for each.
+            options: of the environment's reset, for each member.
+
+        Raises:
+            ValueError: the number of seeds is not that of members.
+            As `EnvGroup.begin`.
+        """
+        self._players.begin(self._seeds(seed), [options] * self.num_envs)
+        infos: dict[str, Any] = {}
+        for index, player in enumerate(self._players.all):
+            infos = self._add_info(infos, player.reset_info, index)
+        return self._stacked(), infos
+
+    def step(self, actions: Any) -> Stepped:
+        """Step all members at once; return observations, rewards, terminations, truncations and infos.
+
+        Raises:
+            As `EnvGroup.step_all`.
+        """
+        rows = self._players.step_all(list(iterate(self.action_space, actions)))
+        infos: dict[str, Any] = {}
+        for index, (player, row) in enumerate(zip(self._players.all, rows, strict=True)):
+            final = {"final_obs": row.step[0], "final_info": row.info}
+            infos = self._add_info(infos, final | player.reset_info if row.ended else row.info, index)
+        _, rewards, terminations, truncations, _ = zip(*(row.step for row in rows), strict=True)
+        return (
+            self._stacked(),
+            np.array(rewards, np.float64),
+            np.array(terminations, np.bool_),
+            np.array(truncations, np.bool_),
+            infos,
+        )
+
+    def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
+        """Return what a method of each environment returns, or an attribute, as `SyncVectorEnv` does."""
+        found = [player.env.get_wrapper_attr(name) for player in self._players.all]
+        return tuple(each(*arguments, **options) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each environment, also one behind wrappers."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment; `values` are one for all, or a list or tuple of one for each.
+
+        Raises:
+            ValueError: the number of values is not that of environments.
+        """
+        each = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ValueError(f"values: {len(each)} for {self.num_envs} environments; give one for each")
+        for player, value in zip(self._players.all, each, strict=True):
+            player.keeper.set_attribute(name, value)
+
+    def render(self) -> tuple[Any, ...]:
+        """Return what each environment's `render` returns."""
+        return self.call("render")
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Stop the simulators and release them."""
+        del kwargs
+        self._players.close()
+
+    def _seeds(self, seed: Seeds) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, SupportsIndex):
+            return [operator.index(seed) + index for index in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed: {len(seed)} seeds for {self.num_envs} environments; give one for each")
+        return seed
+
+    def _stacked(self) -> Any:
+        space = self.single_observation_space
+        empty = create_empty_array(space, self.num_envs, fn=np.zeros)
+        return concatenate(space, [player.observation for player in self._players.all], empty)

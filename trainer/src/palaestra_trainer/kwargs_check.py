@@ -1,0 +1,58 @@
+"""The keyword arguments of a class or function, as options of a job give them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from palaestra_trainer.configuration import nearest
+
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+class AcceptedArguments:
+    """The arguments that a class or function accepts by name.
+
+    Args:
+        taker: the class or function.
+        name: its name in messages.
+    """
+
+    def __init__(self, taker: Callable[..., Any], name: str) -> None:
+        signature = inspect.signature(taker)
+        self._name = name
+        self._named = named(signature)
+        self._any = takes_any(signature)
+
+    def accepts(self, name: str) -> bool:
+        """Return whether an argument of this name may be given."""
+        return self._any or name in self._named
+
+    def mistakes(self, field: str, options: Iterable[str], others: Iterable[str] = ()) -> Iterator[str]:
+        """Yield field, fact and remedy of each unknown option and of each missing argument.
+
+        Args:
+            field: the field of the job with the options.
+            options: the names of the arguments that the job gives.
+            others: the names of the arguments that come from elsewhere.
+        """
+        known = list(self._named)
+        for name in options:
+            if not self.accepts(name):
+                remedy = nearest(name, known) if known else "it has no arguments, so remove this one"
+                yield f"{field}.{name}: {self._name} has no such argument; {remedy}"
+        given = {*options, *others}
+        for name, parameter in self._named.items():
+            if parameter.default is inspect.Parameter.empty and name not in given:
+                yield f"{field}.{name}: {self._name} needs this argument; set it, or give it a default"
+
+
+def named(signature: inspect.Signature) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a signature that can be given by name, without those of its `**kwargs`."""
+    return {name: found for name, found in signature.parameters.items() if found.kind in _NAMED}
+
+
+def takes_any(signature: inspect.Signature) -> bool:
+    """Return whether a signature accepts every name, by `**kwargs`."""
+    return any(found.kind is inspect.Parameter.VAR_KEYWORD for found in signature.parameters.values())

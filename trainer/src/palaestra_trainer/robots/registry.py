@@ -1,0 +1,42 @@
+"""The class that `trainer.robot` of a job names."""
+
+from __future__ import annotations
+
+from palaestra_trainer import user_imports
+from palaestra_trainer.configuration import nearest
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RobotAbc
+from palaestra_trainer.robots.simulated import SimulatedRobot
+
+SHIPPED: dict[str, str] = {
+    "Robotino": "palaestra_trainer.robots.robotino:Robotino",
+    "TurtleBot3Burger": "palaestra_trainer.robots.differential:TurtleBot3Burger",
+    "EPuck": "palaestra_trainer.robots.differential:EPuck",
+}
+
+
+def robot_class(name: str) -> type[SimulatedRobot]:
+    """Return the class of a robot: one in `SHIPPED`, or a class of your own as `module:Class`.
+
+    Raises:
+        ConfigurationError: there is no such class, or it is no robot that a simulator could have.
+    """
+    if name not in SHIPPED and not user_imports.names_class(name):
+        raise ConfigurationError(
+            f"trainer.robot: {name} is not known; {nearest(name, list(SHIPPED))}, "
+            "or name a class of your own as module:Class"
+        )
+    found = user_imports.object_named(SHIPPED.get(name, name), f"trainer.robot: {name}")
+    if not (isinstance(found, type) and issubclass(found, SimulatedRobot)):
+        kind = "a RobotAbc that no simulator has" if _is_robot(found) else "not a RobotAbc"
+        raise ConfigurationError(
+            f"trainer.robot: {name} is {kind}; derive the class from "
+            "palaestra_trainer.robots.simulated.SimulatedRobot or one of its subclasses"
+        )
+    if missing := sorted(getattr(found, "__abstractmethods__", ())):
+        raise ConfigurationError(f"trainer.robot: {name} lacks the method {missing[0]}; implement it")
+    return found
+
+
+def _is_robot(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, RobotAbc)

@@ -1,0 +1,41 @@
+"""One XML-RPC call of the ROS master or of a node, with a deadline and a checked answer.
+
+rosgraph's own client would wait forever. The peer may send any bytes; what is no answer becomes
+`UnreadableAnswer` here.
+"""
+
+from __future__ import annotations
+
+import xmlrpc.client
+from typing import Any, NamedTuple
+
+from palaestra_protocol.xmlrpc import client
+from palaestra_protocol.xmlrpc.documents import UnreadableDocument
+from palaestra_trainer.errors import UnreadableAnswer
+
+OK = 1
+
+
+class RpcResponse(NamedTuple):
+    """The answer of every ROS call: 1 for success, a text for people, a value."""
+
+    code: int
+    text: str
+    value: Any
+
+
+def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcResponse:
+    """Return the answer of the server at `uri`.
+
+    Raises:
+        OSError: it cannot be reached; TimeoutError: it does not answer in time.
+        UnreadableAnswer: it sent an invalid ROS response.
+    """
+    try:
+        answer: Any = client.call(uri, timeout_s, method, *arguments)
+    except (UnreadableDocument, xmlrpc.client.Fault) as error:
+        raise UnreadableAnswer(f"{uri} answered {method} with invalid XML-RPC: {error}") from error
+    match answer:
+        case [int(code), str(text), value]:
+            return RpcResponse(code, text, value)
+    raise UnreadableAnswer(f"{uri} answered {method} with {answer!r}, not with a code, a text and a value")

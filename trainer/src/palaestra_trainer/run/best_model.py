@@ -1,0 +1,250 @@
+"""Select the best policy of a run, and decide whether it is good enough to stop.
+
+The best of many evaluations on the same few episodes looks better than it is. So does the first evaluation
+that reaches a goal. Therefore both are confirmed: evaluated once more, on episodes of another stream. Each
+confirmation plays the next episodes of that stream; otherwise, after many confirmations, the stream itself
+would select a policy.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from math import ceil
+from pathlib import Path
+from typing import Any, Self
+
+import structlog
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_protocol.pod.status import Cause
+from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_all
+from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
+from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.run.context import RunContext
+from palaestra_trainer.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
+from palaestra_trainer.simulators.fleet import resting, running
+from palaestra_trainer.telemetry.progress import Progress
+
+log = structlog.get_logger(__name__)
+
+BEST = "evaluation.json"  # a member of model.zip
+
+
+class Enough(TrainerError):
+    """The policy has reached the wanted success rate; the run is done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Best:
+    """The evaluation of the policy in model.zip.
+
+    Attributes:
+        step: valid environment steps that the policy had learned from.
+        success_rate: 0 to 1; None: the environment reports no success.
+        mean_return: of the evaluation's episodes.
+    """
+
+    step: int
+    success_rate: float | None
+    mean_return: float
+
+    @property
+    def score(self) -> tuple[float, float]:
+        """The rank, as in `EvaluationResult.score`; the best evaluation has the highest."""
+        return (self.success_rate or 0.0, self.mean_return)
+
+    @classmethod
+    def of_line(cls, line: dict[str, Any]) -> Self:
+        """Return a line of evaluations.jsonl as the best one."""
+        rate = line["success_rate"]
+        return cls(
+            step=int(line["step"]),
+            success_rate=None if rate is None else float(rate),
+            mean_return=float(line["mean_return"]),
+        )
+
+
+class Selection:
+    """Evaluates the model of a run, keeps the best policy in model.zip, and confirms its success rate.
+
+    Args:
+        run: its evaluating simulators play; its collecting ones are paused meanwhile.
+        model: the model to evaluate; its logger must be set.
+    """
+
+    def __init__(self, run: RunContext, model: BaseAlgorithm) -> None:
+        self._run = run
+        self._model = model
+        self._directory = run.directory
+        self._best = best_of(run.directory)
+
+    @property
+    def measures(self) -> bool:
+        """Whether this run has evaluations."""
+        return self._run.configuration.evaluation.every_steps > 0 and bool(self._run.fleet.evaluating)
+
+    def evaluate(self, step: int) -> None:
+        """Evaluate the current policy, and keep it if it is the best so far; `step` is the current step.
+
+        The evaluation's line is written last. So an evaluation is repeated if it or its confirmation is cut.
+
+        Raises:
+            Enough: the goal of the run is reached, and confirmed unless that is turned off.
+            ConfigurationError: there is a goal, and the environment reports no success.
+            Interrupted: a signal has arrived.
+        """
+        wanted = self._run.configuration.evaluation
+        evaluation = self._measure(EVALUATE, wanted.episodes)
+        self._log("eval", step, evaluation)
+        goal = wanted.stop_at_success_rate
+        reached = goal is not None and self._confirmed(evaluation, goal, step)
+        if reached or self._best is None or evaluation.score > self._best.score:
+            self._keep(evaluation, step)
+        append_line(self._directory.evaluations, {"step": step} | evaluation.record())
+        if reached:
+            raise Enough(f"{_in_words(self._run.progress)} at step {step}")
+
+    def recycle_resting(self) -> None:
+        """Begin to recycle the evaluating simulators that are due before the next evaluation ends.
+
+        They come up while the others collect.
+        """
+        keepers = [keeper for keeper in self._run.fleet.evaluating if not keeper.lost]
+        for keeper in keepers:
+            keeper.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(keepers)))
+
+    def finish(self, step: int) -> None:
+        """Confirm the best policy at the end of training; without evaluations save the last policy.
+
+        Raises:
+            Interrupted: a signal has arrived.
+        """
+        if not self._directory.model.exists():
+            replace_file(self._directory.model, lambda path: checkpoint.save_tensors(path, self._model))
+        best = self._best
+        if best is None or not self.measures or not self._run.configuration.evaluation.confirming:
+            return
+        if confirmation_of(self._directory, best.step) is None:
+            with self._acting_as_best(best, step):
+                self._confirm(best.step, step)
+
+    def _confirmed(self, evaluation: EvaluationResult, goal: float, step: int) -> bool:
+        if evaluation.success_rate is None:
+            raise ConfigurationError(
+                "evaluation.stopAtSuccessRate: the environment reports no success; set is_success in the "
+                "info of an episode's last step, or remove stopAtSuccessRate"
+            )
+        if evaluation.success_rate < goal:
+            return False
+        if not self._run.configuration.evaluation.confirming:
+            return True
+        confirmation = self._confirm(step, step)
+        return confirmation.success_rate is not None and confirmation.success_rate >= goal
+
+    def _confirm(self, step: int, now: int) -> EvaluationResult:
+        """Evaluate the model, whose policy is that of `step`, on the next episodes of the stream."""
+        before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
+        evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
+        self._log("confirm", now, evaluation, of_step=step)
+        line = {"step": step, "confirmed_at": now} | evaluation.record()
+        append_line(self._directory.confirmations, line)
+        return evaluation
+
+    def _measure(self, stream: str, episodes: int, first: int = 0) -> EvaluationResult:
+        run = self._run
+        seeds = episode_seeds(run.configuration.seed, stream, episodes, first)
+        with (
+            run.progress.spending(Cause.EVALUATING),
+            resting(run.fleet.collecting),
+            running(run.fleet.evaluating, run.interruption.check),
+        ):
+            policy = algorithms.policy_of(self._model)
+            evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
+        run.progress.evaluated(evaluation)
+        return evaluation
+
+    def _log(self, kind: str, step: int, evaluation: EvaluationResult, **fields: Any) -> None:
+        logger = self._model.logger
+        if evaluation.success_rate is not None:
+            logger.record(f"{kind}/success_rate", evaluation.success_rate)
+        logger.record(f"{kind}/mean_reward", evaluation.mean_return)
+        logger.record(f"{kind}/mean_ep_length", evaluation.mean_length)
+        logger.dump(step)
+        event = "evaluated" if kind == "eval" else "confirmed"
+        interval = evaluation.success_interval
+        bounds = {} if interval is None else {"success_low": interval.low, "success_high": interval.high}
+        log.info(event, step=step, **fields, **evaluation.summary(), **bounds)
+
+    def _keep(self, evaluation: EvaluationResult, step: int) -> None:
+        rate, mean_return = evaluation.success_rate, evaluation.mean_return
+        self._best = best = Best(step=step, success_rate=rate, mean_return=mean_return)
+
+        def write(path: Path) -> None:
+            checkpoint.save_tensors(path, self._model)
+            with zipfile.ZipFile(path, "a") as archive:
+                archive.writestr(BEST, json.dumps(asdict(best)))
+
+        replace_file(self._directory.model, write)
+
+    @contextmanager
+    def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:
+        """Load the policy of model.zip into the model inside; its checkpoint may be written after."""
+        if best.step == step:
+            yield
+            return
+        own, normalizer = checkpoint.Tensors.of(self._model), algorithms.normalizer_of(self._model)
+        normalized = None if normalizer is None else normalizer.to_json()
+        try:
+            checkpoint.load_tensors(self._directory.model, self._model)
+            yield
+        finally:
+            own.put_back(self._model)
+            if normalizer is not None and normalized is not None:
+                normalizer.learn_from_json(normalized)
+
+
+def best_of(directory: RunDirectory) -> Best | None:
+    """Return the evaluation of the policy in model.zip; None: it has none.
+
+    A model.zip of a release up to a5276f3 does not hold it; then it is the best line of evaluations.jsonl.
+    """
+    if not directory.model.exists():
+        return None
+    with zipfile.ZipFile(directory.model) as archive:
+        if BEST in archive.namelist():
+            return Best(**json.loads(archive.read(BEST)))
+    lines = map(Best.of_line, read_lines(directory.evaluations))
+    return max(lines, key=lambda line: line.score, default=None)
+
+
+def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None:
+    """Return the confirmation of the policy of `step`; None: it was not confirmed."""
+    found = (line for line in read_lines(directory.confirmations) if line["step"] == step)
+    return next(found, None)
+
+
+def last_evaluated(directory: RunDirectory, step: int) -> int:
+    """Return the step of the last evaluation up to `step`; 0 if there is none.
+
+    An evaluation that was due but cut is not in the file, so a resumed attempt repeats it.
+    """
+    steps = (int(line["step"]) for line in read_lines(directory.evaluations))
+    return max((each for each in steps if each <= step), default=0)
+
+
+def forget_after(directory: RunDirectory, step: int) -> None:
+    """Drop evaluations after `step`, from which the run resumes, and confirmations without an evaluation."""
+    drop_lines(directory.evaluations, lambda line: line["step"] > step)
+    evaluated = last_evaluated(directory, step)
+    drop_lines(directory.confirmations, lambda line: line["confirmed_at"] > evaluated)
+
+
+def _in_words(progress: Progress) -> str:
+    interval = progress.success_interval
+    bounds = f" ({interval.low:.2f} to {interval.high:.2f}, {interval.episodes} episodes)" if interval else ""
+    return f"success rate {progress.success_rate:.2f}{bounds}"

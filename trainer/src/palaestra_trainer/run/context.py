@@ -1,0 +1,33 @@
+"""The objects of one attempt of a run that the parts of the training loop share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.telemetry.display import ProgressDisplay
+from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.waiting.signals import Interruption
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunContext:
+    """One attempt of a run, whose simulators are up.
+
+    Attributes:
+        configuration: the configuration of the run.
+        directory: the run directory.
+        fleet: the simulators.
+        progress: the progress of the run.
+        interruption: raises after a signal has arrived.
+        display: shows the progress to a person.
+    """
+
+    configuration: Configuration
+    directory: RunDirectory
+    fleet: Fleet
+    progress: Progress
+    interruption: Interruption
+    display: ProgressDisplay

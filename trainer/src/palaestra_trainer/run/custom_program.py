@@ -1,0 +1,107 @@
+"""Reports of a user's own training program (`trainer.command`), for /status, /metrics and the operator.
+
+The built-in loop reports by itself. Without reports the operator does not see a program's steps. It then
+cannot detect progress between preempted attempts, and ends the replica as `NoProgress`.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from palaestra_protocol.pod.enums import Role
+from palaestra_protocol.pod.status import Cause, Termination
+from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
+from palaestra_trainer.infos import ours
+from palaestra_trainer.run.termination import write_last_word
+from palaestra_trainer.telemetry.metrics import constants
+from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.status_server import status_server
+
+_lock = threading.Lock()
+_EVALUATING_S = 60.0  # no step of an environment takes longer
+
+
+class ProgramReport(Progress):
+    """The progress of a user's own program; how it spends its time is unknown.
+
+    Its step is the one that the program reports. Before its first report, it is the number of steps of its
+    tolerant environments in this attempt.
+    """
+
+    _reports = _evaluates = False
+
+    @property
+    def phase(self) -> str:
+        """Training, or evaluating if the last step was of an evaluating environment and is not long ago.
+
+        The operator takes no evaluation for training that stands still.
+        """
+        return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
+
+    def spending(self, cause: Cause) -> AbstractContextManager[None]:
+        """Ignore it: any thread of the program may wait for simulators."""
+        del cause
+        return nullcontext()
+
+    def counted(self, kept: int | None = None) -> Counters:
+        """Return the counters as they are now, without the time spent."""
+        return replace(super().counted(kept), goodput={})
+
+    def reports(self, step: int, success_rate: float | None) -> None:
+        """Set the step, and the success rate if there is one, as the program reports them."""
+        self._reports, self.step = True, step
+        self.stepped(1)
+        if success_rate is not None:
+            self.success_rate = success_rate
+
+    def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
+        """Count a step of environments by the infos of their rows; evaluating ones add no steps."""
+        valid = sum("sim_fault" not in ours(info) for info in infos)
+        if valid:
+            self.stepped(valid)
+        self._evaluates = role is Role.EVALUATE
+        if not self._evaluates:
+            self.collected(self.step if self._reports else self.step + valid, infos)
+
+
+def report(step: int, success_rate: float | None) -> None:
+    """Report as `palaestra_trainer.report` describes."""
+    if step < 0:
+        raise ValueError(f"step: {step} is negative; give the number of environment steps learned from")
+    if success_rate is not None and not 0 <= success_rate <= 1:
+        raise ValueError(f"success_rate: {success_rate} is not a share; give a number from 0 to 1")
+    if not os.environ.get(CONFIG_VARIABLE):
+        return
+    with _lock:
+        progress = _served()
+        progress.reports(step, success_rate)
+    if step >= progress.target:
+        done = "Completed: all steps are done"
+        write_last_word(Termination(step=step, reason=done, success_rate=progress.success_rate))
+
+
+def reported(configuration: Configuration) -> ProgramReport:
+    """Return the progress that environments of this process count in.
+
+    Worker processes of a program count for themselves, and /status does not show it.
+    """
+    if multiprocessing.parent_process() is None:
+        with _lock:
+            return _served()
+    return ProgramReport(configuration.steps, [])
+
+
+@cache
+def _served() -> ProgramReport:
+    """Return the progress of this process; the first call starts the status server."""
+    configuration = load()
+    progress = ProgramReport(configuration.steps, [])
+    status_server(configuration.status_address, progress, constants(configuration)).start()
+    return progress

@@ -1,0 +1,54 @@
+"""An environment without a simulator, which computes the rewards of goals for hindsight experience replay.
+
+The collecting environments cannot do it: their simulators may be restarting in other threads while the
+algorithm learns. The environment gets a robot of the job's class that is never connected, and is never reset
+or stepped. The environments of simulators are made with such robots too, so what fits them fits here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+
+from palaestra_trainer.configuration import DEFAULT_ROBOT, Configuration
+from palaestra_trainer.environments.make import make_environment
+from palaestra_trainer.episodes.vec_env import COMPUTE_REWARD
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.registry import robot_class
+from palaestra_trainer.robots.simulated import SimulatedScene
+from palaestra_trainer.webots import Attached, Webots
+from palaestra_trainer.webots.facade import open_facades
+
+# No simulator has this name. An environment that asks for readings gets SimulatorDead with it.
+_NAME = "judge"
+
+
+def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
+    """Return an environment of a job whose `compute_reward` may be called at any time.
+
+    Raises:
+        ConfigurationError: it does not fit the job's robot, or has no `compute_reward`.
+    """
+    webots = Webots(_NAME, wanted.simulators[0].world, launcher=Attached())
+    open_facades.withdraw(webots)
+    robot = robot_class(wanted.robot or DEFAULT_ROBOT)(webots)
+    judge = make_environment(wanted.environment, robot, SimulatedScene(webots, robot))
+    if not callable(getattr(judge.unwrapped, COMPUTE_REWARD, None)):
+        raise ConfigurationError(
+            f"environment.id: {wanted.environment.id} has no {COMPUTE_REWARD}, which HerReplayBuffer needs; "
+            "add it as in gymnasium-robotics, or remove replay_buffer_class"
+        )
+    _refuse_other_rewards(judge)
+    return judge
+
+
+def _refuse_other_rewards(env: gymnasium.Env[Any, Any]) -> None:
+    """Refuse wrappers that change the reward of a step, since `compute_reward` returns it unchanged."""
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, gymnasium.RewardWrapper):
+            raise ConfigurationError(
+                f"environment.wrappers: {type(env).__name__} changes rewards, and HerReplayBuffer computes "
+                f"those of other goals by {COMPUTE_REWARD}, without it; remove it, or replay_buffer_class"
+            )
+        env = env.env

@@ -1,0 +1,76 @@
+"""Bring simulators back to the state of a checkpoint.
+
+A simulator cannot be saved. Instead its episode is played again: a reset with the same seed, then the same
+actions. The last observation is compared; a mismatch is logged and training continues from it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import cast
+
+import numpy as np
+import structlog
+
+from palaestra_trainer.algorithms.observations import Observations, equal_rows
+from palaestra_trainer.checkpoint import TrainingState
+from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+
+log = structlog.get_logger(__name__)
+
+
+def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False) -> TrainingState:
+    """Return the state after each simulator was brought back to the saved state, or as near as possible.
+
+    A simulator that was broken at the save, breaks now, or is new in the run begins its next episode. If
+    `masked`, so does one whose mask forbids an action of its episode now.
+    """
+    before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
+    observation = cast("Observations", env.resume(before, masked=masked))
+    after = env.snapshot()
+    begun = np.array(
+        [was.actions is None or now.episode != was.episode for was, now in zip(before, after, strict=True)]
+    )
+    same = equal_rows(observation, saved.observation)
+    if not begun.any() and same.all() and len(same) == len(saved.members):
+        return saved
+    _tell(begun, same)
+    return dataclasses.replace(
+        saved,
+        observation=observation,
+        episode_starts=begun | _resized(saved.episode_starts, env.num_envs),
+        positions=saved.positions and saved.positions._replace(newest=(None,) * env.num_envs),
+        members=after,
+        rollout={**saved.rollout, "terms": _terms_left(saved, begun)},
+        running_returns=_returns_left(saved, begun),
+    )
+
+
+def _tell(begun: np.ndarray, same: np.ndarray) -> None:
+    """Warn of simulators that replayed their episode and reached another observation."""
+    different = sum(not new and not equal for new, equal in zip(begun, same, strict=False))
+    if different:
+        log.warning(
+            "simulators do not repeat what they did: the run goes on, but not exactly as it would have",
+            simulators=different,
+        )
+    if begun.any():
+        log.info("simulators begin an episode anew", simulators=int(begun.sum()))
+
+
+def _resized(values: np.ndarray, length: int) -> np.ndarray:
+    """Return `length` values: missing ones are 0."""
+    return np.concatenate([values, np.zeros(length, dtype=values.dtype)])[:length]
+
+
+def _returns_left(saved: TrainingState, begun: np.ndarray) -> np.ndarray | None:
+    """Return the discounted rewards of the episodes that continue; None: they are not needed."""
+    known = saved.running_returns
+    return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
+
+
+def _terms_left(saved: TrainingState, begun: np.ndarray) -> list[dict[str, float]]:
+    """Return the sums of reward terms of the episodes that continue."""
+    known = [*saved.rollout["terms"], *[{}] * len(begun)]
+    return [{} if new else terms for new, terms in zip(begun, known, strict=False)]

@@ -1,0 +1,137 @@
+"""The simulator of a facade that a program created before its environment, as in the paper.
+
+The program starts, pauses and ends it: `with webots:` and `webots.run` decide when it steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+
+from palaestra_trainer.configuration import Environment as Wanted
+from palaestra_trainer.environments.make import make_environment
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
+from palaestra_trainer.simulators.connect import robot_for
+from palaestra_trainer.simulators.interface import Environment, Step
+from palaestra_trainer.webots import Webots
+from palaestra_trainer.webots.facade import open_facades
+
+
+class NotebookSimulator:
+    """Robot and scene in the simulator of a facade, which no other environment uses until `release`.
+
+    The robot connects when the facade starts its simulator, or at once if it runs.
+
+    Args:
+        webots: the facade.
+        robot: the class of the robot in its world.
+
+    Raises:
+        SimulatorDead, SimulatorHung, WrongData: it runs, and the robot cannot connect.
+    """
+
+    def __init__(self, webots: Webots, robot: type[SimulatedRobot]) -> None:
+        self.webots = webots
+        self.robot = robot(webots)
+        self.scene = SimulatedScene(webots, self.robot)
+        if webots.available():
+            self.robot.connect()
+        open_facades.take(webots)
+
+    def release(self) -> None:
+        """Close the robot's connections and offer the facade again; safe to repeat."""
+        self.robot.close()
+        open_facades.give_back(self.webots)
+
+
+def offered_simulator(world: str) -> NotebookSimulator | None:
+    """Return the newest facade that no environment uses; None: this process has none.
+
+    Its robot is that of PALAESTRA_CONFIG; without that, the one in the world that ships for the environment.
+    """
+    webots = open_facades.offered()
+    return None if webots is None else NotebookSimulator(webots, robot_for(world))
+
+
+class NotebookMember:
+    """A member in such a simulator; it is restarted after faults, and started and paused by the program.
+
+    Args:
+        place: the simulator.
+        wanted: the environment.
+
+    Raises:
+        ConfigurationError: the environment is unknown, or does not take what it is given.
+    """
+
+    def __init__(self, place: NotebookSimulator, wanted: Wanted) -> None:
+        self.name = place.webots.robot_name
+        self._one_life = _OneLife(make_environment(wanted, place.robot, place.scene), self.name)
+        self.env: Environment = self._one_life
+        self._webots = place.webots
+        self._place = place
+        place.webots.at_start(f"environment of {self.name}", self._one_life.end)
+
+    def due(self, episodes: int = 1) -> None:
+        """It is not recycled: `webots.run(..., restart=True)` does that."""
+        del episodes
+
+    def start(self) -> None:
+        """Leave the start to the program."""
+
+    def stop(self) -> None:
+        """Leave the simulator to the program, for another environment."""
+        self._place.release()
+
+    def restart(self) -> None:
+        """Restart it, unless the program has done that; it runs as before, or is paused.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: it does not start in time.
+            ConfigurationError: the facade is only attached to it.
+        """
+        if not (self._one_life.ended and self._webots.available()):
+            self._webots()
+
+    def abandon(self) -> None:
+        """Do nothing: the start's own deadline ends it."""
+
+    def pause(self) -> None:
+        """Leave it to the program."""
+
+    def unpause(self) -> None:
+        """Leave it to the program."""
+
+
+class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment whose episodes do not go on in a simulator that the program has restarted.
+
+    Attributes:
+        ended: whether the simulator was started since the last reset.
+    """
+
+    def __init__(self, env: Environment, name: str) -> None:
+        super().__init__(env)
+        self._name = name
+        self.ended = False
+
+    def end(self) -> None:
+        """Record a start of the simulator."""
+        self.ended = True
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Return the result of the environment's reset."""
+        self.ended = False
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> Step:
+        """Return the result of the environment's step.
+
+        Raises:
+            SimulatorDead: the simulator of this episode has ended; or as the environment raises it.
+        """
+        if self.ended:
+            raise SimulatorDead(self._name, "was restarted amid an episode")
+        return self.env.step(action)

@@ -1,0 +1,157 @@
+"""Step several simulators in one thread: while one computes a step, the others get their turn.
+
+A step of an environment is one function that sends, waits and reads. Each step runs in a greenlet of its
+own, so that the waits of many environments overlap. After a greenlet has sent a long request to its
+simulator, it lets the others run before it waits for the answer. `take_turns` runs the greenlets, and
+`let_others` is where a turn may end. The answer of one simulator is read while the others still compute.
+Threads needed twice the processor time for the same: see docs/decisions/0006-turns-instead-of-threads.md.
+"""
+
+from __future__ import annotations
+
+import select
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol
+
+from greenlet import getcurrent, greenlet
+
+from palaestra_trainer.waiting import shutdown_deadline
+from palaestra_trainer.waiting.wait_time import count_wait
+
+# After this time the first greenlet waits alone; its own deadline and fault attribution then apply. The time
+# is longer than a step, because the wait counts as its turn, and short beside a deadline, which begins then.
+_SOON_MS = 500
+
+
+class PendingResponse(Protocol):
+    """An object whose descriptor becomes readable when an answer arrives."""
+
+    def fileno(self) -> int:
+        """Return the descriptor to watch."""
+        ...
+
+
+class _Turn(greenlet):
+    """A greenlet for the works of `take_turns`; it is reused, because a new one makes Python map memory.
+
+    Attributes:
+        work: the current or last work.
+        done: whether it has finished.
+        result: the return value of `work`.
+        failure: the exception that it raised instead.
+        away_s: seconds that it spent in others' turns, without the time in which all of them wait.
+        until: the descriptor of the answer that it waits for; None: it can run.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(self._do_works)
+        self.work: Callable[[], Any] | None = None
+        self.done = False
+        self.result: Any = None
+        self.failure: Exception | None = None
+        self.away_s = 0.0
+        self.until: int | None = None
+
+    def begin(self, work: Callable[[], Any]) -> _Turn:
+        """Return this turn, ready to do `work` for the caller."""
+        self.parent = getcurrent()
+        self.work = work
+        self.done = False
+        self.away_s = 0.0
+        self.until = None
+        return self
+
+    def end(self) -> tuple[Any, Exception | None]:
+        """Return the result and the failure of the work, and drop both."""
+        ended = self.result, self.failure
+        self.work = self.result = self.failure = None
+        return ended
+
+    def _do_works(self) -> None:
+        """Do one work, and the next one after the next switch."""
+        while self.work is not None and self.parent is not None:
+            try:
+                self.result = self.work()
+            except Exception as error:  # noqa: BLE001 - raised by `take_turns`, when no work is left in the middle
+                self.failure = error
+            self.done = True
+            self.parent.switch()
+
+
+class _Idle(threading.local):
+    """Turns of this thread without work."""
+
+    def __init__(self) -> None:
+        self.turns: list[_Turn] = []
+
+
+_idle = _Idle()
+
+
+def let_others(until: PendingResponse | None = None) -> None:
+    """Let the other works of `take_turns` run first; without others, this does nothing.
+
+    Args:
+        until: the others may run until this can be read; by default each runs once.
+    """
+    turn = getcurrent()
+    if isinstance(turn, _Turn) and turn.parent is not None:
+        turn.until = None if until is None else until.fileno()
+        left = time.perf_counter()
+        turn.parent.switch()
+        turn.away_s += time.perf_counter() - left
+
+
+def away_s() -> float:
+    """Return the seconds that the current work has spent in others' turns so far."""
+    turn = getcurrent()
+    return turn.away_s if isinstance(turn, _Turn) else 0.0
+
+
+def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
+    """Return the results of `works`, in their order; each runs until it calls `let_others`, then the next.
+
+    All works finish before the first error is raised, so that none is left half done.
+
+    Raises:
+        Exception: of the first work, in their order, that failed.
+        BaseException: of the current work, at once; the others are stopped where they are.
+    """
+    turns = [(_idle.turns.pop() if _idle.turns else _Turn()).begin(work) for work in works]
+    waiting = turns
+    try:
+        while waiting:
+            for turn in _ready(waiting):
+                turn.switch()
+            waiting = [turn for turn in waiting if not turn.done]
+    except BaseException:
+        for turn in turns:
+            if not turn.dead:
+                turn.throw()
+        raise
+    ended = [turn.end() for turn in turns]
+    _idle.turns += turns
+    for _, failure in ended:
+        if failure is not None:
+            raise failure
+    return [result for result, _ in ended]
+
+
+def _ready(turns: list[_Turn]) -> list[_Turn]:
+    """Return the turns that can run, at least one, in their order; wait if none can."""
+    awaited = [turn.until for turn in turns if turn.until is not None]
+    if not awaited or len(turns) == 1:
+        return turns
+    answers = select.poll()
+    for file in awaited:
+        answers.register(file, select.POLLIN)
+    nobody_can_go_on = len(awaited) == len(turns) and not shutdown_deadline.is_over()
+    began = time.perf_counter()
+    come = {file for file, _ in answers.poll(_SOON_MS if nobody_can_go_on else 0)}
+    waited_s = time.perf_counter() - began
+    count_wait(waited_s)
+    for turn in turns:
+        turn.away_s -= waited_s
+    return [turn for turn in turns if turn.until is None or turn.until in come] or turns[:1]

@@ -1,0 +1,48 @@
+"""The facades that environments may use: open ones that this process created for itself.
+
+In a notebook, an environment that is made after `Webots(...)` is meant for that simulator. A facade is
+offered until it is closed, except while an environment has it. A forked process is offered none of its
+parent's.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from typing import Generic, TypeVar
+from weakref import WeakSet, WeakValueDictionary
+
+Facade = TypeVar("Facade")
+
+
+class FacadeRegistry(Generic[Facade]):
+    """The open facades of this process and its parents; it keeps none of them alive."""
+
+    def __init__(self) -> None:
+        self._numbers = itertools.count()
+        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by process, number
+        self._taken: WeakSet[Facade] = WeakSet()
+
+    def offer(self, facade: Facade) -> None:
+        """Offer a new facade to environments."""
+        self._open[os.getpid(), next(self._numbers)] = facade
+
+    def withdraw(self, facade: Facade) -> None:
+        """Offer a facade to no environment any more; safe to repeat."""
+        for key, known in list(self._open.items()):
+            if known is facade:
+                self._open.pop(key, None)
+
+    def offered(self) -> Facade | None:
+        """Return the newest facade that no environment has, None if each has one."""
+        mine = sorted(key for key in list(self._open.keys()) if key[0] == os.getpid())
+        known = (self._open.get(key) for key in reversed(mine))
+        return next((facade for facade in known if facade is not None and facade not in self._taken), None)
+
+    def take(self, facade: Facade) -> None:
+        """Reserve a facade for one environment."""
+        self._taken.add(facade)
+
+    def give_back(self, facade: Facade) -> None:
+        """Offer a facade again, unless it was closed or withdrawn."""
+        self._taken.discard(facade)

@@ -1,0 +1,87 @@
+"""Read the reading from a sensor's message, without decoding the rest.
+
+Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
+always sends the same `frame_id`.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from functools import cache
+from typing import Any
+
+# The numbers after the header, in the codes of `struct`; the reading comes last.
+RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
+BOOL = "?"
+FLOAT64 = "d"
+POINT = "ddd"  # geometry_msgs/PointStamped: x, y, z
+
+_FRAME_ID_LENGTH = struct.Struct("<I")
+_FRAME_ID_AT = 12  # after sequence number and stamp
+
+
+class NumberReading:
+    """Reads the last number of one device's messages.
+
+    Args:
+        device: the device's name in errors.
+        codes: `struct` codes of the numbers after the header.
+    """
+
+    __slots__ = ("_codes", "_device", "_frame_id_bytes", "_layout")
+
+    def __init__(self, device: str, codes: str) -> None:
+        self._device = device
+        self._codes = codes
+        self._frame_id_bytes = 0
+        self._layout = _layout(0, codes)
+
+    def __call__(self, message: bytes | memoryview) -> Any:
+        """Return the reading.
+
+        Raises:
+            ValueError: it is not finite, or the message has a wrong length, so that text would be read.
+            struct.error: the message ends within its header.
+        """
+        if len(message) != self._layout.size:
+            self._fit(message)
+        numbers = self._layout.unpack(message)
+        if numbers[0] != self._frame_id_bytes:
+            raise ValueError(f"a frame_id of {numbers[0]} bytes, not {self._frame_id_bytes}")
+        if not math.isfinite(numbers[-1]):
+            raise ValueError(f"{numbers[-1]} from {self._device}")
+        return numbers[-1]
+
+    def _fit(self, message: bytes | memoryview) -> None:
+        """Set the layout for messages of a new length."""
+        (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
+        length = self._layout.size - self._frame_id_bytes + frame_id_bytes
+        if len(message) != length:
+            raise ValueError(f"a message of {len(message)} bytes, not {length}")
+        self._frame_id_bytes = frame_id_bytes
+        self._layout = _layout(frame_id_bytes, self._codes)
+
+
+class VectorReading(NumberReading):
+    """Reads all numbers after the header, as a tuple."""
+
+    __slots__ = ()
+
+    def __call__(self, message: bytes | memoryview) -> tuple[float, ...]:
+        """Return the reading.
+
+        Raises:
+            ValueError, struct.error: as `NumberReading`.
+        """
+        super().__call__(message)
+        numbers = self._layout.unpack(message)[1:]
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{numbers} from {self._device}")
+        return numbers
+
+
+@cache
+def _layout(frame_id_bytes: int, codes: str) -> struct.Struct:
+    """Return the layout of a message: the length of its frame_id, then its numbers."""
+    return struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{codes}")
