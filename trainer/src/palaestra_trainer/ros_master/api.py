@@ -1,6 +1,6 @@
 """The calls of the Master API and the Parameter Server API, and the updates that they cause.
 
-Pure: a call changes registrations and parameters and returns the response; nothing is sent here. Make only one
+Pure: a call changes registrations and parameters and returns the response; it sends nothing. Make only one
 call at a time.
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Parameter%20Server%20API
 """
