@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rosmaster.master_api import ROSMasterHandler
 
 from palaestra_trainer.ros_master.api import MasterApi
-from palaestra_trainer.ros_master.serving import RosMaster
+from palaestra_trainer.ros_master.serving import MasterServer
 from tests.waiting import eventually
 
 logging.getLogger("rosmaster").setLevel(logging.CRITICAL)  # it logs a traceback for each wrong argument
@@ -165,7 +165,7 @@ RECORDED = (
 
 def test_recorded_calls_have_the_same_answers_on_the_wire(rosmaster):
     """Codes, values and their types after XML-RPC; the texts for people are our own."""
-    with RosMaster(name="localhost") as master:
+    with MasterServer(name="localhost") as master:
         for method, *arguments in RECORDED:
             assert answered(master.uri, method, arguments) == answered(rosmaster, method, arguments), method
 
@@ -188,7 +188,7 @@ TOOLS = (["rostopic", "list", "-v"], ["rosservice", "list"])
 def test_ros_command_lines_print_the_same_with_both_masters(rosmaster):
     """`rosnode` and `rosparam` ask the same calls."""
     calls = [RECORDED[0], RECORDED[1], RECORDED[2]]
-    with RosMaster(name="localhost") as master:
+    with MasterServer(name="localhost") as master:
         for uri in (master.uri, rosmaster):
             for method, *arguments in calls:
                 answered(uri, method, arguments)
@@ -232,7 +232,7 @@ print(rospy.is_shutdown(), flush=True)
 
 def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_path):
     """Topics, parameters, and `shutdown` from the master, as with rosmaster."""
-    with RosMaster(name="localhost") as master:
+    with MasterServer(name="localhost") as master:
         environment = {
             "ROS_MASTER_URI": master.uri,
             "ROS_HOSTNAME": "localhost",

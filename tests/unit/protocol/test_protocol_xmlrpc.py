@@ -19,7 +19,7 @@ from palaestra_protocol.xmlrpc.documents import (
     encode_request,
     encode_response,
 )
-from palaestra_protocol.xmlrpc.server import MOST_CONNECTIONS, MOST_REQUEST_BYTES, Server
+from palaestra_protocol.xmlrpc.server import MOST_CONNECTIONS, MOST_REQUEST_BYTES, RpcServer
 
 PATIENCE_S = 30.0
 TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=5)
@@ -83,7 +83,7 @@ def server():
 
     def make(**options):
         methods = {"double": lambda given: 2 * given[0], "nothing": lambda _: None}
-        made.append(Server(("127.0.0.1", 0), methods.get, **options))
+        made.append(RpcServer(("127.0.0.1", 0), methods.get, **options))
         made[-1].start()
         return made[-1]
 

@@ -49,7 +49,7 @@ def bind_address(host: str) -> str:
     return "127.0.0.1" if host in _LOOPBACK else ""
 
 
-class Server(socketserver.ThreadingTCPServer):
+class RpcServer(socketserver.ThreadingTCPServer):
     """One port: bound when made, answering from `start` until `close`.
 
     Args:
@@ -198,8 +198,8 @@ class _Handler(BaseHTTPRequestHandler):
         """Log nothing."""
 
     @property
-    def _server(self) -> Server:
-        return cast("Server", self.server)
+    def _server(self) -> RpcServer:
+        return cast("RpcServer", self.server)
 
     def _responded(self, body: bytes) -> bytes:
         """Return the response; until it is made, the connection keeps its place."""
@@ -225,7 +225,7 @@ class _Handler(BaseHTTPRequestHandler):
 class _Reader(io.RawIOBase):
     """Reads a connection: it may be idle for a while, but a request that has begun has a deadline."""
 
-    def __init__(self, connection: socket.socket, server: Server) -> None:
+    def __init__(self, connection: socket.socket, server: RpcServer) -> None:
         self._connection = connection
         self._server = server
         self._ends: float | None = None

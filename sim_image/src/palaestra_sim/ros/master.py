@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from palaestra_protocol.xmlrpc.server import Method, Server, bind_address
+from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address
 
 _OK = 1
 _FAILED = 0
@@ -160,7 +160,7 @@ class SlaveApi:
         self._bus = bus
         self._on_shutdown = on_shutdown
         self._methods = self._answers()
-        self._server = Server((bind_address(host), 0), self._find)
+        self._server = RpcServer((bind_address(host), 0), self._find)
         self.uri = f"http://{host}:{self._server.port}/"
         self._server.start()
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from palaestra_protocol.xmlrpc.server import Server
+from palaestra_protocol.xmlrpc.server import RpcServer
 from palaestra_trainer.ros_master.api import Update
 from palaestra_trainer.ros_master.updates import Updates
 from tests.waiting import eventually
@@ -21,7 +21,7 @@ class Slave:
         self.free = threading.Event()
         self.free.set()
         self._code = code
-        self.server = Server(("127.0.0.1", 0), lambda method: lambda given: self._take(method, given))
+        self.server = RpcServer(("127.0.0.1", 0), lambda method: lambda given: self._take(method, given))
         self.server.start()
         self.uri = f"http://127.0.0.1:{self.server.port}/"
 

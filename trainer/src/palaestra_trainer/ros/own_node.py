@@ -15,7 +15,7 @@ from typing import Any
 
 import structlog
 
-from palaestra_protocol.xmlrpc.server import Method, Server, bind_address
+from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros.master import Master
 
@@ -76,7 +76,7 @@ def _made(name: str) -> _Node:
     master.ping()
     host = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
     try:
-        server = Server((bind_address(host), 0), _answers(master.uri).get)
+        server = RpcServer((bind_address(host), 0), _answers(master.uri).get)
     except OSError as error:
         fact = f"{host}: cannot listen there as a ROS node: {error.strerror}"
         raise ConfigurationError(f"{fact}; set ROS_HOSTNAME, for example to localhost") from error

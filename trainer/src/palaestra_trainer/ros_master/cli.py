@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from palaestra_protocol.http import Address
 from palaestra_protocol.signals import obeyed
-from palaestra_trainer.ros_master.serving import RosMaster
+from palaestra_trainer.ros_master.serving import MasterServer
 
 LOOPBACK = "127.0.0.1"
 EXIT_WRONG = 2
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         end_with_owner()
     host, port = options.listen
     try:
-        master = RosMaster(host, port, _name(host))
+        master = MasterServer(host, port, _name(host))
     except OSError as error:
         sys.stderr.write(f"--listen: {options.listen}: {error.strerror}; choose another address\n")
         sys.exit(EXIT_WRONG)

@@ -15,7 +15,7 @@ _SCHEMES = ("http://", "rosrpc://")
 _ILLEGAL = (":", " ")
 
 
-class RpcResponse(NamedTuple):
+class MasterResponse(NamedTuple):
     """The response to every ROS call: 1 for success, a text for people, a value."""
 
     code: int

@@ -7,12 +7,12 @@ import threading
 from types import TracebackType
 from typing import Any, Self
 
-from palaestra_protocol.xmlrpc.server import Method, Server
+from palaestra_protocol.xmlrpc.server import Method, RpcServer
 from palaestra_trainer.ros_master.api import MasterApi, Update
 from palaestra_trainer.ros_master.updates import Updates
 
 
-class RosMaster:
+class MasterServer:
     """A ROS master, answering from `start` until `close`.
 
     Args:
@@ -25,7 +25,7 @@ class RosMaster:
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, name: str = "") -> None:
-        self._server = Server((host, port), self._find)
+        self._server = RpcServer((host, port), self._find)
         self.uri = f"http://{name or host}:{self._server.port}/"
         self._lock = threading.Lock()
         self._api = MasterApi(self.uri, os.getpid())
