@@ -14,21 +14,26 @@ COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --gen
 # Bytecode is kept, whatever the surroundings say: else every process compiles PyTorch and all else anew, for seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup run test check e2e images cluster cluster-down format bench soak golden lock
+.PHONY: help setup test-packages run test check e2e images cluster cluster-down format bench soak golden lock
 
 help: ## list the verbs
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
 
-setup: .venv/ready ## install ROS from the distribution and everything else into .venv
+setup: .venv/ready ## install what is needed into .venv; needs no root and no package of ROS
 
 .venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh $(WEBOTS_ROS)
 	@tools/setup.sh
+
+test-packages: .venv/test-packages ## install what only tests need from the distribution: ROS, a compiler, OpenGL
+
+.venv/test-packages: .venv/ready tools/test-packages.sh
+	@tools/test-packages.sh
 
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy; SIM=mujoco: in MuJoCo
 	@$(BIN)/palaestra run $(JOB)
 
 # Four at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.
-test: setup ## run every test; also that generated files are current
+test: setup test-packages ## run every test; also that generated files are current
 	@$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder --durations=10
 
 # Side by side, what takes longest first; each prints as a whole, and all are told that fail.
@@ -70,10 +75,10 @@ format: setup ## rewrite the sources in the common format
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
 
-bench: setup ## measure what the project promises; prints JSON
+bench: setup test-packages ## measure what the project promises; prints JSON
 	@$(BIN)/python -m tests.bench
 
-soak: setup ## prove that nothing ends a training run which nobody attends to; prints JSON, takes hours
+soak: setup test-packages ## prove that nothing ends a training run which nobody attends to; prints JSON, takes hours
 	@$(BIN)/python -m tests.soak
 
 golden: setup ## record the plans of the examples and other generated files anew

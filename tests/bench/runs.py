@@ -12,7 +12,7 @@ from tests.soak.jobs import example
 
 WARM_STEPS = 1500
 PATIENCE_S = 180
-PROGRAMS = ("palaestra-train", "palaestra-stub", "palaestra-sidecar", REAPER, "rosmaster")
+PROGRAMS = ("palaestra-train", "palaestra-stub", "palaestra-sidecar", REAPER, "palaestra-ros-master")
 
 
 def measure_recovery(scale=1.0):

@@ -3,7 +3,7 @@
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
 - `ros`: between trainer and simulator: connections, types and values of ROS 1
-- `foreign_words`: words of other projects, and the TrainingJob fields that replace them
+- `foreign_words`: words of other projects, and their places in a TrainingJob
 - `fields`: checks of received JSON, because its sender is not trusted
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
@@ -12,8 +12,9 @@
 - `shadowing`: a user's modules that shadow those of Python and of dependencies
 - `signals`: the signals that a program handles
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
-- `connection_limits`: the limits on open connections of this server
+- `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
+- `connection_limits`: the connections that these servers keep
 
-This package imports none of the others. All modules except `http`, `imports`, `connection_limits`,
-`shadowing`, `signals` and `ros.sockets` are pure: values and bytes.
+This package imports none of the others. All modules except `connection_limits`, `http`, `imports`,
+`shadowing`, `signals`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and bytes.
 """

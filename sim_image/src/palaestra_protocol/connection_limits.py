@@ -24,9 +24,16 @@ class _Place:
 
 
 class ConnectionSlots:
-    """The connections that have a slot; safe to use from several threads."""
+    """The connections that have a place; safe to use from several threads.
 
-    def __init__(self) -> None:
+    Args:
+        most: how many connections have a place.
+        most_of_peer: how many of them one peer may have.
+    """
+
+    def __init__(self, most: int = MOST_CONNECTIONS, most_of_peer: int = MOST_OF_PEER) -> None:
+        self._most = most
+        self._most_of_peer = most_of_peer
         self._lock = threading.Lock()
         self._taken: dict[socket.socket, _Place] = {}  # the oldest first
 
@@ -52,12 +59,18 @@ class ConnectionSlots:
         with self._lock:
             self._taken.pop(connection, None)
 
+    def clear(self) -> None:
+        """Close every connection, also those whose request is being answered."""
+        with self._lock:
+            for connection in list(self._taken):
+                self._drop(connection)
+
     def _crowd(self, peer: str) -> list[socket.socket] | None:
         """Return the connections of which one must be closed for `peer`; None if a slot is free."""
         of_peer = [one for one, place in self._taken.items() if place.peer == peer]
-        if len(of_peer) >= MOST_OF_PEER:
+        if len(of_peer) >= self._most_of_peer:
             return of_peer
-        return list(self._taken) if len(self._taken) >= MOST_CONNECTIONS else None
+        return list(self._taken) if len(self._taken) >= self._most else None
 
     def _drop(self, connection: socket.socket) -> None:
         """Close a connection; the thread that reads from it ends."""

@@ -1,7 +1,6 @@
 """`palaestra run` with the real ROS master and sidecars, and with small programs as trainers."""
 
 import fcntl
-import importlib.util
 import os
 import pty
 import re
@@ -15,7 +14,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from palaestra.local.preflight import ROS
 from tests.local_run import below, left_of
 from tests.strangers import DRIVE, rover
 
@@ -61,13 +59,6 @@ for simulator in config["simulators"]:
     sidecar.start()
 """
 TRAIN = START + WAIT
-# This is the program `palaestra`, run by an interpreter that does not look where Debian installs rospy.
-WITHOUT = """\
-import sys
-sys.path.remove(sys.argv.pop(1))
-from palaestra.cli import main
-sys.exit(main())
-"""
 
 
 class Desk:
@@ -356,26 +347,6 @@ def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
     assert out.startswith(f"port {port}: ")
     assert len(out.splitlines()) == 1
     assert not desk.run_directory.exists()
-
-
-def test_a_missing_rospy_is_one_line_and_nothing_is_written(desk):
-    """A ROS master alone is not enough: without the check the trainer would fail a minute later."""
-    desk.write(ASK)
-    before = sorted(desk.folder.rglob("*"))
-    where = str(Path(importlib.util.find_spec("rospy").origin).parents[1])
-
-    refused = subprocess.run(
-        [sys.executable, "-c", WITHOUT, where, "run", desk.job],
-        cwd=desk.folder,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-
-    assert (refused.returncode, refused.stdout) == (2, "")
-    assert refused.stderr == f"rospy: cannot be imported by {sys.executable}; {ROS}\n"
-    assert sorted(desk.folder.rglob("*")) == before
 
 
 def test_replicas_run_one_after_another(desk):

@@ -78,7 +78,7 @@ def lose_the_master(run):
     ends, attempts, trainer = len(kills.ENDED.findall(run.output())), len(run.attempts()), run.trainer()
     run.process.send_signal(signal.SIGSTOP)
     try:
-        os.kill(run.pid_of("rosmaster"), signal.SIGKILL)
+        os.kill(run.pid_of("palaestra-ros-master"), signal.SIGKILL)
         run.until(lambda: not is_running(trainer))
     finally:
         run.process.send_signal(signal.SIGCONT)

@@ -137,9 +137,9 @@ def test_every_class_of_the_package_has_the_md5_of_the_wire(environment):
 
 
 def test_the_packages_that_the_page_names_are_those_that_the_tests_run_with():
-    """`make setup` installs them."""
+    """`make test` installs them."""
     lines = [text for text in blocks(PAGE, "console") if "apt-get install" in text]
-    installed = (ROOT / "tools/setup.sh").read_text()
+    installed = (ROOT / "tools/test-packages.sh").read_text()
 
     assert lines
     assert [name for line in lines for name in line.split()[3:] if name not in installed] == []

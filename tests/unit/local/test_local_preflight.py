@@ -41,15 +41,6 @@ def test_this_machine_can_run_the_minimal_job(request_for):
     assert not request.runs.exists()
 
 
-def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypatch, tmp_path):
-    """Otherwise the trainer would fail with a traceback a minute later."""
-    monkeypatch.setenv("PATH", str(tmp_path))
-
-    problems = list(preflight.ros_is_installed(request_for()))
-
-    assert problems == [f"rosmaster: is not installed; {preflight.ROS}"]
-
-
 def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch, tmp_path):
     """Without /proc, the processes that a container leaves behind could not be found and ended."""
     monkeypatch.setattr(preflight, "ENVIRONMENT", tmp_path / "environ")

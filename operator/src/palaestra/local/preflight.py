@@ -1,10 +1,8 @@
 """Checks before the start of a run; each problem has its remedy."""
 
 import fcntl
-import importlib.util
 import os
 import shutil
-import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,7 +13,6 @@ from tempfile import TemporaryFile
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import RunRefused
 from palaestra.local.files import without_locks
-from palaestra.local.process import program_path
 from palaestra.local.run_directory import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
@@ -27,7 +24,6 @@ LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples ta
 PYTHON_PATH = "PYTHONPATH"
 POLICY = "policy.pth"  # in a zip of Stable-Baselines3
 INSTALLATION = "this installation"
-ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,15 +57,6 @@ def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
         yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc, as in a container or WSL 2"
 
 
-def ros_is_installed(request: PreflightRequest) -> Iterator[str]:
-    """The ROS master is an installed program, and its client a module that the trainer can import."""
-    del request
-    if shutil.which("rosmaster", path=program_path()) is None:
-        yield f"rosmaster: is not installed; {ROS}"
-    if importlib.util.find_spec("rospy") is None:
-        yield f"rospy: cannot be imported by {sys.executable}; {ROS}"
-
-
 def no_module_is_shadowed(request: PreflightRequest) -> Iterator[str]:
     """No module on PYTHONPATH has the name of a module that the ROS master or the trainer needs."""
     own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
@@ -87,7 +74,7 @@ def programs_exist(request: PreflightRequest) -> Iterator[str]:
     """The program of every container exists, with the library that it needs."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
-    programs = {"palaestra-sidecar": INSTALLATION}
+    programs = {"palaestra-ros-master": INSTALLATION, "palaestra-sidecar": INSTALLATION}
     programs.update({own[0]: "spec.trainer.command"} if own else {"palaestra-train": INSTALLATION})
     for index, group in enumerate(spec.simulators):
         programs[_simulator_program(group)] = f"spec.simulators[{index}]"
@@ -151,7 +138,6 @@ def locks_work(request: PreflightRequest) -> Iterator[str]:
 CHECKS: tuple[Check, ...] = (
     processes_can_be_found,
     no_module_is_shadowed,
-    ros_is_installed,
     nothing_is_put_off,
     programs_exist,
     worlds_are_right,

@@ -24,11 +24,8 @@ SECURITY = {
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# A signal ends process 1 of a container only if the process handles it, and rosmaster does not. Without this
-# shell as process 1, a pod would stay for its whole grace period.
-ROS_MASTER_PROGRAM = "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!"
-# One try waits for the port itself: a kubelet's shortest period is a second, and the master starts in a
-# quarter of a second. The port is on loopback, which a kubelet's own TCP probe cannot reach.
+# One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
+# quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 
@@ -41,7 +38,7 @@ def ros_master(replica: Replica) -> Container:
         "image": _trainer_image(replica),
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         "restartPolicy": "Always",
-        "command": ["bash", "-c", ROS_MASTER_PROGRAM.format(port=port)],
+        "command": [word.format(port=port) for word in replica.layout.ros_master],
         "startupProbe": {
             "exec": {"command": probe},
             "periodSeconds": 1,

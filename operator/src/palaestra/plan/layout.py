@@ -14,7 +14,11 @@ ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
 CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32
 HEALTH_PORTS = range(7200, 7300)
-USER = 65532  # uid, gid and fsGroup of a pod, as in the images
+# Process 1 of a container ends at a signal only if it asks for it, which rosmaster does not: without
+# somebody before it, a pod would stay for its whole grace period.
+ROSMASTER = ("bash", "-c", "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!")
+OWN_ROS_MASTER = ("palaestra-ros-master", "--listen=127.0.0.1:{port}")
+USER = 65532  # uid, gid and fsGroup of everything in a pod, as in the images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +110,11 @@ class Layout(Protocol):
         ...
 
     @property
+    def ros_master(self) -> Sequence[str]:
+        """The command of the ROS master, with `{port}` for its port."""
+        ...
+
+    @property
     def health_host(self) -> str:
         """The address at which health and metrics are served."""
         ...
@@ -164,6 +173,7 @@ class ClusterLayout:
 
     images: Images
     ports: Ports = Ports()
+    ros_master: Sequence[str] = ROSMASTER
     health_host: str = "0.0.0.0"
     longest_start_s: None = None
     operator_namespace: str = "palaestra-system"
@@ -203,6 +213,7 @@ class LocalLayout:
     images: Images
     job_directory: str
     ports: Ports = Ports()
+    ros_master: Sequence[str] = OWN_ROS_MASTER
     health_host: str = "127.0.0.1"
     longest_start_s: int = 600  # a person waits for it, and no image is pulled and no volume is mounted
     operator_namespace: None = None

@@ -9,18 +9,16 @@ from __future__ import annotations
 import http.client
 import os
 import socket
-import threading
 import xmlrpc.client
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from socketserver import ThreadingMixIn
 from typing import Any, Protocol
-from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address
 
 _OK = 1
 _FAILED = 0
 _TIMEOUT_S = 5.0
-_POLL_S = 0.05  # interval at which the server checks for `close`
 
 
 class MasterUnreachable(ConnectionError):
@@ -126,15 +124,6 @@ class Master:
         self._proxy("close")()
 
 
-class _RequestHandler(SimpleXMLRPCRequestHandler):
-    rpc_paths = ()  # any path, as roscpp
-    timeout = _TIMEOUT_S
-
-
-class _Server(ThreadingMixIn, SimpleXMLRPCServer):
-    daemon_threads = True
-
-
 class Bus(Protocol):
     """The topics of a node and their subscribers; called from another thread."""
 
@@ -170,18 +159,18 @@ class SlaveApi:
         self._port = tcpros_port
         self._bus = bus
         self._on_shutdown = on_shutdown
-        self._server = _Server((bind_address(host), 0), _RequestHandler, logRequests=False, allow_none=True)
-        for name, answer in self._answers().items():
-            self._server.register_function(answer, name)
-        self.uri = f"http://{host}:{self._server.server_address[1]}/"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(_POLL_S,), daemon=True)
-        self._thread.start()
+        self._methods = self._answers()
+        self._server = RpcServer((bind_address(host), 0), self._find)
+        self.uri = f"http://{host}:{self._server.port}/"
+        self._server.start()
 
     def close(self) -> None:
-        """Stop serving requests and free the port."""
-        self._server.shutdown()
-        self._server.server_close()
-        self._thread.join(_TIMEOUT_S)
+        """Stop answering; the port is free afterwards."""
+        self._server.close()
+
+    def _find(self, name: str) -> Method | None:
+        answer = self._methods.get(name)
+        return None if answer is None else lambda parameters: answer(*parameters)
 
     def _answers(self) -> dict[str, Callable[..., list[Any]]]:
         return {
@@ -210,8 +199,3 @@ class SlaveApi:
 def host_name() -> str:
     """Return the name for other nodes, by the rules of ROS: ROS_HOSTNAME, ROS_IP, the host's name."""
     return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
-
-
-def bind_address(host: str) -> str:
-    """Return the address to listen on: loopback if `host` is loopback, else every interface."""
-    return "127.0.0.1" if host in {"localhost", "127.0.0.1"} else ""

@@ -16,9 +16,10 @@ from typing import Any, Final
 
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
 from palaestra_protocol.ros.tcpros import encode_header, frame
+from palaestra_protocol.xmlrpc.server import bind_address
 from palaestra_sim.ros.links import Connection, Endpoint, HeaderRefused, Lingering, RosLink
 from palaestra_sim.ros.loop import Loop
-from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
+from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, host_name
 from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 LATER: Final = object()

@@ -22,6 +22,6 @@ def ensure_master() -> None:
         module = [sys.executable, "-P", "-m", "palaestra_trainer.launching.master_process"]
         uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
-            raise MasterLost("a ROS master could not be started; start rosmaster yourself") from None
+            raise MasterLost("a ROS master could not be started; start palaestra-ros-master") from None
         os.environ["ROS_MASTER_URI"] = uri
         os.environ["ROS_HOSTNAME"] = "localhost"

@@ -1,37 +1,14 @@
-"""This process as a ROS node, through rospy."""
+"""This process as a ROS node: rospy's where rospy is installed, otherwise one of our own.
+
+A process has one node. A program of a user may have one through rospy, with publishers and services of its
+own, so rospy is used wherever it can be imported.
+"""
 
 from __future__ import annotations
 
-import os
-import threading
+try:
+    from palaestra_trainer.ros.rospy_node import ensure_node, node_uri
+except ImportError:  # of rospy, or of a package that it needs
+    from palaestra_trainer.ros.own_node import ensure_node, node_uri
 
-import rospy
-import rospy.core
-
-from palaestra_trainer.ros.master import Master
-
-_lock = threading.Lock()
-
-
-def ensure_node(name: str = "palaestra_trainer") -> str:
-    """Return the full name of this process's node; create the node unless the program has one already.
-
-    Args:
-        name: the node's name; a number is added so that several programs may share a master.
-
-    Raises:
-        MasterLost: no master responds; rospy alone would wait forever.
-    """
-    with _lock:
-        if not rospy.core.is_initialized():
-            Master(f"/{name}").ping()
-            # The program keeps its own signals, clock and log; rospy provides only name and registration.
-            rospy.init_node(
-                f"{name}_{os.getpid()}", disable_signals=True, disable_rostime=True, disable_rosout=True
-            )
-    return str(rospy.get_name())
-
-
-def node_uri() -> str:
-    """Return the URI at which this process's node receives requests of other nodes."""
-    return str(rospy.core.get_node_uri())
+__all__ = ["ensure_node", "node_uri"]

@@ -1,0 +1,110 @@
+"""Requests and responses of XML-RPC, as bytes.
+
+Python's own reader of XML-RPC expands entities and takes values that are nested at any depth. This one
+refuses a document type, without which there are no entities, and deep values.
+"""
+
+from __future__ import annotations
+
+import xmlrpc.client
+from typing import Any
+from xml.parsers import expat
+
+MOST_DEPTH = 64  # of arrays and structs inside each other; a tree of ROS parameters has few levels
+FAULT = 1  # the code of every fault; ROS's clients read only the text
+_NESTING = frozenset({"array", "struct"})
+
+
+class UnreadableDocument(ValueError):
+    """The bytes are not a document of XML-RPC, or they exceed a limit."""
+
+
+def encode_request(method: str, parameters: tuple[Any, ...]) -> bytes:
+    """Return a request.
+
+    Raises:
+        TypeError, OverflowError: XML-RPC has no such value.
+    """
+    return xmlrpc.client.dumps(parameters, method).encode()
+
+
+def encode_response(value: Any) -> bytes:
+    """Return the response with a value.
+
+    Raises:
+        TypeError, OverflowError: XML-RPC has no such value.
+    """
+    return xmlrpc.client.dumps((value,), methodresponse=True).encode()
+
+
+def encode_fault(text: str) -> bytes:
+    """Return the response of a call that could not be made."""
+    return xmlrpc.client.dumps(xmlrpc.client.Fault(FAULT, text)).encode()
+
+
+def decode_request(data: bytes) -> tuple[str, tuple[Any, ...]]:
+    """Return the method and the parameters of a request.
+
+    Raises:
+        UnreadableDocument: see the class.
+    """
+    reader = _read(data)
+    method = reader.getmethodname()
+    if method is None:
+        raise UnreadableDocument("XML-RPC: the request names no method")
+    return method, _values(reader)
+
+
+def decode_response(data: bytes) -> Any:
+    """Return the value of a response.
+
+    Raises:
+        UnreadableDocument: see the class.
+        xmlrpc.client.Fault: the server could not make the call.
+    """
+    values = _values(_read(data))
+    if len(values) != 1:
+        raise UnreadableDocument(f"XML-RPC: the response has {len(values)} values, not 1")
+    return values[0]
+
+
+def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
+    reader = xmlrpc.client.Unmarshaller()
+    parser = expat.ParserCreate()
+    depth = 0
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += tag in _NESTING
+        if depth > MOST_DEPTH:
+            raise UnreadableDocument(f"XML-RPC: values are nested deeper than {MOST_DEPTH} levels")
+        reader.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= tag in _NESTING
+        reader.end(tag)
+
+    parser.StartElementHandler = begin
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = reader.data
+    parser.StartDoctypeDeclHandler = _refuse_document_type
+    reader.xml("", None)  # without an encoding, because expat decodes
+    try:
+        parser.Parse(data, True)
+    except UnreadableDocument:
+        raise
+    except Exception as error:  # of many types: ExpatError, ValueError, IndexError, binascii.Error, ...
+        raise UnreadableDocument(f"XML-RPC: {error!r}") from error
+    return reader
+
+
+def _refuse_document_type(*_: object) -> None:
+    raise UnreadableDocument("XML-RPC: a document type is not allowed")
+
+
+def _values(reader: xmlrpc.client.Unmarshaller) -> tuple[Any, ...]:
+    try:
+        return reader.close()
+    except xmlrpc.client.ResponseError as error:
+        raise UnreadableDocument("XML-RPC: the document ends before its values") from error

@@ -1,0 +1,248 @@
+"""A port that answers XML-RPC: the ROS master's, and that of a node.
+
+Connections stay open for more calls, as the clients of ROS expect. Their number, the length of a request and
+every wait are limited: a new connection takes the place of one without a request (`connection_limits`).
+Several calls may come in one request (`system.multicall`); they are made in their order.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import socket
+import socketserver
+import sys
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from typing import Any, cast
+
+from palaestra_protocol.connection_limits import ConnectionSlots
+from palaestra_protocol.xmlrpc.documents import (
+    FAULT,
+    UnreadableDocument,
+    decode_request,
+    encode_fault,
+    encode_response,
+)
+
+MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter of up to a few MB
+MOST_CONNECTIONS = 256  # each has a thread; a simulator keeps one connection for each robot
+REQUEST_S = 10.0  # from the first byte of a request to its last, and again for the response
+IDLE_S = 60.0  # between two requests
+_POLL_S = 0.05  # how long `close` takes at most
+_MULTICALL = "system.multicall"
+
+log = logging.getLogger(__name__)
+
+_LOOPBACK = frozenset({"localhost", "127.0.0.1"})
+
+Method = Callable[[tuple[Any, ...]], Any]
+"""Returns the value of a call with these parameters."""
+
+
+def bind_address(host: str) -> str:
+    """Return the address on which a ROS node of that host name listens: loopback, or every interface."""
+    return "127.0.0.1" if host in _LOOPBACK else ""
+
+
+class RpcServer(socketserver.ThreadingTCPServer):
+    """One port: bound when made, answering from `start` until `close`.
+
+    Args:
+        address: host and port on which it listens; port 0 takes one that is free.
+        find: returns the method of a name, or None. Methods are called in several threads.
+        request_s: see REQUEST_S.
+        idle_s: see IDLE_S.
+
+    Raises:
+        OSError: the address is in use, or is not an address of this machine.
+    """
+
+    allow_reuse_address = True
+    daemon_threads = True
+    request_queue_size = 128
+
+    def __init__(
+        self,
+        address: tuple[str, int],
+        find: Callable[[str], Method | None],
+        *,
+        request_s: float = REQUEST_S,
+        idle_s: float = IDLE_S,
+    ) -> None:
+        self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+        self.places = ConnectionSlots(MOST_CONNECTIONS, MOST_CONNECTIONS)
+        self.request_s = request_s
+        self.idle_s = idle_s
+        self._find = find
+        self._thread: threading.Thread | None = None
+        super().__init__(address, _Handler)
+
+    @property
+    def port(self) -> int:
+        """The port on which it listens."""
+        return int(self.socket.getsockname()[1])
+
+    def start(self) -> None:
+        """Begin to answer, in threads of its own."""
+        self._thread = threading.Thread(target=self.serve_forever, args=(_POLL_S,), daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Accept no more connections, close those that are open, and free the port."""
+        if self._thread is not None:
+            self.shutdown()
+            self._thread.join()
+        self.server_close()
+        self.places.clear()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a connection a thread, or close it if there is no place for it."""
+        if not self.places.take(request, client_address[0]):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except RuntimeError:  # no more threads
+            self.places.leave(request)
+            raise
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer one connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.places.leave(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Log an error of this program; that a client goes away is not one."""
+        del request, client_address
+        error = sys.exception()
+        if not isinstance(error, OSError):
+            log.error("XML-RPC: a request failed: %r", error)
+
+    def respond(self, data: bytes) -> bytes:
+        """Return the response to a request."""
+        try:
+            method, parameters = decode_request(data)
+            value = self._several(parameters) if method == _MULTICALL else self._called(method, parameters)
+            return encode_response(value)
+        except xmlrpc.client.Fault as fault:
+            return encode_fault(fault.faultString)
+        except (UnreadableDocument, TypeError, OverflowError) as error:  # the latter of a value
+            return encode_fault(str(error))
+
+    def _called(self, name: str, parameters: tuple[Any, ...]) -> Any:
+        method = self._find(name)
+        if method is None:
+            raise xmlrpc.client.Fault(FAULT, f"{name} is not a method of this server")
+        try:
+            return method(parameters)
+        except Exception as error:  # of any type: the caller must get a response, and others continue
+            raise xmlrpc.client.Fault(FAULT, f"{name}: {error!r}") from error
+
+    def _several(self, parameters: tuple[Any, ...]) -> list[Any]:
+        match parameters:
+            case (list(calls),):
+                return [self._one_of_several(each) for each in calls]
+        raise xmlrpc.client.Fault(FAULT, f"{_MULTICALL} takes one list of calls")
+
+    def _one_of_several(self, wanted: Any) -> Any:
+        """Return a list with the value of a call; a mapping if it is a fault."""
+        try:
+            match wanted:
+                case {"methodName": str(name), "params": list(parameters)} if name != _MULTICALL:
+                    return [self._called(name, tuple(parameters))]
+                case _:
+                    return {"faultCode": FAULT, "faultString": "a call has a methodName and a list params"}
+        except xmlrpc.client.Fault as fault:  # a call that fails prevents no other call of the request
+            return {"faultCode": fault.faultCode, "faultString": fault.faultString}
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """The requests of one connection."""
+
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    wbufsize = -1  # a response is sent in one piece
+
+    def setup(self) -> None:
+        super().setup()
+        self.rfile.close()
+        self._reader = _Reader(self.connection, self._server)
+        self.rfile = io.BufferedReader(self._reader)
+
+    def version_string(self) -> str:
+        return "palaestra"
+
+    def handle_one_request(self) -> None:
+        self._reader.renew()
+        super().handle_one_request()
+
+    def do_POST(self) -> None:
+        length = self.headers.get("Content-Length", "")
+        if not length.isascii() or not length.isdecimal():
+            self._refuse(HTTPStatus.LENGTH_REQUIRED)
+        elif len(length) > len(str(MOST_REQUEST_BYTES)) or int(length) > MOST_REQUEST_BYTES:
+            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        elif len(body := self.rfile.read(int(length))) < int(length):
+            self.close_connection = True
+        else:
+            self._send(self._responded(body))
+
+    def log_message(self, *_: Any, **__: Any) -> None:
+        """Log nothing."""
+
+    @property
+    def _server(self) -> RpcServer:
+        return cast("RpcServer", self.server)
+
+    def _responded(self, body: bytes) -> bytes:
+        """Return the response; until it is made, the connection keeps its place."""
+        self._server.places.answering(self.connection, now=True)
+        try:
+            return self._server.respond(body)
+        finally:
+            self._server.places.answering(self.connection, now=False)
+
+    def _refuse(self, status: HTTPStatus) -> None:
+        self.close_connection = True
+        self.send_error(status)
+
+    def _send(self, body: bytes) -> None:
+        self.connection.settimeout(self._server.request_s)
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", "text/xml")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+class _Reader(io.RawIOBase):
+    """Reads a connection: it may be idle for a while, but a request that has begun has a deadline."""
+
+    def __init__(self, connection: socket.socket, server: RpcServer) -> None:
+        self._connection = connection
+        self._server = server
+        self._ends: float | None = None
+
+    def readable(self) -> bool:
+        return True
+
+    def renew(self) -> None:
+        """Wait for another request."""
+        self._ends = None
+
+    def readinto(self, buffer: Any) -> int:
+        wait_s = self._server.idle_s if self._ends is None else self._ends - time.monotonic()
+        if wait_s <= 0.0:
+            raise TimeoutError("the request is not complete at its deadline")
+        self._connection.settimeout(wait_s)
+        count = self._connection.recv_into(buffer)
+        if self._ends is None:
+            self._ends = time.monotonic() + self._server.request_s
+        return count

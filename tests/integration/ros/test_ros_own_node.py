@@ -1,0 +1,121 @@
+"""Our node, which the trainer uses where rospy is absent, and which of the two a program gets."""
+
+import os
+import subprocess
+import sys
+import xmlrpc.client
+
+import pytest
+
+from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.ros import Master, own_node
+
+WITHOUT_ROSPY = "import sys; sys.modules['rospy'] = None\n"  # as where it is not installed
+WHICH = "from palaestra_trainer.ros import node; print(node.ensure_node.__module__)"
+LISTEN = """
+import os
+from palaestra_trainer.ros import RosService, RosSubscriber, ensure_node
+peer = os.environ["PEER"]
+print(RosService(f"/{peer}/get_time", "webots_ros/get_float")(ask=True).value)
+topic = RosSubscriber(f"/{peer}/ir1/value", "sensor_msgs/Range")
+topic.connect()
+print(ensure_node(), flush=True)
+input()
+print(topic.next().range)
+topic.close()
+"""
+
+
+def run(program, **variables):
+    """Return what a Python program prints."""
+    return subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    ).stdout
+
+
+@pytest.mark.usefixtures("master")
+def test_rospy_is_the_node_exactly_where_it_is_installed():
+    """A program's own publishers and services need it; a process has one node."""
+    assert run(WHICH) == "palaestra_trainer.ros.rospy_node\n"
+    assert run(WITHOUT_ROSPY + WHICH) == "palaestra_trainer.ros.own_node\n"
+
+
+def test_a_program_without_rospy_calls_listens_and_is_listed(peer):
+    """By the name that is in the log of a simulator, and in `rosnode list`."""
+    with subprocess.Popen(
+        [sys.executable, "-c", WITHOUT_ROSPY + LISTEN],
+        env={**os.environ, "PEER": peer.name, "ROS_NAMESPACE": "lab"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as program:
+        time, name = program.stdout.readline(), program.stdout.readline().strip()
+        listed = Master("/test").node_names()
+        peer.do(lambda: peer.publisher.send_value(0.5))
+        heard, _ = program.communicate("\n", timeout=60)
+
+    assert (time, heard) == ("1.25\n", "0.5\n")
+    assert name == f"/lab/palaestra_trainer_{program.pid}"
+    assert name in listed
+    assert name not in Master("/test").node_names()
+
+
+def test_our_node_answers_the_master_and_tools(master):
+    """`rosnode info` and `rosnode ping` ask it, and a second node of a name would have it shut down."""
+    name = own_node.ensure_node("tester")
+    with xmlrpc.client.ServerProxy(own_node.node_uri()) as node:
+        answers = {
+            method: getattr(node, method)("/test", *given)[::2]
+            for method, given in {
+                "getPid": (),
+                "getMasterUri": (),
+                "getBusInfo": (),
+                "getBusStats": (),
+                "getSubscriptions": (),
+                "getPublications": (),
+                "publisherUpdate": ("/t", []),
+                "paramUpdate": ("/p", 1),
+                "requestTopic": ("/t", [["TCPROS"]]),
+                "shutdown": ("a reason",),
+            }.items()
+        }
+
+    assert own_node.ensure_node() == name == f"/tester_{os.getpid()}"
+    assert answers == {
+        "getPid": [1, os.getpid()],
+        "getMasterUri": [1, master],
+        "getBusInfo": [1, []],
+        "getBusStats": [1, [[], [], []]],
+        "getSubscriptions": [1, []],
+        "getPublications": [1, []],
+        "publisherUpdate": [1, 0],
+        "paramUpdate": [1, 0],
+        "requestTopic": [0, 0],
+        "shutdown": [1, 0],
+    }
+
+
+NO_MASTER = (
+    WITHOUT_ROSPY
+    + """
+from palaestra_trainer.ros import ensure_node
+from palaestra_trainer.errors import MasterLost
+try:
+    ensure_node()
+except MasterLost as error:
+    print(error)
+"""
+)
+
+
+def test_without_a_master_there_is_no_node():
+    """As with rospy, which is not asked before the master has answered."""
+    assert issubclass(MasterLost, ConnectionError)
+    assert "no ROS master answers at http://localhost:1" in run(
+        NO_MASTER, ROS_MASTER_URI="http://localhost:1"
+    )

@@ -1,0 +1,246 @@
+"""XML-RPC between peers that are not trusted: documents, a server with bounds, and a call with a deadline."""
+
+import contextlib
+import socket
+import threading
+import time
+import xmlrpc.client
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_protocol.xmlrpc.client import MOST_RESPONSE_BYTES, call
+from palaestra_protocol.xmlrpc.documents import (
+    UnreadableDocument,
+    decode_request,
+    decode_response,
+    encode_fault,
+    encode_request,
+    encode_response,
+)
+from palaestra_protocol.xmlrpc.server import MOST_CONNECTIONS, MOST_REQUEST_BYTES, RpcServer
+
+PATIENCE_S = 30.0
+TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=5)
+VALUES = st.recursive(
+    st.one_of(st.booleans(), st.integers(-(2**31), 2**31 - 1), st.floats(allow_nan=False), TEXTS),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(TEXTS, inner, max_size=3)),
+    max_leaves=8,
+)
+
+
+@given(st.lists(VALUES, max_size=3))
+def test_what_is_encoded_is_decoded(values):
+    """Also by Python's own reader, which other programs use."""
+    request = encode_request("name", tuple(values))
+
+    assert decode_request(request) == ("name", tuple(values))
+    assert xmlrpc.client.loads(request.decode()) == (tuple(values), "name")
+    assert decode_response(encode_response(values)) == values
+
+
+@given(st.binary(max_size=60))
+def test_any_bytes_are_a_document_or_refused(data):
+    """With one error, whatever Python's reader raises."""
+    for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
+        with contextlib.suppress(UnreadableDocument):
+            decode_request(document)
+
+
+BOMB = b"""<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]>
+<methodCall><methodName>m</methodName><params><param><value>&b;</value></param></params></methodCall>"""
+
+
+@pytest.mark.parametrize(
+    ("document", "fact"),
+    [
+        (BOMB, "document type"),
+        (
+            encode_request("m", ()).replace(b"<params>\n</params>", b"<value><array><data>" * 70),
+            "nested deeper",
+        ),
+        (encode_response(5), "names no method"),
+        (b"", "no element found"),
+    ],
+)
+def test_a_document_that_is_no_request_is_refused_with_the_fact(document, fact):
+    """Entities could expand to any size, and a deep value fails when it is written."""
+    with pytest.raises(UnreadableDocument, match=fact):
+        decode_request(document)
+
+
+def test_a_fault_is_raised_with_its_text():
+    """As `xmlrpc.client` does."""
+    with pytest.raises(xmlrpc.client.Fault, match="no such call"):
+        decode_response(encode_fault("no such call"))
+
+
+@pytest.fixture
+def server():
+    """Make servers with one method, `double`, and close them."""
+    made = []
+
+    def make(**options):
+        methods = {"double": lambda given: 2 * given[0], "nothing": lambda _: None}
+        made.append(RpcServer(("127.0.0.1", 0), methods.get, **options))
+        made[-1].start()
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def dialed(server):
+    """Return a connection to a server, with a deadline."""
+    return socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S)
+
+
+def uri(server):
+    """Return the address of a server."""
+    return f"http://127.0.0.1:{server.port}/"
+
+
+def test_a_call_returns_the_value(server):
+    """By our client and by Python's, over one connection."""
+    running = server()
+
+    assert call(uri(running), PATIENCE_S, "double", 21) == 42
+    with xmlrpc.client.ServerProxy(uri(running)) as proxy:
+        assert [proxy.double(each) for each in (1, "a", [2])] == [2, "aa", [2, 2]]
+
+
+@pytest.mark.parametrize(("method", "given"), [("none", 1), ("double", {}), ("nothing", 0)])
+def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
+    """The connection and the server go on."""
+    with xmlrpc.client.ServerProxy(uri(server())) as proxy:
+        with pytest.raises(xmlrpc.client.Fault):
+            getattr(proxy, method)(given)
+        assert proxy.double(1) == 2
+
+
+def test_several_calls_of_one_request_are_made_in_order_and_fail_alone(server):
+    """A robot registers hundreds of services at once."""
+    calls = [{"methodName": name, "params": [3]} for name in ("double", "none", "system.multicall", "double")]
+
+    with xmlrpc.client.ServerProxy(uri(server())) as proxy:
+        answers = proxy.system.multicall(calls)
+
+        assert [type(each) for each in answers] == [list, dict, dict, list]
+        assert answers[0] == answers[3] == [6]
+        with pytest.raises(xmlrpc.client.Fault):
+            proxy.system.multicall("no list")
+
+
+def test_a_request_that_is_not_finished_is_dropped(server):
+    """A program that was stopped in the middle of a request would keep a thread."""
+    with dialed(server(request_s=0.2)) as connection:
+        connection.sendall(b"POST / HTTP/1.1\r\n")
+
+        assert connection.recv(1) == b""
+
+
+def test_a_connection_without_a_request_is_dropped(server):
+    """So is one that a client has forgotten."""
+    with dialed(server(idle_s=0.2)) as connection:
+        assert connection.recv(1) == b""
+
+
+def test_a_body_that_is_too_long_or_has_no_length_is_refused(server):
+    """Before any of it is read."""
+    for header, status in ((f"Content-Length: {MOST_REQUEST_BYTES + 1}", b"413"), ("X: y", b"411")):
+        with dialed(server()) as connection:
+            connection.sendall(f"POST / HTTP/1.1\r\n{header}\r\n\r\n".encode())
+            answer = connection.recv(65536)
+
+            assert answer.split()[1] == status
+
+
+def test_a_server_that_is_closed_closes_its_connections(server):
+    """A node that has ended must not answer as if it lived."""
+    running = server()
+    with dialed(running) as connection:
+        call(uri(running), PATIENCE_S, "double", 1)
+
+        running.close()
+
+        assert connection.recv(1) == b""
+
+
+def test_a_new_connection_takes_the_place_of_an_idle_one(server):
+    """Forgotten connections must not keep a simulator from registering."""
+    running = server()
+    with contextlib.ExitStack() as opened:
+        idle = [opened.enter_context(dialed(running)) for _ in range(MOST_CONNECTIONS + 8)]
+
+        assert call(uri(running), PATIENCE_S, "double", 2) == 4
+        assert [connection.recv(1) for connection in idle[:8]] == [b""] * 8
+
+
+@pytest.fixture
+def peer():
+    """`peer(data)`: the address of a program that answers with these pieces, and then waits."""
+    ended = threading.Event()
+    sockets = []
+
+    def begin(pieces, pace_s=0.0):
+        listening = socket.create_server(("127.0.0.1", 0))
+        sockets.append(listening)
+
+        def answer():
+            connection, _ = listening.accept()
+            sockets.append(connection)
+            with contextlib.suppress(OSError):
+                for piece in pieces:
+                    connection.sendall(piece)
+                    ended.wait(pace_s)
+
+        threading.Thread(target=answer, daemon=True).start()
+        return f"http://127.0.0.1:{listening.getsockname()[1]}/"
+
+    yield begin
+    ended.set()
+    for each in sockets:
+        each.close()
+
+
+HEAD = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n"
+
+
+@pytest.mark.parametrize("pieces", [[], [b"H"] * 1000, [HEAD, b"\r\n", *[b" "] * 1000]])
+def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, pieces):
+    """A byte now and then would renew the deadline of a socket."""
+    began = time.monotonic()
+
+    with pytest.raises(TimeoutError):
+        call(peer(pieces, pace_s=0.05), 0.3, "m")
+
+    assert time.monotonic() - began < PATIENCE_S
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"no HTTP\r\n\r\n",
+        b"HTTP/1.1 500 Oops\r\nContent-Length: 0\r\n\r\n",
+        HEAD + b"Content-Length: 3\r\n\r\nabc",
+        HEAD + b"Content-Length: %d\r\n\r\n" % (2 * MOST_RESPONSE_BYTES) + bytes(2 * MOST_RESPONSE_BYTES),
+    ],
+)
+def test_an_answer_that_is_no_response_is_refused(peer, answer):
+    """With one error."""
+    with pytest.raises(UnreadableDocument):
+        call(peer([answer]), PATIENCE_S, "m")
+
+
+LONG = f"http://{'h' * 64}.org:1/"  # no host's name has such a part
+
+
+@pytest.mark.parametrize(
+    "address", ["http://", "rosrpc://h:1", "http://h:x/", "http://h/", "http://ä:1/", LONG]
+)
+def test_an_address_that_is_none_is_refused(address):
+    """Nodes register any text as theirs."""
+    with pytest.raises(UnreadableDocument, match="is not an address"):
+        call(address, PATIENCE_S, "m")

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Install what only the tests and measurements need, on a Debian 12 or 13 machine: ROS, a compiler and OpenGL
+# from the distribution. Safe to repeat; a failed run leaves no .venv/test-packages behind.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+# rospy's own service proxies import netifaces, on which its package forgets to depend.
+packages=(python3-rospy python3-rosmaster python3-netifaces)
+# ROS's command line, and the messages that those of webots_ros hold, as Python modules and as definitions.
+packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
+# A compiler and the headers of roscpp: a test builds a client in C++.
+packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
+# OpenGL on the processor: MuJoCo's cameras draw with it.
+packages+=(libegl1 libgl1-mesa-dri libopengl0)
+
+all_installed() {
+  local libraries modules
+  libraries=$(/sbin/ldconfig -p)
+  modules='netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
+  /usr/bin/python3 -c "import $modules" 2>/dev/null && command -v g++ >/dev/null &&
+    [[ -d /usr/share/sensor_msgs/msg && -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]] &&
+    [[ $libraries == *libEGL.so.1* && $libraries == *libOpenGL.so.0* ]]
+}
+
+if ! all_installed; then
+  install="apt-get install -y --no-install-recommends ${packages[*]}"
+  if [[ $EUID -ne 0 ]]; then
+    echo "Packages for the tests are missing. Type this line, then repeat the command:"
+    echo "  sudo apt-get update && sudo $install"
+    exit 1
+  fi
+  echo "test-packages: installing ${packages[*]}"
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
+fi
+.venv/bin/palaestra-webots-ros --importable .venv/share
+touch .venv/test-packages

@@ -1,0 +1,37 @@
+"""This process as a ROS node, through rospy; it cannot be imported where rospy is not installed."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import rospy
+import rospy.core
+
+from palaestra_trainer.ros.master import Master
+
+_lock = threading.Lock()
+
+
+def ensure_node(name: str = "palaestra_trainer") -> str:
+    """Return the full name of this process's node; create the node unless the program has one already.
+
+    Args:
+        name: the node's name; a number is added so that several programs may share a master.
+
+    Raises:
+        MasterLost: no master answers; rospy alone would wait forever.
+    """
+    with _lock:
+        if not rospy.core.is_initialized():
+            Master(f"/{name}").ping()
+            # The program keeps its own signals, clock and log; rospy provides only name and registration.
+            rospy.init_node(
+                f"{name}_{os.getpid()}", disable_signals=True, disable_rostime=True, disable_rosout=True
+            )
+    return str(rospy.get_name())
+
+
+def node_uri() -> str:
+    """Return the URI at which this process's node answers other nodes."""
+    return str(rospy.core.get_node_uri())

@@ -1,0 +1,299 @@
+"""The calls of the Master API and the Parameter Server API, and the updates that they cause.
+
+Pure: a call changes registrations and parameters and returns the response; it sends nothing. Make only one
+call at a time.
+Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Parameter%20Server%20API
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from palaestra_protocol.xmlrpc.documents import MOST_DEPTH
+from palaestra_trainer.ros_master.names import parts, resolved
+from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, changes
+from palaestra_trainer.ros_master.registrations import Kind, Registrations
+from palaestra_trainer.ros_master.responses import (
+    FAILED,
+    OK,
+    WRONG,
+    MasterResponse,
+    WrongArgument,
+    name_of,
+    text_of,
+    topic_or_service,
+    type_name_of,
+    uri_of,
+)
+
+MASTER = "/master"  # the name in which the master calls nodes
+_REPLACED = "new node registered with same name"  # rosmaster's words, which people search for
+
+
+class Update(NamedTuple):
+    """A call that the master makes to a node.
+
+    Attributes:
+        uri: of the node.
+        method: of the Slave API.
+        subject: what it is about; a newer update of the same method and subject replaces it.
+        value: the new value, or the reason of a shutdown.
+        node: the node's full name.
+    """
+
+    uri: str
+    method: str
+    subject: str
+    value: Any
+    node: str = ""
+
+
+class _Call:
+    """A call of the API: its function, and the value of a response that refuses its arguments."""
+
+    def __init__(self, function: Callable[..., MasterResponse], nothing: Any) -> None:
+        self.nothing = nothing
+        self._function = function
+        self._names = tuple(inspect.signature(function).parameters)
+
+    def respond(self, arguments: tuple[Any, ...]) -> MasterResponse:
+        """Return the response.
+
+        Raises:
+            WrongArgument: there are too few or too many, or one of them is wrong.
+        """
+        if len(arguments) != len(self._names):
+            names = ", ".join(name.removeprefix("_") for name in self._names)
+            raise WrongArgument(f"{len(arguments)} arguments were given; it takes {names}")
+        if not isinstance(arguments[0], str):
+            raise WrongArgument(f"caller: {arguments[0]!r} is not a text; give the full name of the node")
+        return self._function(*arguments)
+
+
+class MasterApi:
+    """The master's calls, by their names on the wire.
+
+    Args:
+        uri: at which the master answers.
+        pid: of the master's process.
+    """
+
+    def __init__(self, uri: str, pid: int) -> None:
+        self._uri = uri
+        self._pid = pid
+        self._nodes = Registrations()
+        self._parameters = Parameters()
+        self._updates: list[Update] = []
+        self._calls = {
+            name: _Call(getattr(self, function), nothing) for name, (function, nothing) in _CALLS.items()
+        }
+
+    def knows(self, method: str) -> bool:
+        """Return whether the master has such a call."""
+        return method in self._calls
+
+    def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[MasterResponse, list[Update]]:
+        """Return the response to a call, and the updates to send, in their order.
+
+        Raises:
+            KeyError: the master has no such call.
+        """
+        made = self._calls[method]
+        self._updates = []
+        try:
+            response = made.respond(arguments)
+        except WrongArgument as error:
+            response = MasterResponse(WRONG, f"{method}: {error}", made.nothing)
+        return response, self._updates
+
+    def stop_updates(self, update: Update) -> None:
+        """Unsubscribe a node that has refused an update of a parameter."""
+        self._nodes.unregister(Kind.PARAMETER, update.subject, update.node, update.uri)
+
+    def _get_uri(self, _caller: str) -> MasterResponse:
+        return MasterResponse(OK, "the URI of this master", self._uri)
+
+    def _get_pid(self, _caller: str) -> MasterResponse:
+        return MasterResponse(OK, "the process of this master", self._pid)
+
+    def _register_service(
+        self, caller: str, service: Any, service_api: Any, caller_api: Any
+    ) -> MasterResponse:
+        name = topic_or_service("service", service, caller)
+        address, uri = uri_of("service_api", service_api), uri_of("caller_api", caller_api)
+        self._shut_down(caller, self._nodes.register_service(name, caller, uri, address))
+        return MasterResponse(OK, f"{caller} serves {name}", 1)
+
+    def _unregister_service(self, caller: str, service: Any, service_api: Any) -> MasterResponse:
+        name = topic_or_service("service", service, caller)
+        address = uri_of("service_api", service_api)
+        return _removed(caller, name, removed=self._nodes.unregister_service(name, caller, address))
+
+    def _lookup_service(self, caller: str, service: Any) -> MasterResponse:
+        name = topic_or_service("service", service, caller)
+        address = self._nodes.address_of(name)
+        if address is None:
+            return MasterResponse(WRONG, f"no node serves {name}", "")
+        return MasterResponse(OK, f"{name} is served", address)
+
+    def _register_subscriber(
+        self, caller: str, topic: Any, topic_type: Any, caller_api: Any
+    ) -> MasterResponse:
+        name, type_name = topic_or_service("topic", topic, caller), type_name_of("topic_type", topic_type)
+        uri = uri_of("caller_api", caller_api)
+        self._shut_down(caller, self._nodes.register(Kind.SUBSCRIBER, name, caller, uri))
+        self._nodes.declare_type(name, type_name, published=False)
+        return MasterResponse(OK, f"{caller} subscribes to {name}", self._nodes.uris(Kind.PUBLISHER, name))
+
+    def _unregister_subscriber(self, caller: str, topic: Any, caller_api: Any) -> MasterResponse:
+        name, uri = topic_or_service("topic", topic, caller), uri_of("caller_api", caller_api)
+        return _removed(caller, name, removed=self._nodes.unregister(Kind.SUBSCRIBER, name, caller, uri))
+
+    def _register_publisher(
+        self, caller: str, topic: Any, topic_type: Any, caller_api: Any
+    ) -> MasterResponse:
+        name, type_name = topic_or_service("topic", topic, caller), type_name_of("topic_type", topic_type)
+        uri = uri_of("caller_api", caller_api)
+        self._shut_down(caller, self._nodes.register(Kind.PUBLISHER, name, caller, uri))
+        self._nodes.declare_type(name, type_name, published=True)
+        self._announce(name)
+        return MasterResponse(OK, f"{caller} publishes {name}", self._nodes.uris(Kind.SUBSCRIBER, name))
+
+    def _unregister_publisher(self, caller: str, topic: Any, caller_api: Any) -> MasterResponse:
+        name, uri = topic_or_service("topic", topic, caller), uri_of("caller_api", caller_api)
+        removed = self._nodes.unregister(Kind.PUBLISHER, name, caller, uri)
+        if removed:
+            self._announce(name)
+        return _removed(caller, name, removed=removed)
+
+    def _lookup_node(self, caller: str, node: Any) -> MasterResponse:
+        name = name_of("node", node, caller)
+        uri = self._nodes.uri_of(name)
+        if uri is None:
+            return MasterResponse(WRONG, f"no node {name} is registered", "")
+        return MasterResponse(OK, f"{name} is registered", uri)
+
+    def _get_published_topics(self, caller: str, subgraph: Any) -> MasterResponse:
+        if not isinstance(subgraph, str):
+            raise WrongArgument(f"subgraph: {subgraph!r} is not a text; give a namespace, or an empty text")
+        namespace = as_subscribed(resolved(subgraph, caller)) if subgraph else ""
+        names = (name for name in self._nodes.names(Kind.PUBLISHER) if name.startswith(namespace))
+        return MasterResponse(
+            OK, "topics with publishers", [(name, self._nodes.type_of(name)) for name in names]
+        )
+
+    def _get_topic_types(self, _caller: str) -> MasterResponse:
+        return MasterResponse(OK, "topics and their types", self._nodes.types())
+
+    def _get_system_state(self, _caller: str) -> MasterResponse:
+        kinds = (Kind.PUBLISHER, Kind.SUBSCRIBER, Kind.SERVICE)
+        return MasterResponse(
+            OK, "publishers, subscribers, services", [self._nodes.listed(kind) for kind in kinds]
+        )
+
+    def _delete_param(self, caller: str, key: Any) -> MasterResponse:
+        name = resolved(text_of("key", key), caller)
+        try:
+            self._parameters.delete(name)
+        except KeyError:
+            return MasterResponse(WRONG, f"{name} is not set", 0)
+        self._report_changes(name, {}, but=None)
+        return MasterResponse(OK, f"{name} is deleted", 0)
+
+    def _set_param(self, caller: str, key: Any, value: Any) -> MasterResponse:
+        name = resolved(text_of("key", key), caller)
+        if len(parts(name)) > MOST_DEPTH:
+            raise WrongArgument(f"key: has more than {MOST_DEPTH} parts; use a shorter name")
+        if value is None:
+            raise WrongArgument("value: is missing; to delete a parameter, call deleteParam")
+        try:
+            self._parameters.set(name, value)
+        except TypeError as error:
+            raise WrongArgument(f"value: {error}") from error
+        self._report_changes(name, value, but=caller)
+        return MasterResponse(OK, f"{name} is set", 0)
+
+    def _get_param(self, caller: str, key: Any) -> MasterResponse:
+        name = resolved(text_of("key", key), caller)
+        try:
+            return MasterResponse(OK, f"{name} is set", self._parameters.get(name))
+        except KeyError:
+            return MasterResponse(WRONG, f"{name} is not set", 0)
+
+    def _search_param(self, caller: str, key: Any) -> MasterResponse:
+        wanted = text_of("key", key)
+        try:
+            found = self._parameters.search(wanted, caller)
+        except ValueError as error:
+            return MasterResponse(FAILED, str(error), 0)
+        if found is None:
+            return MasterResponse(WRONG, f"{wanted} is not set at {caller} or above", "")
+        return MasterResponse(OK, f"{wanted} is {found}", found)
+
+    def _subscribe_param(self, caller: str, caller_api: Any, key: Any) -> MasterResponse:
+        uri, name = uri_of("caller_api", caller_api), resolved(text_of("key", key), caller)
+        value = self._parameters.get(name) if self._parameters.has(name) else {}
+        self._shut_down(caller, self._nodes.register(Kind.PARAMETER, as_subscribed(name), caller, uri))
+        return MasterResponse(OK, f"{caller} subscribes to {name}", value)
+
+    def _unsubscribe_param(self, caller: str, caller_api: Any, key: Any) -> MasterResponse:
+        uri, name = uri_of("caller_api", caller_api), resolved(text_of("key", key), caller)
+        self._nodes.unregister(Kind.PARAMETER, as_subscribed(name), caller, uri)
+        return MasterResponse(OK, f"{caller} does not subscribe to {name}", 1)
+
+    def _has_param(self, caller: str, key: Any) -> MasterResponse:
+        name = resolved(text_of("key", key), caller)
+        return MasterResponse(OK, name, self._parameters.has(name))
+
+    def _get_param_names(self, _caller: str) -> MasterResponse:
+        return MasterResponse(OK, "names of all parameters", self._parameters.names())
+
+    def _shut_down(self, node: str, uri: str | None) -> None:
+        if uri is not None:
+            self._updates.append(Update(uri, "shutdown", node, f"[{node}] Reason: {_REPLACED}", node))
+
+    def _announce(self, topic: str) -> None:
+        publishers = self._nodes.uris(Kind.PUBLISHER, topic)
+        for node, uri in self._nodes.members(Kind.SUBSCRIBER, topic):
+            self._updates.append(Update(uri, "publisherUpdate", topic, publishers, node))
+
+    def _report_changes(self, name: str, value: Any, *, but: str | None) -> None:
+        """Add an update for each subscriber, except `but` if it subscribes to what it has set."""
+        for change in changes(name, value, self._nodes.names(Kind.PARAMETER)):
+            for node, uri in self._nodes.members(Kind.PARAMETER, change.subscribed):
+                if not (change.by_caller and node == but):
+                    self._updates.append(Update(uri, "paramUpdate", change.name, change.value, node))
+
+
+def _removed(node: str, name: str, *, removed: bool) -> MasterResponse:
+    if removed:
+        return MasterResponse(OK, f"{node} is not registered for {name} any more", 1)
+    return MasterResponse(OK, f"{node} was not registered for {name} at this address", 0)
+
+
+# By the name on the wire: the method, and the value of a response that refuses its arguments.
+_CALLS: dict[str, tuple[str, Any]] = {
+    "getUri": ("_get_uri", ""),
+    "getPid": ("_get_pid", -1),
+    "registerService": ("_register_service", 0),
+    "unregisterService": ("_unregister_service", 0),
+    "lookupService": ("_lookup_service", ""),
+    "registerSubscriber": ("_register_subscriber", []),
+    "unregisterSubscriber": ("_unregister_subscriber", 0),
+    "registerPublisher": ("_register_publisher", []),
+    "unregisterPublisher": ("_unregister_publisher", 0),
+    "lookupNode": ("_lookup_node", ""),
+    "getPublishedTopics": ("_get_published_topics", 0),
+    "getTopicTypes": ("_get_topic_types", []),
+    "getSystemState": ("_get_system_state", [[], [], []]),
+    "deleteParam": ("_delete_param", 0),
+    "setParam": ("_set_param", 0),
+    "getParam": ("_get_param", 0),
+    "searchParam": ("_search_param", 0),
+    "subscribeParam": ("_subscribe_param", 0),
+    "unsubscribeParam": ("_unsubscribe_param", 0),
+    "hasParam": ("_has_param", False),
+    "getParamNames": ("_get_param_names", []),
+}

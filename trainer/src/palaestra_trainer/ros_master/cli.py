@@ -1,0 +1,92 @@
+"""`palaestra-ros-master`: a ROS master as a program."""
+
+from __future__ import annotations
+
+import argparse
+import ipaddress
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Sequence
+
+from palaestra_protocol.http import Address
+from palaestra_protocol.signals import obeyed
+from palaestra_trainer.ros_master.serving import MasterServer
+
+LOOPBACK = "127.0.0.1"
+EXIT_WRONG = 2
+_DESCRIPTION = """\
+A ROS 1 master with its parameters, without any package of ROS.
+
+Prints its URI once it answers, and ends at SIGTERM or SIGINT.
+A call is answered for every program that can connect, so listen on an address that only yours can reach.
+
+exit codes: 0 after a signal, or when standard input has closed; 2 a wrong option, or a port in use
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the program."""
+    options = _options(arguments)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    ended = threading.Event()
+    for number in obeyed((signal.SIGTERM, signal.SIGINT, signal.SIGHUP)):
+        signal.signal(number, lambda *_: ended.set())
+    if options.until_stdin_closes:
+        end_with_owner()
+    host, port = options.listen
+    try:
+        master = MasterServer(host, port, _name(host))
+    except OSError as error:
+        sys.stderr.write(f"--listen: {options.listen}: {error.strerror}; choose another address\n")
+        sys.exit(EXIT_WRONG)
+    with master:
+        sys.stdout.write(f"{master.uri}\n")
+        sys.stdout.flush()
+        ended.wait()
+
+
+def end_with_owner() -> None:
+    """End this process as soon as its standard input closes, as it does when its owner is killed."""
+    threading.Thread(target=_end_with_owner, daemon=True).start()
+
+
+def _end_with_owner() -> None:
+    while os.read(sys.stdin.fileno(), 1024):
+        pass
+    os._exit(0)  # the connections' threads are not waited for
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="palaestra-ros-master",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "--listen",
+        type=Address.parse,
+        default=Address(LOOPBACK, 0),
+        metavar="ADDRESS:PORT",
+        help=f"address and port; port 0 takes one that is free; default: {LOOPBACK}:0",
+    )
+    parser.add_argument(
+        "--until-stdin-closes", action="store_true", help="end when the program that started it has ended"
+    )
+    return parser.parse_args(arguments)
+
+
+def _name(host: str) -> str:
+    """Return the name under which nodes reach the master; they choose theirs in the same way."""
+    if host == LOOPBACK:
+        return "localhost"
+    own = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
+    if own:
+        return own
+    if ipaddress.ip_address(host).is_unspecified:
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host

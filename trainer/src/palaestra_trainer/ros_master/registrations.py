@@ -1,0 +1,168 @@
+"""Which node publishes, subscribes and serves what, and where each node is.
+
+Pure: no thread, socket or clock. A node is known from its first registration to the end of its last one.
+A node that registers with another address is a new one of the same name: everything of the old one is
+dropped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, auto
+
+ANY_TYPE = "*"
+
+
+class Kind(Enum):
+    """What a node registers for."""
+
+    PUBLISHER = auto()
+    SUBSCRIBER = auto()
+    SERVICE = auto()
+    PARAMETER = auto()
+
+
+@dataclass(slots=True)
+class _Node:
+    """A node: the URI at which it answers, and its registrations."""
+
+    uri: str
+    registered: set[tuple[Kind, str]] = field(default_factory=set)
+
+
+class Registrations:
+    """All registrations of one master, by the names of topics, services and parameters.
+
+    Every name is global, and everything is returned in the order of registration.
+    """
+
+    def __init__(self) -> None:
+        self._nodes: dict[str, _Node] = {}
+        # By kind, and then by the name of topic, service or parameter, the URIs of nodes by their names.
+        self._members: dict[Kind, dict[str, dict[str, str]]] = {kind: {} for kind in Kind}
+        self._service_uris: dict[str, tuple[str, str]] = {}  # of each service, its node and address
+        self._types: dict[str, str] = {}
+
+    def register(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
+        """Register a node, and return the URI of an older node of its name; None: there is none.
+
+        Args:
+            kind: not SERVICE, which `register_service` is for.
+            name: of the topic or parameter.
+            node: its full name.
+            uri: at which the node answers.
+        """
+        replaced = self._entered(kind, name, node, uri)
+        self._members[kind].setdefault(name, {})[node] = uri
+        return replaced
+
+    def register_service(self, service: str, node: str, uri: str, address: str) -> str | None:
+        """Register the only node that serves `service`; return as `register`."""
+        replaced = self._entered(Kind.SERVICE, service, node, uri)
+        self._members[Kind.SERVICE][service] = {node: uri}
+        self._service_uris[service] = (node, address)
+        return replaced
+
+    def unregister(self, kind: Kind, name: str, node: str, uri: str) -> bool:
+        """Return whether that node was registered; it is not any more.
+
+        Args:
+            kind: not SERVICE.
+            name: of the topic or parameter.
+            node: its full name.
+            uri: at which the node answers; a registration with another URI stays.
+        """
+        members = self._members[kind].get(name, {})
+        if members.get(node) != uri:
+            return False
+        del members[node]
+        if not members:
+            del self._members[kind][name]
+        self._left(kind, name, node)
+        return True
+
+    def unregister_service(self, service: str, node: str, address: str) -> bool:
+        """Return whether that node served `service` at that address; it does not any more."""
+        if node not in self._nodes or self._service_uris.get(service) != (node, address):
+            return False
+        del self._service_uris[service]
+        del self._members[Kind.SERVICE][service]
+        self._left(Kind.SERVICE, service, node)
+        return True
+
+    def knows(self, node: str) -> bool:
+        """Return whether a node of that name has a registration."""
+        return node in self._nodes
+
+    def uri_of(self, node: str) -> str | None:
+        """Return the URI of a node; None if it has no registration."""
+        found = self._nodes.get(node)
+        return None if found is None else found.uri
+
+    def address_of(self, service: str) -> str | None:
+        """Return the address of a service; None if no node serves it."""
+        found = self._service_uris.get(service)
+        return None if found is None else found[1]
+
+    def members(self, kind: Kind, name: str) -> list[tuple[str, str]]:
+        """Return name and URI of each node that is registered for `name`."""
+        return list(self._members[kind].get(name, {}).items())
+
+    def uris(self, kind: Kind, name: str) -> list[str]:
+        """Return the URI of each node that is registered for `name`."""
+        return list(self._members[kind].get(name, {}).values())
+
+    def names(self, kind: Kind) -> list[str]:
+        """Return the topics, services or parameters for which a node is registered."""
+        return list(self._members[kind])
+
+    def listed(self, kind: Kind) -> list[tuple[str, list[str]]]:
+        """Return each topic or service with the names of its nodes."""
+        return [(name, list(members)) for name, members in self._members[kind].items()]
+
+    def type_of(self, topic: str) -> str:
+        """Return the type of a topic that a node publishes.
+
+        Raises:
+            KeyError: no node has ever registered for it with a type.
+        """
+        return self._types[topic]
+
+    def types(self) -> list[tuple[str, str]]:
+        """Return each topic that ever had a type, with this type."""
+        return list(self._types.items())
+
+    def declare_type(self, topic: str, type_name: str, *, published: bool) -> None:
+        """Set the type of a topic: that of its newest publisher, else that of its first subscriber.
+
+        ANY_TYPE replaces no type, and only a publisher can declare it.
+        """
+        absent = topic not in self._types
+        if (published and (absent or type_name != ANY_TYPE)) or (absent and type_name != ANY_TYPE):
+            self._types[topic] = type_name
+
+    def _entered(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
+        """Note a registration; drop an older node of that name, and return its URI."""
+        known = self._nodes.get(node)
+        if known is not None and known.uri == uri:
+            known.registered.add((kind, name))
+            return None
+        if known is not None:
+            self._drop(node)
+        self._nodes[node] = _Node(uri, {(kind, name)})
+        return None if known is None else known.uri
+
+    def _left(self, kind: Kind, name: str, node: str) -> None:
+        known = self._nodes[node]
+        known.registered.discard((kind, name))
+        if not known.registered:
+            del self._nodes[node]
+
+    def _drop(self, node: str) -> None:
+        for members_of in self._members.values():
+            for name in [name for name, members in members_of.items() if node in members]:
+                del members_of[name][node]
+                if not members_of[name]:
+                    del members_of[name]
+        for service in [name for name, (owner, _) in self._service_uris.items() if owner == node]:
+            del self._service_uris[service]

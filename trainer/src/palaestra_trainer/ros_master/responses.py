@@ -1,0 +1,86 @@
+"""What every call of ROS returns, and the checks of its arguments."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from palaestra_trainer.ros_master.names import SEPARATOR, resolved
+from palaestra_trainer.ros_master.registrations import ANY_TYPE
+
+OK = 1
+FAILED = 0
+WRONG = -1  # the caller's mistake
+
+_SCHEMES = ("http://", "rosrpc://")
+_ILLEGAL = (":", " ")
+
+
+class MasterResponse(NamedTuple):
+    """The response to every ROS call: 1 for success, a text for people, a value."""
+
+    code: int
+    text: str
+    value: Any
+
+
+class WrongArgument(ValueError):
+    """An argument of a call is wrong; the message names it."""
+
+
+def text_of(argument: str, value: Any) -> str:
+    """Return a text that is not empty.
+
+    Raises:
+        WrongArgument: it is.
+    """
+    if not isinstance(value, str) or not value:
+        raise WrongArgument(f"{argument}: {value!r} is not a text with characters; give a name")
+    return value
+
+
+def name_of(argument: str, value: Any, caller: str) -> str:
+    """Return the global name that the caller means.
+
+    Raises:
+        WrongArgument: it is not a name.
+    """
+    name = text_of(argument, value)
+    if any(character in name for character in _ILLEGAL):
+        raise WrongArgument(f"{argument}: {name!r} is not a name; a name has no colon and no blank")
+    return resolved(name, caller)
+
+
+def topic_or_service(argument: str, value: Any, caller: str) -> str:
+    """Return the global name of a topic or service.
+
+    Raises:
+        WrongArgument: it is not a name, or it is the root.
+    """
+    name = name_of(argument, value, caller)
+    if name == SEPARATOR:
+        raise WrongArgument(f"{argument}: {value!r} is the root of all names; give a name below it")
+    return name
+
+
+def uri_of(argument: str, value: Any) -> str:
+    """Return the URI of a node or service.
+
+    Raises:
+        WrongArgument: it is not such a URI.
+    """
+    uri = text_of(argument, value)
+    if not uri.startswith(_SCHEMES):
+        raise WrongArgument(f"{argument}: {uri!r} is not a URI; it must begin with {' or '.join(_SCHEMES)}")
+    return uri
+
+
+def type_name_of(argument: str, value: Any) -> str:
+    """Return the type of a topic, `package/Name` or ANY_TYPE.
+
+    Raises:
+        WrongArgument: it is neither.
+    """
+    name = text_of(argument, value)
+    if name != ANY_TYPE and name.count(SEPARATOR) != 1:
+        raise WrongArgument(f"{argument}: {name!r} is not a type such as std_msgs/String")
+    return name
