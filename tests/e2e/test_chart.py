@@ -1,6 +1,6 @@
 """A release of the chart for one namespace, while the operator of the cluster is away.
 
-The release for the cluster is that of docs/install.md, which tests/e2e/test_pages.py types.
+The release for the cluster is that of docs/howto/install.md, which tests/e2e/test_pages.py types.
 """
 
 import os

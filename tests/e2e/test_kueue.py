@@ -1,4 +1,4 @@
-"""docs/queues.md on the real cluster, with a real Kueue: admitted, preempted, admitted again."""
+"""docs/howto/queues.md on the real cluster, with a real Kueue: admitted, preempted, admitted again."""
 
 import os
 from dataclasses import dataclass

@@ -46,7 +46,7 @@ _EPILOG = """\
 Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes
 what it leaves out into the file PALAESTRA_SIMULATOR_LEFT_OUT, if that is set; a sidecar sets it.
 
-faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/simulators.md has them all.
+faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/reference/faults.md has them.
 PALAESTRA_STUB_FAULTS takes them with blanks between, PALAESTRA_STUB_FAULT_SEED what --fault-seed does,
 PALAESTRA_SIMULATOR_START what --fault-life does.
 

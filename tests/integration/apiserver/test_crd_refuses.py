@@ -272,7 +272,7 @@ MAY_NOT_CHANGE = [
 
 @pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
 def test_what_may_change_changes(apply, path, value):
-    """The whole list of docs/trainingjob.md."""
+    """The whole list of docs/reference/trainingjob.md."""
     job = make_job()
     apply(job)
 

@@ -1,4 +1,4 @@
-"""docs/install.md can be typed as it stands, from top to bottom."""
+"""docs/howto/install.md can be typed as it stands, from top to bottom."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from tests.integration.chart.conftest import DEFINITION
 from tests.pages import blocks
 from tests.terminal import Terminal
 
-PAGE = (ROOT / "docs" / "install.md").read_text()
+PAGE = (ROOT / "docs/howto/install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
 REGISTRY = blocks(PAGE, "sh with-a-registry")
 # Without nodes no job ends: `palaestra try` is tested with the operator, and `helm test` by `make e2e`.

@@ -10,16 +10,16 @@ from palaestra.sweeps.model import SweepSpec, load
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
-SWEEPS = (ROOT / "docs/sweeps.md").read_text()
+SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
 
 
-def test_the_script_of_the_page_about_tools_trains(tmp_path, monkeypatch, capsys):
+def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsys):
     """With the example that people have, in a folder of their own."""
-    [script] = blocks((ROOT / "docs/tools.md").read_text(), "python with-a-run")
+    [script] = blocks((ROOT / "docs/howto/python.md").read_text(), "python with-a-run")
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     monkeypatch.chdir(tmp_path)
 
-    exec(compile(script, "docs/tools.md", "exec"), {})
+    exec(compile(script, "docs/howto/python.md", "exec"), {})
 
     assert "True " in capsys.readouterr().out.splitlines()[-1]
     assert (tmp_path / "runs/tiny/0/model.zip").exists()

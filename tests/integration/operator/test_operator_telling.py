@@ -68,7 +68,7 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
 
 def test_the_metrics_are_those_of_the_page(place, start):
-    """Every family of docs/metrics.md with its type, and none besides; promtool has nothing to say."""
+    """Every family of docs/reference/metrics.md with its type, and none besides; promtool finds nothing."""
     operator = start()
     place.train()
     place.pods()

@@ -1,4 +1,7 @@
-"""What the programs of a real run serve, compared with docs/metrics.md; the operator's are in its folder."""
+"""What the programs of a real run serve, compared with docs/reference/metrics.md.
+
+The operator's metrics are in its folder.
+"""
 
 import re
 import urllib.request

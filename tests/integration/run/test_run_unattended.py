@@ -1,8 +1,8 @@
 """Short forms of `make soak`: what breaks amid a run does not end it.
 
 Each runs a part of tests/soak in its smallest size and shows that this part works. The figures of
-docs/reliability.md come from the full sizes. The test test_run_exact_resume.py compares a resumed run with
-an uninterrupted one.
+docs/explain/reliability.md come from the full sizes. The test test_run_exact_resume.py compares a resumed run
+with an uninterrupted one.
 """
 
 import os
@@ -26,8 +26,8 @@ MANY = "crash:probability=0.02 wrong_value:topic=ir2/value,step=31 exit:step=47 
 
 def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follows():
     """Both tables are played, each by other tests; here they are compared: what they say may differ."""
-    text = (ROOT / "docs/simulators.md").read_text().partition("### The kinds")[2]
-    known = FAULT.findall(text.partition("### When")[0])
+    text = (ROOT / "docs/reference/faults.md").read_text().partition("## The kinds")[2]
+    known = FAULT.findall(text.partition("## When")[0])
 
     assert [fault for fault, _, _ in kinds.rows()] == known
 

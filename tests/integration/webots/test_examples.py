@@ -37,7 +37,7 @@ def test_the_facade_example_drives_and_reads():
 
 def test_the_blocks_of_the_page_about_facades_are_one_script():
     """In a process of its own: it wants to start the ROS master too."""
-    page = (ROOT / "docs/facades.md").read_text()
+    page = (ROOT / "docs/howto/facades.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
 
@@ -46,9 +46,9 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
     assert result.stderr == ""
 
 
-def test_the_blocks_of_the_page_about_environments_are_one_script():
-    """Those of a training loop of one's own."""
-    page = (ROOT / "docs/environments.md").read_text()
+def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
+    """In a process of its own: it starts simulators."""
+    page = (ROOT / "docs/howto/training-loop.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
 

@@ -1,4 +1,4 @@
-"""Every service and topic of docs/ros-interface.md, called and heard by clients with rospy and roscpp."""
+"""Every service and topic of docs/reference/ros-interface.md, called and heard with rospy and roscpp."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from tools.interface.everything import FAILING, offered, world
 DEADLINE_S = 120.0  # of what takes seconds, on a busy machine
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
-PAGE = (ROOT / "docs/ros-interface.md").read_text()
+PAGE = (ROOT / "docs/reference/ros-interface.md").read_text()
 STEPPED = {"robot/time_step"}
 
 

@@ -92,7 +92,7 @@ def pair(master, tmp_path):
 
 
 def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
-    """SIGKILL, as the kernel does to who takes too much memory. The figure is in docs/reliability.md."""
+    """SIGKILL, as the kernel does for lack of memory. The figure is in docs/explain/reliability.md."""
     it = pair().begin()
     os.kill(pid_of(it.first), signal.SIGKILL)
 

@@ -1,4 +1,4 @@
-"""The order in which a replica is judged is one list; docs/judging.md shows it."""
+"""The order in which a replica is judged is one list; docs/explain/judging.md shows it."""
 
 from palaestra.decide.replica_policy import JUDGED, CheckKind
 from tools.judging import page

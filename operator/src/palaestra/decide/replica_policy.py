@@ -1,7 +1,7 @@
 """The ordered list of checks by which a replica that has not ended is judged.
 
-`make golden` writes the list into docs/judging.md. Each reconcile runs all checks, because a check may also
-return how long it still waits. The class of a check that holds decides what follows:
+`make golden` writes the list into docs/explain/judging.md. Each reconcile runs all checks, because a
+check may also return how long it still waits. The class of a check that holds decides what follows:
 
 - ended: the first one that holds is how the replica ended, and the others are ignored.
 - final: the first one that holds stops the replica for good, by a mark on its Job.

@@ -84,7 +84,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
-    By default everything but `position` and `to_reach`: see docs/environments.md for what that costs.
+    By default everything but `position` and `to_reach`: see docs/explain/tasks.md for what that costs.
 
     ## Reward
 

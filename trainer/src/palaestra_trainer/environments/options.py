@@ -13,7 +13,7 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for time-up, so its episode ends there. `Dense` does not: see docs/environments.md.
+# `Sparse` has a reward for time-up, so its episode ends there. `Dense` does not: see docs/explain/tasks.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
