@@ -1,7 +1,7 @@
 """Rays of sensors that see shapes: infra-red DistanceSensors everywhere, lidars where nothing draws. Pure.
 
 A ray stops at the first surface that faces it. It passes the robot that carries the sensor, and what contains
-its origin. Source of the reflection: docs/reference/distancesensor.md of Webots, "Infra-Red Sensors".
+its origin. Source of the reflection: reference/distancesensor.md of Webots, "Infra-Red Sensors".
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Several rays are a cone around the first axis. A sonar measures the nearest one. The others measure the
 average, in which a ray counts less the more it is off the axis. Infra-red rays meet shapes, the others
-boundingObjects; the darker what they meet is, the farther it seems. Source: docs/reference/distancesensor.md
+boundingObjects; the darker what they meet is, the farther it seems. Source: reference/distancesensor.md
 and WbDistanceSensor.cpp of Webots.
 
 A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four rays beside
