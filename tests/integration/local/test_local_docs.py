@@ -1,4 +1,4 @@
-"""The pages about training from Python and about sweeps can be typed."""
+"""The pages about a first run, about training from Python and about sweeps can be typed."""
 
 from pathlib import Path
 
@@ -7,10 +7,26 @@ import pytest
 from palaestra.cli import main
 from palaestra.sweeps.grid import trials
 from palaestra.sweeps.model import SweepSpec, load
+from tests.local_run import PALAESTRA
 from tests.pages import blocks
+from tests.terminal import Terminal
 
 ROOT = Path(__file__).parents[3]
 SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
+LAPTOP = (ROOT / "docs/start/laptop.md").read_text()
+TYPED_S = 300
+
+
+@pytest.mark.timeout(400)
+def test_the_first_run_of_the_page_about_a_laptop_trains_and_is_measured(tmp_path):
+    """The first two commands that a stranger types."""
+    (tmp_path / "manifests").symlink_to(ROOT / "manifests")
+    [commands] = blocks(LAPTOP, "sh")
+
+    printed = Terminal(tmp_path, path=PALAESTRA.parent).type_in(commands, TYPED_S)
+
+    assert (tmp_path / "runs/tiny/0/model.zip").exists()
+    assert '"episodes": 5' in printed
 
 
 def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsys):

@@ -27,7 +27,7 @@ def carried_out(*program, folder=None, **variables):
 
 
 def test_the_facade_example_drives_and_reads():
-    """As typed in the README."""
+    """As on the page about notebooks."""
     result = carried_out(EXAMPLES / "facade.py")
 
     assert result.stdout.startswith("Pose(x_m=0.03")
