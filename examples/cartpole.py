@@ -2,8 +2,8 @@
 
     palaestra run manifests/examples/cartpole-mjcf.yaml
 
-`CartPole` names the devices of the model, and `BalanceEnv` is the task. The job names both as
-`cartpole:CartPole` and `cartpole:Balance-v0`; Palaestra finds this module on PYTHONPATH.
+`CartPole` names the devices of the model, and `BalanceEnv` is the task. The job names them as
+`cartpole:CartPole` and `cartpole:Balance-v0`; Palaestra imports this module from PYTHONPATH.
 """
 
 from typing import Any
@@ -15,11 +15,11 @@ from palaestra_trainer.robots import Joints
 from palaestra_trainer.robots.joints import JointRobot
 
 FARTHEST_M, STEEPEST_RAD = 1.5, 0.3
-LONGEST = 250  # steps of an episode, of 40 ms each
+LONGEST = 250  # most steps of an episode; a step is 40 ms
 
 
 class CartPole(JointRobot):
-    """A cart on a rail that is pushed, with a pole on it that falls."""
+    """A cart on a rail, with a pole that falls; a motor pushes the cart."""
 
     period_ms = 40
     motors = ("push",)
@@ -28,7 +28,7 @@ class CartPole(JointRobot):
 
 
 class BalanceEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Keep the pole up for 10 s: each step of a pole that stands is worth 1."""
+    """Keep the pole up for 10 s; each step with the pole up has reward 1."""
 
     needs = (Joints,)
     observation_space = gymnasium.spaces.Box(-10.0, 10.0, (4,), np.float32)
@@ -38,7 +38,7 @@ class BalanceEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.robot, self.scene = robot, scene
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Begin with the pole at a small angle."""
+        """Begin an episode with the pole at a small angle."""
         super().reset(seed=seed, options=options)
         self.steps = 0
         self.scene.begin(int(self.np_random.integers(2**31)))
@@ -58,7 +58,7 @@ class BalanceEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return seen, float(not fell), fell, over, {"is_success": over and not fell}
 
     def observe(self) -> np.ndarray:
-        """Return position, speed, angle and its speed."""
+        """Return position and speed of the cart, then angle and angular speed of the pole."""
         return np.clip(self.robot.joints(), -10.0, 10.0).astype(np.float32)
 
 

@@ -2,10 +2,11 @@
 
     palaestra run manifests/examples/curriculum.yaml
 
-`level` grows from 0 to 1 in the first half of training. With it grow the number of cylinders on the floor and
-their distance from their places, the noise of the distance sensors, the slip of the wheels, and how often a
-command takes effect one period late. Evaluations are always at level 1. All that is drawn follows from the
-episode's seed, so an interrupted run resumes as if it had not been interrupted.
+`level` grows from 0 to 1 in the first half of training. A higher level puts more cylinders on the floor, and
+moves them farther from their positions in the world file. It also increases the noise of the distance
+sensors, the slip of the wheels, and the share of commands that take effect one period late. Evaluations are
+always at level 1. All random values follow from the episode's seed, so an interrupted run resumes as if it
+had not been interrupted.
 """
 
 from typing import Any
@@ -18,19 +19,20 @@ from palaestra_trainer.environments.options import MoveToTargetOptions, parse
 from palaestra_trainer.robots import Pose, RobotinoAbc, Scene, SceneWrapper
 
 HARDEST_AT = 0.5  # share of training
-MOVED_M, NOISE_M, SLIP, LATE = 0.3, 0.01, 0.2, 0.3  # at level 1: at most, deviation, at most, probability
+# These are the values at level 1: most, standard deviation, most, probability.
+MOVED_M, NOISE_M, SLIP, LATE = 0.3, 0.01, 0.2, 0.3
 UNDER_THE_FLOOR_M = -1.0
 
 
 class DisturbedRobot(RobotinoAbc):
-    """A robot with noise, slip and late commands; `begin` says how much."""
+    """A robot with noise, slip and late commands; `begin` sets their size."""
 
     def __init__(self, robot: RobotinoAbc) -> None:
         self.robot = robot
         self.begin(np.random.default_rng(0), 0.0)
 
     def begin(self, random: np.random.Generator, level: float) -> None:
-        """Draw what stays for an episode; `random` draws the rest during it."""
+        """Draw the values that stay constant in an episode; `random` draws the others during the episode."""
         self.random, self.level = random, level
         self.grip = 1.0 - level * random.uniform(0.0, SLIP)
         self.command, self.noise = (0.0, 0.0, 0.0), 0.0
@@ -41,11 +43,11 @@ class DisturbedRobot(RobotinoAbc):
         return self.robot.period_s
 
     def distances(self) -> np.ndarray:
-        """Return the distances of the robot with this period's noise."""
+        """Return the distances of the robot, with the noise of this period."""
         return np.clip(self.robot.distances() + self.noise, *self.distance_range_m, dtype=np.float32)
 
     def bumped(self) -> bool:
-        """Return what the bumper says."""
+        """Return whether the bumper touches something."""
         return self.robot.bumped()
 
     def pose(self) -> Pose:
@@ -53,7 +55,7 @@ class DisturbedRobot(RobotinoAbc):
         return self.robot.pose()
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
-        """Drive slower by the slip; a late command takes effect in the next period."""
+        """Drive slower because of the slip; a late command takes effect in the next period."""
         before, self.command = self.command, (self.grip * vx, self.grip * vy, self.grip * omega)
         late = self.random.random() < LATE * self.level
         self.robot.drive(*(before if late else self.command))
@@ -66,15 +68,15 @@ class DisturbedRobot(RobotinoAbc):
 
 
 class HarderScene(SceneWrapper):
-    """A scene that puts as many cylinders on the floor as its level says, and disturbs the robot."""
+    """A scene that puts cylinders on the floor and disturbs the robot, according to its level."""
 
     def __init__(self, robot: DisturbedRobot, scene: Scene) -> None:
         super().__init__(scene)
         self.robot, self.level = robot, 1.0
 
     def begin(self, seed: int) -> None:
-        """Begin anew; everything follows from the seed and the level."""
-        self.scene.begin(seed)  # puts everything back to its place in the world file
+        """Begin an episode; the scene follows from the seed and the level."""
+        self.scene.begin(seed)  # puts all objects back to their positions in the world file
         random = np.random.default_rng(seed)
         cylinders = [it for it in self.layout().obstacles if it.name.startswith("CYLINDER")]
         for number, cylinder in enumerate(cylinders):
@@ -93,7 +95,7 @@ class CurriculumEnv(MoveToTargetEnv):
         self.harder = scene
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Begin an episode; without a run, at level 1."""
+        """Begin an episode; outside of a run its level is 1."""
         progress = (options or {}).get("training_progress", 1.0)
         self.harder.level = min(1.0, progress / HARDEST_AT)
         return super().reset(seed=seed, options=options)

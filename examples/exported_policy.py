@@ -1,4 +1,4 @@
-"""Drive a simulated Robotino with a policy of `palaestra export RUN --to onnx`: without PyTorch."""
+"""Drive a simulated Robotino with the file of `palaestra export RUN --to onnx`, without PyTorch."""
 
 import json
 import sys
@@ -14,7 +14,7 @@ policy = onnxruntime.InferenceSession(sys.argv[1])
 sheet = json.loads(policy.get_modelmeta().custom_metadata_map["palaestra"])
 task = f"palaestra_trainer.environments:{sheet['environment']['id']}"
 over = False
-with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if there is none
+with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if none runs
     robot = Robotino(webots)
     robot.connect()
     scene = SimulatedScene(webots, robot)

@@ -1,4 +1,4 @@
-"""Drive a simulated Robotino and read its sensors: from a script, or cell by cell in a notebook."""
+"""Drive a simulated Robotino and read its sensors, in a script or in the cells of a notebook."""
 
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino

@@ -1,11 +1,9 @@
 """A training loop of your own: `trainer: {command: [python, own_training_script.py]}`.
 
-It runs where the built-in loop would, in the simulators of the TrainingJob. A simulator that breaks is
-mended, and its episode counts as truncated.
-The script saves its model as often as the job says, and reports its steps, so that the operator sees its
-progress.
-SIGTERM ends it after the current step, with the model saved and an exit code that asks to be started again;
-started again, it resumes from that model.
+It replaces the built-in loop and uses the simulators of the TrainingJob. A simulator that breaks is
+restarted, and its episode counts as truncated. The script saves its model at the interval in the job. It
+reports its steps, so that the operator sees its progress. After a SIGTERM it ends the current step, saves the
+model, and exits with a code that requests a restart. After the restart it resumes from that model.
 """
 
 import os
@@ -22,21 +20,21 @@ from stable_baselines3.common.monitor import Monitor
 from palaestra_trainer import make_env, make_sb3_vec_env, report
 from palaestra_trainer.configuration import load
 
-job = load()  # what PALAESTRA_CONFIG names: the TrainingJob, resolved for this replica
-run = Path(os.environ["PALAESTRA_RUN"])  # what is written here outlives the pod
+job = load()  # the file in PALAESTRA_CONFIG: the TrainingJob, resolved for this replica
+run = Path(os.environ["PALAESTRA_RUN"])  # files in this folder outlive the pod
 saved = run / "model.zip"
 interrupted = threading.Event()
 signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
 
 
 def save(model: PPO) -> None:
-    """Replace the saved model at once: a kill amid a save leaves the one before."""
+    """Replace the saved model atomically, so that a kill during the save leaves the previous model."""
     model.save(run / "unfinished.zip")
     (run / "unfinished.zip").replace(saved)
 
 
 class Progress(BaseCallback):
-    """Reports before each rollout, when the model is whole, and saves when it is time."""
+    """Reports before each rollout, when no update is running, and saves the model when a save is due."""
 
     def _on_training_start(self) -> None:
         self.next_save = self.num_timesteps + job.checkpoint.every_steps
@@ -51,7 +49,7 @@ class Progress(BaseCallback):
         return not interrupted.is_set()
 
 
-envs = make_sb3_vec_env()  # in all simulators that collect
+envs = make_sb3_vec_env()  # in all simulators with role Collect
 if saved.exists():
     model = PPO.load(saved, envs, device=job.device)
 else:
@@ -64,7 +62,7 @@ report(step=model.num_timesteps)
 envs.close()
 
 if interrupted.is_set():
-    sys.exit(75)  # interrupted, start me again
+    sys.exit(75)  # interrupted: a restart resumes the run
 if job.with_role("Evaluate"):
     env = Monitor(make_env(role="Evaluate"))
     mean_return, _ = evaluate_policy(model, env, n_eval_episodes=job.evaluation.episodes)

@@ -1,10 +1,10 @@
 """PPO in one file, to be read and changed: `trainer: {command: [python, ppo_in_one_file.py]}`.
 
-In a job it trains in all collecting simulators, for as many steps as the job says. By hand, for example:
+In a job it trains in all simulators with role Collect, for the steps of the job. To run it by hand:
 
     python examples/ppo_in_one_file.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096
 
-A simulator that breaks is mended within the step; its episode counts as truncated.
+A simulator that breaks is restarted within the step; its episode counts as truncated.
 """
 
 import argparse
@@ -21,9 +21,9 @@ from palaestra_trainer import make_vec_env, report
 from palaestra_trainer.configuration import load
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--environment", help="its id; by default that of the job")
-parser.add_argument("--simulators", type=int, help="how many; by default all that collect")
-parser.add_argument("--steps", type=int, help="of all simulators together; by default as the job says")
+parser.add_argument("--environment", help="id of the environment; by default that of the job")
+parser.add_argument("--simulators", type=int, help="number of simulators; by default all with role Collect")
+parser.add_argument("--steps", type=int, help="steps of all simulators together; by default those of the job")
 parser.add_argument("--rollout", type=int, default=128, help="steps of each simulator between two updates")
 parser.add_argument("--epochs", type=int, default=4)
 parser.add_argument("--minibatches", type=int, default=4)
@@ -38,7 +38,7 @@ total = settings.steps or load().steps
 
 
 class Agent(nn.Module):
-    """A policy and a value function, for observations that are a row of numbers and discrete actions."""
+    """A policy and a value function, for discrete actions and observations that are a row of numbers."""
 
     def __init__(self, numbers: int, actions: int) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class Agent(nn.Module):
         )
 
     def value(self, seen: torch.Tensor) -> torch.Tensor:
-        """Estimate the discounted return from here."""
+        """Return the estimated discounted return from this observation on."""
         return self.critic(seen).squeeze(-1)
 
     def choice(self, seen: torch.Tensor) -> Categorical:
@@ -79,7 +79,7 @@ while steps < total:
         following, reward, terminated, truncated, infos = envs.step(action.numpy())
         ended = terminated | truncated
         rewards[step], ends[step] = torch.as_tensor(reward), torch.as_tensor(ended)
-        # An episode that its time limit or a fault has cut would have gone on: add the value of the rest.
+        # A time limit or a fault truncates an episode that would have continued: add the value of the rest.
         for index in np.flatnonzero(truncated & ~terminated):
             last = torch.as_tensor(infos["final_obs"][index])
             with torch.no_grad():

@@ -1,7 +1,7 @@
 """PPO of skrl in the simulators of a job, or in stubs: `trainer: {command: [python, skrl_ppo.py]}`.
 
-skrl is not part of the trainer's image; add it with `FROM palaestra-trainer` and `pip install skrl`.
-By hand: `python examples/skrl_ppo.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096`.
+skrl is not part of the trainer's image; add it with `FROM palaestra-trainer` and `pip install skrl`. To run
+it by hand: `python examples/skrl_ppo.py --environment MoveToTargetEnv-v0 --simulators 2 --steps 4096`.
 """
 
 import argparse
@@ -21,9 +21,9 @@ from palaestra_trainer import make_vec_env, report
 from palaestra_trainer.configuration import load
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--environment", help="its id; by default that of the job")
-parser.add_argument("--simulators", type=int, help="how many; by default all that collect")
-parser.add_argument("--steps", type=int, help="of all simulators together; by default as the job says")
+parser.add_argument("--environment", help="id of the environment; by default that of the job")
+parser.add_argument("--simulators", type=int, help="number of simulators; by default all with role Collect")
+parser.add_argument("--steps", type=int, help="steps of all simulators together; by default those of the job")
 parser.add_argument("--rollout", type=int, default=128, help="steps of each simulator between two updates")
 settings = parser.parse_args()
 
@@ -48,7 +48,7 @@ class Policy(CategoricalMixin, Model):
 
 
 class Value(DeterministicMixin, Model):
-    """The discounted return that is expected."""
+    """The expected discounted return."""
 
     def __init__(self, **spaces: Any) -> None:
         Model.__init__(self, **spaces)
@@ -85,8 +85,8 @@ agent = Reporting(
         "discount_factor": 0.97,
         "learning_rate": 3e-4,
         "entropy_loss_scale": 0.01,
-        # `time_limit_bootstrap` stays off: with it, skrl would take the next episode's first observation
-        # for the last one of an episode that was cut.
+        # `time_limit_bootstrap` stays off: with it, skrl would use the next episode's first observation
+        # as the last one of a truncated episode.
         "experiment": {
             "directory": os.environ.get("PALAESTRA_RUN", "runs"),
             "write_interval": 0,

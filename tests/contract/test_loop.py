@@ -42,5 +42,5 @@ def test_a_look_observes_once():
 
     assert [call for call in calls if call[1] in {"observe", "self._looking.look"}] == [
         ("controller.py", "self._looking.look"),
-        ("looking.py", "observe"),
+        ("observer.py", "observe"),
     ]

@@ -87,10 +87,10 @@ def end(run: Run) -> None:
     address = run.folder / ADDRESS
     if run.owner != os.getpid() or not address.exists():
         return
-    keeper = os.pidfd_open(json.loads(address.read_text())["process"])
-    signal.pidfd_send_signal(keeper, signal.SIGTERM)
-    select.select([keeper], [], [], ENDS_S)
-    os.close(keeper)
+    restarter = os.pidfd_open(json.loads(address.read_text())["process"])
+    signal.pidfd_send_signal(restarter, signal.SIGTERM)
+    select.select([restarter], [], [], ENDS_S)
+    os.close(restarter)
 
 
 def _start(run: Run) -> None:

@@ -84,8 +84,8 @@ def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
 
 def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
     """It trained from step 0 again, and nothing said so; a new value of the annotation gives the run up."""
-    namespace.apply(make_slow_job("amid", steps=300, every_steps=EVERY_STEPS))
-    namespace.wait_for_step("amid", AMID)
+    namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS))
+    _, lost_at = namespace.wait_for_step("amid", AMID)
     namespace.patch("amid", suspend=True)
     namespace.wait(lambda: namespace.holds("amid", "Suspended") and not namespace.pods("amid"), LONG_S)
     [claim] = map(named, namespace.select("persistentvolumeclaims", "amid"))
@@ -99,6 +99,8 @@ def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
     assert namespace.get("persistentvolumeclaims", claim) is None
     word = {"metadata": {"annotations": {"palaestra.dev/restart-lost-runs": "now"}}}
     namespace.cluster.patch("trainingjobs", namespace.name, "amid", word)
-    assert namespace.wait_for_end("amid", LONG_S) == "Succeeded"
+    again, step = namespace.wait_for_step("amid", 1)
+    assert step < lost_at
+    assert "new run" in namespace.in_run(again, "attempts.jsonl")[0]["reason"]
     assert namespace.replica("amid")["lost"]["step"] >= EVERY_STEPS
-    assert namespace.events("amid", "RunRestarted")
+    namespace.wait(lambda: namespace.events("amid", "RunRestarted"))

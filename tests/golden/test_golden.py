@@ -1,26 +1,60 @@
-"""Every recorded plan is what the plan is now; `make golden` records them anew."""
+"""Every recorded plan and every generated file is current; `make golden` records them anew."""
 
 import runpy
+from difflib import unified_diff
 from functools import cache
-from pathlib import Path
+from itertools import islice
 
+from tests.golden import plans
 from tests.tables import for_each
 
-HERE = Path(__file__).parent
+ROOT = plans.HERE.parents[1]
+MOST_LINES = 40  # of a message; git shows all of them after `make golden`
 
 
 @cache
 def recorded():
     """Return the text that belongs into each generated file, by its path."""
-    return dict(runpy.run_path(str(HERE / "__main__.py"), run_name="golden")["recorded"]())
+    return dict(runpy.run_path(str(plans.HERE / "__main__.py"), run_name="golden")["recorded"]())
 
 
-@for_each("path, text", lambda: recorded().items())
-def test_a_generated_file_is_current(path, text):
-    """A plan is read in review as what it is: the objects that a cluster will get."""
-    assert path.read_text() == text, "not current; run `make golden` and read the diff"
+def change_of(path):
+    """Return the lines by which a file differs from what belongs into it; none: it is current."""
+    before, now = path.read_text() if path.exists() else "", recorded()[path]
+    return list(unified_diff(before.splitlines(), now.splitlines(), "recorded", "now", lineterm=""))
 
 
-def test_no_recorded_plan_is_without_its_example():
-    """A plan that nothing makes any more would be believed."""
-    assert set(HERE.glob("*.yaml")) <= recorded().keys()
+@for_each("path", recorded)
+def test_a_generated_file_is_current(path):
+    """A review of a plan shows the objects that a cluster will get."""
+    change = change_of(path)
+    shown = "\n".join(islice(change, MOST_LINES))
+
+    assert not change, f"{path.relative_to(ROOT)} is not current; run `make golden`, read its diff:\n{shown}"
+
+
+def test_every_recorded_plan_has_its_example_or_case():
+    """A reader would believe a recorded plan that nothing makes any more."""
+    assert plans.on_disk() <= recorded().keys()
+
+
+@for_each("job", plans.cases)
+def test_a_case_says_what_it_shows_and_shows_it(job):
+    """The first line is the caption of the pair; a case without a difference shows nothing."""
+    caption, _, fields = job.read_text().partition("\n")
+
+    assert caption.startswith("# ")
+    assert fields.startswith("spec:")
+    assert "@@" in plans.plan_of(job).read_text()
+
+
+@for_each("name, layout", lambda: [(name, layout) for name in plans.examples() for layout in plans.LAYOUTS])
+def test_the_name_of_a_job_changes_nothing_in_its_plan_but_the_name(name, layout):
+    """The difference of an example leaves out what its plan has in common with this one."""
+    smallest = plans.example(plans.SMALLEST)
+    whole = plans.comparable(smallest, layout)
+    in_ros = name.replace("-", "_")
+
+    plan = plans.comparable(plans.renamed(smallest, name), layout)
+
+    assert plan == whole.replace(f"{plans.SMALLEST}_r", f"{in_ros}_r").replace(plans.SMALLEST, name)

@@ -3,12 +3,13 @@
     PalaestraError
     ├── TrainingJobError             a TrainingJob cannot be used as it stands
     │   ├── SpecErrors               its spec is wrong: never retried
+    │   ├── JobRefused               the operator cannot run it (decide.validation)
     │   └── PlanError                no plan can be made of it
     │       ├── WorldCheckTooCostly  the check of a world takes more than its budget
     │       ├── WorldRefused         a world is wrong
     │       └── WorldUnchecked       a world is not checked yet: retried once it is
     ├── LocalError                   the local runner cannot go on (local.errors)
-    │   ├── Refused                  the run cannot be started as asked
+    │   ├── RunRefused               the run cannot be started as asked
     │   ├── StartFailed              a container that others wait for did not start
     │   ├── StillRunning             a run in the background has not ended by a deadline
     │   └── StorageFailed            a file of the run could not be written

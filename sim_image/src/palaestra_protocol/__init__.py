@@ -3,17 +3,17 @@
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
 - `ros`: between trainer and simulator: connections, types and values of ROS 1
-- `elsewhere`: words of other projects, and their places in a TrainingJob
+- `foreign_words`: words of other projects, and the TrainingJob fields that replace them
 - `fields`: checks of received JSON, because its sender is not trusted
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
-- `imports`: imports of programs, without what they do not use
-- `masking`: texts without the passwords of addresses
+- `imports`: faster imports for programs
+- `masking`: text in which the passwords of addresses are masked
 - `shadowing`: a user's modules that shadow those of Python and of dependencies
-- `signals`: which signals a program obeys
+- `signals`: the signals that a program handles
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
-- `places`: the connections that this server keeps
+- `connection_limits`: the limits on open connections of this server
 
-This package imports none of the others. All modules except `http`, `imports`, `places`, `shadowing`,
-`signals` and `ros.sockets` are pure: values and bytes.
+This package imports none of the others. All modules except `http`, `imports`, `connection_limits`,
+`shadowing`, `signals` and `ros.sockets` are pure: values and bytes.
 """

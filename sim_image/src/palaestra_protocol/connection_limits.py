@@ -1,8 +1,9 @@
-"""The places of a server for connections: bounded in all and for one peer, and the newest gets one.
+"""The connection slots of a server: limited in total and for each peer; new connections come first.
 
-A kubelet's probe sends its request as soon as it is connected. So a connection that is still waited for gives
-up its place to a new one, the oldest of its peer first, so that a peer with many starves only itself. A
-connection whose request is being answered keeps its place.
+A kubelet's probe sends its request as soon as it is connected. So an idle connection, one whose request is
+not yet complete, loses its slot to a new one. If the peer of the new connection has reached its limit, that
+peer's oldest idle connection is closed, so a peer with many connections starves only itself. A connection
+whose request is complete keeps its slot until the response is ready.
 """
 
 import contextlib
@@ -16,21 +17,21 @@ MOST_OF_PEER = 16
 
 @dataclass(slots=True)
 class _Place:
-    """The place of one connection: its peer's address, and whether its request is being answered."""
+    """The slot of one connection: its peer's address, and whether the server is processing its request."""
 
     peer: str
     answering: bool = False
 
 
 class ConnectionSlots:
-    """The connections that have a place; safe to use from several threads."""
+    """The connections that have a slot; safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._taken: dict[socket.socket, _Place] = {}  # the oldest first
 
     def take(self, connection: socket.socket, peer: str) -> bool:
-        """Give a new connection a place, and close another for it if need be; return whether it has one."""
+        """Return whether a new connection got a slot; if all are taken, close the oldest idle connection."""
         with self._lock:
             if (crowd := self._crowd(peer)) is not None:
                 idle = next((one for one in crowd if not self._taken[one].answering), None)
@@ -41,25 +42,25 @@ class ConnectionSlots:
             return True
 
     def answering(self, connection: socket.socket, *, now: bool) -> None:
-        """Note that the request of a connection is being answered, or no more."""
+        """Record whether the server is processing the request of a connection."""
         with self._lock:
             if place := self._taken.get(connection):
                 place.answering = now
 
     def leave(self, connection: socket.socket) -> None:
-        """Free the place of a connection, if it still has one."""
+        """Free the slot of a connection, if it still has one."""
         with self._lock:
             self._taken.pop(connection, None)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
-        """Return the connections of which one has to go before `peer` gets a place; None: there is room."""
+        """Return the connections of which one must be closed for `peer`; None if a slot is free."""
         of_peer = [one for one, place in self._taken.items() if place.peer == peer]
         if len(of_peer) >= MOST_OF_PEER:
             return of_peer
         return list(self._taken) if len(self._taken) >= MOST_CONNECTIONS else None
 
     def _drop(self, connection: socket.socket) -> None:
-        """Close a connection; the thread that waits for it ends."""
+        """Close a connection; the thread that reads from it ends."""
         del self._taken[connection]
-        with contextlib.suppress(OSError):  # the peer has closed it
+        with contextlib.suppress(OSError):  # the peer may have closed it already
             connection.shutdown(socket.SHUT_RDWR)

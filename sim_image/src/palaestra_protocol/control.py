@@ -1,19 +1,20 @@
-"""The requests of a trainer to a sidecar, and the sidecar's answers about its simulator.
+"""The requests of a trainer to a sidecar, and the sidecar's reports about its simulator.
 
-    POST /start   {}                    begin to start it; answered at once
-    POST /ready   {}                    it has answered a real round trip
+    POST /start   {}                    start it; the response does not wait for it
+    POST /ready   {}                    it has completed a real round trip
     POST /stop    {"deadline_s": 5.0}   it will end; it is killed after that many seconds
     GET  /state
 
 A sidecar with a standby has the same requests for its second simulator at /standby/start, /standby/ready,
 /standby/stop and /standby/state. The trainer decides which of the two it uses.
 
-The answer is a `SimulatorState` with status 200, or 409 if the state does not allow the request. For a wrong
-body it is 400 with {"error": "<field>: <fact>"}.
+The response is a `SimulatorState` with status 200, or 409 if the state does not allow the request. If the
+body is wrong, the status is 400 and the body is {"error": "<field>: <fact>"}.
 
 A simulator may leave out nodes of its world that it cannot simulate, if its user allowed that. Before it
-answers, it then writes the file that the environment variable `LEFT_OUT_FILE` names, whole: UTF-8, with one
-line for each kind of node, such as "the stub simulates no Drone: 1 node left out (collect-0.wbt, line 12)".
+becomes ready, it then writes the whole file that the environment variable `LEFT_OUT_FILE` names: UTF-8, with
+one line for each kind of node. Example: "the stub simulates no Drone: 1 node left out (collect-0.wbt, line
+12)".
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class RobotName:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -103,9 +104,9 @@ class RobotName:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LastExit:
-    """How the simulator last ended: with a code, or by a signal such as "SIGBUS".
+    """The last end of the simulator: its exit code, or its signal such as "SIGBUS".
 
-    If neither is set, it could not be started, or its end was not seen. `expected` is true if the end was
+    If neither is set, it could not be started, or its end was not observed. `expected` is true if the end was
     announced; otherwise it was a fault.
     """
 
@@ -119,7 +120,7 @@ class LastExit:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -140,15 +141,15 @@ class SimulatorState:
         state: of the simulator.
         driver: stub, webots or command.
         world: the path of its world.
-        robots: the robots of that world that speak ROS.
-        pid: of the simulator's first process; None while none runs.
-        starts: how often it was started since the sidecar started.
-        faults: how often it ended without an announcement.
-        last_exit: how it last ended; None: it has not ended yet.
-        detail: why it is in this state, in a sentence for people; "": no comment.
-        rss_bytes: the memory of its processes, in the answer to GET while it is ready; None: not included.
-        left_out: what the simulator left out of its world at its last start, in lines for people. Absent, not
-            empty.
+        robots: the robots of that world that have a ROS node.
+        pid: of the simulator's first process; None while it does not run.
+        starts: number of starts since the sidecar started.
+        faults: number of ends without an announcement.
+        last_exit: its last end; None if it has not ended yet.
+        detail: the reason for this state, in a sentence for people; "" if there is nothing to add.
+        rss_bytes: the memory of its processes, in responses to GET while it is ready; else None.
+        left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
+            Absent, not empty.
     """
 
     state: SidecarState
@@ -183,7 +184,7 @@ class SimulatorState:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -216,10 +217,10 @@ class StopRequest:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
-            ProtocolError: `content` is anything else, or has a field more.
+            ProtocolError: `content` is anything else, or has an additional field.
         """
         fields = Fields(content, path)
         fields.only("deadline_s")
@@ -242,7 +243,7 @@ class PlainRequest:
 
 
 def left_out(fields: Fields, most: int) -> tuple[str, ...]:
-    """Return the field `left_out`, lines of at most `most` characters; () if it is absent.
+    """Return the lines in the field `left_out`, of at most `most` characters each; () if it is absent.
 
     Raises:
         ProtocolError: it is anything else.

@@ -1,9 +1,9 @@
 """Read JSON from an untrusted process.
 
-A pod runs programs that its author chose, so its answer may be of a wrong type, endless, or not encodable.
-Each value is read by a method that checks its type and its bounds; any other value is a `ProtocolError`.
-Unknown fields are ignored in answers, because a newer release may add some. In requests they are refused,
-because there they are mistakes.
+A pod runs programs that its author chose, so its response may have a wrong type, be endless, or contain
+characters that cannot be encoded. Each value is read by a method that checks its type and its bounds; any
+other value raises `ProtocolError`. Unknown fields are ignored in responses, because a newer release may add
+some. In requests they are refused, because there they are mistakes.
 
 Writers keep the same bounds with `clipped`, `enumerated` and `known`.
 """
@@ -23,8 +23,8 @@ from palaestra_protocol.masking import masked
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # of one answer; enough for all fields at maximum length, with the longest escapes
-MOST_COUNT = 2**53  # integers that every JSON reader keeps exactly
+MOST_BYTES = 2**19  # of one response; enough for all fields at maximum length, with the longest escapes
+MOST_COUNT = 2**53  # every JSON reader keeps integers up to this one exactly
 MOST_NAME = 255
 MOST_TEXT = 500
 
@@ -60,7 +60,7 @@ def clipped(text: str, most: int = MOST_TEXT) -> str:
 
 
 def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:
-    """Return at most `most_entries` texts, each `clipped`; the last one counts those that are missing."""
+    """Return at most `most_entries` texts, each `clipped`; the last one counts those that were dropped."""
     kept = [clipped(text, most) for text in texts[:most_entries]]
     if missing := len(texts) - len(kept):
         kept[-1] = f"and {missing + 1} more"
@@ -68,7 +68,7 @@ def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:
 
 
 def known(value: float | None) -> float | None:
-    """Return `value`; None for infinities and not-a-number, which JSON does not have."""
+    """Return `value`; None for infinities and NaN, which JSON cannot express."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -79,7 +79,7 @@ class Fields:
 
     Args:
         content: the result of `json.loads`.
-        path: of the object, such as "simulators[1]"; "" at the top.
+        path: the path of the object, such as "simulators[1]"; "" for the whole body.
     """
 
     def __init__(self, content: object, path: str = "") -> None:
@@ -89,7 +89,7 @@ class Fields:
         self._content = cast("dict[str, object]", content)
 
     def only(self, *names: str) -> None:
-        """Refuse every field that is not among `names`."""
+        """Raise ProtocolError for any field that is not among `names`."""
         for name in self._content:
             if name not in names:
                 raise self._error(clipped(name, MOST_NAME), "is not a field of this request")
@@ -154,11 +154,11 @@ class Fields:
         return text
 
     def part(self, name: str, read: Callable[[object, str], T]) -> T:
-        """Return an object within this one, read by `read`."""
+        """Return the result of `read` for an object within this one."""
         return read(self._value(name), self._at(name))
 
     def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
-        """Return a list of at most `most` entries, each read by `read`."""
+        """Return the results of `read` for a list of at most `most` entries."""
         value = self._value(name)
         if not isinstance(value, list):
             raise self._error(name, f"{_kind(value)} is no list")
@@ -191,12 +191,12 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
 
 
 def _kind(value: object) -> str:
-    """Return the type of a JSON value in words, without the value, which may be endless."""
+    """Return the type of a JSON value in words, without the value, which may be very long."""
     return _TYPES.get(type(value), "a number")
 
 
 def _exists(time: str) -> bool:
-    """Return whether there is such a day and hour."""
+    """Return whether the date and time exist in the calendar."""
     try:
         datetime.fromisoformat(time)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Words of other projects, and their places in a TrainingJob.
+"""Words of other projects, and the TrainingJob fields that replace them.
 
 Operator and trainer meet the same words: in a section of a job, and among its hyperparameters.
 """
@@ -15,8 +15,8 @@ _COUNT = "write the count of a group of spec.simulators with role Collect"
 _STEPS = "write trainer.steps"
 _NORMALIZE = "write trainer.algorithm.normalize"
 
-# Words of RL-Baselines3-Zoo's files, arguments that a run itself gives to classes of Stable-Baselines3, and
-# words of its `learn`, its callbacks and other libraries for what a job has in a field.
+# Words of RL-Baselines3-Zoo's files; arguments that a run itself passes to classes of Stable-Baselines3; and
+# words of `learn`, of callbacks and of other libraries for which a job has a field of its own.
 ELSEWHERE: Mapping[str, str] = MappingProxyType(
     {
         "_init_setup_model": "a run sets its model up itself; leave it out",
@@ -55,7 +55,7 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "verbose": "the log of a run has every figure; leave it out",
     }
 )
-# Of these, the words that only a file of RL-Baselines3-Zoo has.
+# Those of them that only a file of RL-Baselines3-Zoo has.
 OF_ZOO = frozenset(
     {
         "callback", "env_kwargs", "env_wrapper", "frame_stack", "monitor_kwargs", "n_envs", "n_timesteps",
@@ -67,7 +67,7 @@ FROM_ZOO = "`palaestra from-zoo FILE` writes a job from a whole file of RL-Basel
 _HINDSIGHT = (
     "HER is a replay buffer; use SAC, TD3, DDPG, TQC, DQN or QRDQN with replay_buffer_class: HerReplayBuffer"
 )
-# Algorithms of Stable-Baselines3 and sb3-contrib that a run cannot have, by their names in lower case.
+# Algorithms of Stable-Baselines3 and sb3-contrib that a run does not support, by their names in lower case.
 NO_ALGORITHM: Mapping[str, str] = MappingProxyType(
     {
         "ars": "ARS learns from whole returns, which rows of broken simulators would enter; use another one",

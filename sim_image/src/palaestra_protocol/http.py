@@ -1,10 +1,10 @@
-"""The HTTP server of operator, trainer and sidecar: a table of routes, and a bound for everything.
+"""The HTTP server of operator, trainer and sidecar: a table of routes, with limits for time, size and number.
 
-Each connection has one request, with a deadline and a largest size; a slow or endless request is closed
-without an answer. The number of connections is limited: a new one takes the place of one that is waited for,
-as `places` says. Errors are JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a
-wrong method, 411 for a POST without Content-Length and 413 for a body that is too long. No request is logged,
-because probes and scrapes come every few seconds.
+Each connection carries one request, with a deadline and a maximum size; a slow or endless request is closed
+without a response. The number of connections is limited: a new one replaces an idle one, as
+`connection_limits` describes. Errors are JSON: {"error": "<field>: <fact>"}. The status is 404 for an unknown
+path, 405 for a wrong method, 411 for a POST without Content-Length and 413 for a body that is too long.
+Requests are not logged, because probes and scrapes come every few seconds.
 """
 
 import io
@@ -26,16 +26,16 @@ from typing import Any, NamedTuple, Self, cast
 from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlots
 from palaestra_protocol.numbers import MOST_PORT
 
-MOST_REQUEST_BYTES = 2**17  # enough to answer a path of 64 KiB, the longest of http.server, with 414
+MOST_REQUEST_BYTES = 2**17  # enough to send 414 for a path of 64 KiB, the longest of http.server
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
-_POLL_S = 0.1  # how long `close` takes at most
+_POLL_S = 0.1  # maximum duration of `close`
 
 log = logging.getLogger(__name__)
 
 
 class Address(NamedTuple):
-    """Where a server listens; port 0 takes one that is free."""
+    """The address on which a server listens; port 0 stands for any free port."""
 
     host: str
     port: int
@@ -45,7 +45,7 @@ class Address(NamedTuple):
         """Return the address of `127.0.0.1:7100` or `[::1]:7100`; a host is an IP address.
 
         Raises:
-            ValueError: it is none, or has no port from 0 to 65535.
+            ValueError: it is not an IP address with a port from 0 to 65535.
         """
         host, _, port = text.rpartition(":")
         bare = host.removeprefix("[").removesuffix("]")
@@ -63,14 +63,14 @@ class Address(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """An answer: a status, and a body of some type."""
+    """A response: a status, and a body of some type."""
 
     status: HTTPStatus
     body: bytes
     content_type: str
 
 
-Route = Callable[[bytes], Response]  # from the body of a request
+Route = Callable[[bytes], Response]  # takes the body of a request
 Routes = Mapping[tuple[str, str], Route]  # by method, GET or POST, and path
 
 
@@ -80,12 +80,12 @@ def json_response(status: HTTPStatus, content: Mapping[str, Any]) -> Response:
 
 
 def error_response(status: HTTPStatus, fact: str) -> Response:
-    """Return an error, as the server itself writes it."""
+    """Return an error response, in the format of the server's own errors."""
     return json_response(status, {"error": fact})
 
 
 def probe_response(trouble: str | None = None) -> Response:
-    """Return the answer to a probe: "ok", or 503 with what is wrong."""
+    """Return the response to a probe: "ok", or 503 with the reason."""
     return Response(
         status=HTTPStatus.OK if trouble is None else HTTPStatus.SERVICE_UNAVAILABLE,
         body=f"{'ok' if trouble is None else trouble}\n".encode(),
@@ -94,17 +94,17 @@ def probe_response(trouble: str | None = None) -> Response:
 
 
 class Server(socketserver.ThreadingTCPServer):
-    """One port: bound when made, answering from `start` until `close`.
+    """A server on one port, which is bound at once; it responds from `start` until `close`.
 
     Args:
         address: where to listen. `0.0.0.0` and `::` both mean every address of the machine, IPv6 and IPv4,
             because the addresses of a pod are those of its cluster.
         routes: its paths.
         name: of the program, for the header `Server` and the thread.
-        deadline_s: for reading a request, and again for writing the answer.
+        deadline_s: for reading a request, and again for writing the response.
 
     Raises:
-        OSError: the address is in use, or not of this machine.
+        OSError: the address is in use, or does not belong to this machine.
     """
 
     allow_reuse_address = True
@@ -126,17 +126,17 @@ class Server(socketserver.ThreadingTCPServer):
 
     @property
     def address(self) -> Address:
-        """The address on which it listens, with the port that was free."""
+        """The address on which it listens, with the actual port."""
         return Address(*self.socket.getsockname()[:2])
 
     def server_bind(self) -> None:
-        """Bind the socket; for every address also to IPv4, whatever the system's default is."""
+        """Bind the socket; a server for all addresses also accepts IPv4, whatever the system's default is."""
         if self._every and self.address_family == socket.AF_INET6:
             self.socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         super().server_bind()
 
     def start(self) -> None:
-        """Begin to answer, in threads of its own."""
+        """Start to serve requests, in new threads."""
         self._thread = threading.Thread(
             target=self.serve_forever, kwargs={"poll_interval": _POLL_S}, name=self.name, daemon=True
         )
@@ -150,7 +150,7 @@ class Server(socketserver.ThreadingTCPServer):
         self.server_close()
 
     def __enter__(self) -> Self:
-        """Begin to answer."""
+        """Start to serve requests."""
         self.start()
         return self
 
@@ -160,32 +160,32 @@ class Server(socketserver.ThreadingTCPServer):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop answering and free the address."""
+        """Stop serving requests and free the address."""
         self.close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection a thread, or close it if there is no place for it."""
+        """Start a thread for a connection, or close the connection if no slot is available for it."""
         if self.places.take(request, client_address[0]):
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answer one connection."""
+        """Serve one connection."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self.places.leave(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
-        """Log an error of a route; a client that goes away is none."""
+        """Log an error of a route; a client that disconnects is not logged."""
         error = sys.exception()
         if not isinstance(error, OSError):
             log.error("%s: a request failed: %r", self.name, error)
 
 
 def _is_every(host: str) -> bool:
-    """Return whether a host stands for every address; a name does not."""
+    """Return whether a host is an IP address that stands for every address; a host name never does."""
     try:
         return ipaddress.ip_address(host).is_unspecified
     except ValueError:
@@ -193,12 +193,12 @@ def _is_every(host: str) -> bool:
 
 
 def _every_host() -> str:
-    """Return the host that stands for every address; nodes may have IPv6 switched off in the kernel."""
+    """Return the host that stands for every address: IPv4 if IPv6 is disabled in the node's kernel."""
     return str(ipaddress.IPv6Address(0) if socket.has_dualstack_ipv6() else ipaddress.IPv4Address(0))
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """One request, by the routes of its server."""
+    """Handles one request, by the routes of its server."""
 
     def setup(self) -> None:
         super().setup()
@@ -241,7 +241,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(error_response(HTTPStatus.NOT_FOUND, f"path: is not one of {known}"))
 
     def _called(self, route: Route, body: bytes) -> Response:
-        """Return the answer of a route; meanwhile the connection keeps its place."""
+        """Return the response of a route; until then the connection keeps its slot."""
         self._server.places.answering(self.connection, now=True)
         try:
             return route(body)

@@ -1,4 +1,4 @@
-"""Starting a program sooner: importing without optional dependencies and without garbage collections."""
+"""Faster imports: without an optional dependency, and without garbage collection."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from importlib import import_module
 
 
 def import_without(dependency: str, module: str) -> None:
-    """Import a module as if its optional dependency were not installed; later imports find it again.
+    """Import a module as if its optional dependency were not installed; later imports find the dependency.
 
-    It has no effect if one of the two is imported already.
+    This has no effect if the module or the dependency is already imported.
     """
     if dependency not in sys.modules and module not in sys.modules:
-        sys.modules[dependency] = None  # type: ignore[assignment]  # so Python documents how to forbid an import
+        sys.modules[dependency] = None  # type: ignore[assignment]  # Python's way to forbid an import
         try:
             import_module(module)
         finally:
@@ -24,10 +24,11 @@ def import_without(dependency: str, module: str) -> None:
 
 @contextmanager
 def without_collections() -> Iterator[None]:
-    """Collect no garbage while the block imports modules, and leave them out of all later collections.
+    """Collect no garbage while the block imports modules, and exclude these objects from later collections.
 
-    Imports make hundreds of thousands of objects that stay. Looking through them again and again takes a
-    sixth of the time to import PyTorch. If the block imports nothing new, later collections are as before.
+    Imports create hundreds of thousands of permanent objects. If the collector scans them repeatedly, that
+    takes a sixth of the time to import PyTorch. If the block imports nothing new, later collections are as
+    before.
     """
     imported = len(sys.modules)
     gc.disable()

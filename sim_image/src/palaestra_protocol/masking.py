@@ -1,8 +1,8 @@
-"""Texts that leave a process, without the passwords that addresses in them have."""
+"""Mask the passwords in the addresses of a text before it leaves the process."""
 
 import re
 
-# What stands between the scheme and the host of an address: a user, a password, or a token.
+# The part between the scheme and the host of an address: a user, a password, or a token.
 _USER_INFORMATION = re.compile(r"(?<=://)[^\s/?#]{1,4096}@")
 MASK = "***@"
 

@@ -1,11 +1,12 @@
 """Families of metrics, as data.
 
 Each program declares its families in one table, from which its /metrics and docs/reference/metrics.md are
-generated. So the page always equals the served metrics, and the number of a program's series can be computed.
+generated. So the page always matches the exported metrics, and the number of a program's series can be
+computed.
 
-Frequent events, thousands a second, are counted in plain Python (`Tally`) and read at a scrape. That takes a
-tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond, and more than one to find
-a label's child.
+Frequent events, thousands a second, are counted in plain Python (`Tally`) and read at a scrape. Counting one
+takes a tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond, and over one to
+find the child of a label.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ PREFIX = "palaestra_"
 
 
 class MetricType(StrEnum):
-    """Types of Prometheus."""
+    """The metric types of Prometheus."""
 
     COUNTER = "counter"
     GAUGE = "gauge"
@@ -36,8 +37,8 @@ class Label:
 
     Attributes:
         name: as in PromQL.
-        values: all possible ones; empty: they depend on job or cluster.
-        bound: the thing that has one value each, in words, if `values` is empty.
+        values: all possible ones; empty if they depend on the job or the cluster.
+        bound: if `values` is empty, the kind of object that has one value each, in words.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Family:
     Attributes:
         name: as exported, with its unit.
         meaning: the help text.
-        labels: empty: there is one value.
+        labels: its labels; empty if the family has one value.
         buckets: upper bounds of a histogram, ascending, without the last one, infinity.
     """
 
@@ -68,11 +69,11 @@ class Family:
         return tuple(label.name for label in self.labels)
 
     def combinations(self) -> Iterator[tuple[str, ...]]:
-        """Yield every combination of label values; none if a label's values are not known beforehand."""
+        """Yield every combination of label values; nothing if a label's values are not known in advance."""
         yield from product(*(label.values for label in self.labels))
 
     def series(self, sizes: Mapping[str, int]) -> int:
-        """Return the maximum number of series, with `sizes` for the bounds of the labels."""
+        """Return the maximum number of series; `sizes` maps the bound of a label to its number of values."""
         values = prod(sizes[label.bound] if label.bound else len(label.values) for label in self.labels)
         samples = sum(1 for _ in self.tally().samples()) if self.kind is MetricType.HISTOGRAM else 1
         return values * samples

@@ -1,4 +1,4 @@
-"""Parsers for the numbers of command-line options; they refuse invalid numbers."""
+"""Parsers for the numbers of command-line options; each raises an error for an invalid number."""
 
 from __future__ import annotations
 

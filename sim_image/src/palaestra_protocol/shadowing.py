@@ -1,13 +1,13 @@
 """A user's modules, and the modules of Python and of Palaestra's dependencies that they shadow.
 
-PYTHONPATH and the folder of a script come before the standard library. All libraries then import a `queue.py`
-in them in place of Python's own, and fail with a traceback that does not name the file.
+PYTHONPATH and the folder of a script come before the standard library. If they hold a `queue.py`, all
+libraries import it in place of Python's own, and fail with a traceback that does not name the file.
 
-Programs that run no code of the user import from such folders last. Other programs are refused, as the user's
-code may need its own `queue` and the libraries need Python's.
+Programs that run no code of the user import from such folders last. Other programs exit with an error: the
+user's code may need its own `queue`, while the libraries need Python's.
 
-This module runs before it is known what is shadowed. So it imports only modules that Python has built in or
-frozen, until no module of the standard library is shadowed.
+This module runs before the shadowed modules are known. Until it is clear that no module of the standard
+library is shadowed, it imports only built-in and frozen modules.
 """
 
 import os
@@ -18,7 +18,7 @@ from _frozen_importlib_external import PathFinder
 _WITH_CODE_OF_USERS = ("palaestra-train", "palaestra-eval", "palaestra-export")
 _WRONG_INPUT = 2
 _OURS = ("palaestra", "palaestra-sim", "palaestra-trainer")
-# Modules that no metadata names: ours in a checkout, the distribution's, and webots_ros, which we make.
+# Modules that no metadata names: ours in a checkout, the distribution's, and webots_ros, which we generate.
 _UNNAMED = (
     *("palaestra", "palaestra_protocol", "palaestra_sim", "palaestra_trainer"),
     *("rospy", "rosgraph", "rosmaster", "roslib", "rospkg", "genpy", "genmsg", "catkin_pkg", "webots_ros"),
@@ -27,7 +27,7 @@ _UNNAMED = (
 
 
 def settle_imports() -> None:
-    """Make this process import the modules that it needs; our packages call this before they import others.
+    """Make imports in this process find the right modules; our packages call this before other imports.
 
     Raises:
         ImportError: a module of the user shadows another one.
@@ -38,7 +38,7 @@ def settle_imports() -> None:
         _import_last(_ahead())
         return
     if program in _WITH_CODE_OF_USERS and not sys.flags.safe_path:
-        _put_last(sys.path[:1])  # the folder of the program itself
+        _put_last(sys.path[:1])  # the folder of the script itself
     folders = _ahead()
     reasons = [reason for name, reason in _shadows(folders, _others(folders)) if not _loaded(name, folders)]
     if reasons and program in _WITH_CODE_OF_USERS:
@@ -76,18 +76,18 @@ def _ahead() -> list[str]:
 
 
 def _import_last(folders: list[str]) -> None:
-    """Import from these folders last, and forget modules that the start of Python has imported from them."""
+    """Import from these folders last, and unload modules that Python's startup imported from them."""
     _put_last(folders)
     others = _others(folders)
     for name, file, _ in [each for folder in folders for each in _hidden(folder, others)]:
         if name in sys.modules and getattr(sys.modules[name], "__file__", None) == file:
             _forget(name)
         if name in sys.stdlib_module_names and _spec(name, others) is None:
-            vars(sys)["modules"][name] = None  # its import fails, as it should here
+            vars(sys)["modules"][name] = None  # this system lacks the module, so its import must fail
 
 
 def _forget(name: str) -> None:
-    """Let the next import load a module anew, and with it those of the standard library that hold it."""
+    """Unload a module and the standard library modules that reference it; the next import reloads them."""
     module = sys.modules.pop(name)
     library = os.path.dirname(os.__file__)
     for other, holder in list(sys.modules.items()):
@@ -105,14 +105,14 @@ def _others(folders: list[str]) -> list[str]:
 
 
 def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
-    """Return each shadowed module, and a line with file, fact and remedy."""
+    """Return the name of each shadowed module, and a line with file, fact and remedy."""
     found = [each for folder in folders for each in _hidden(folder, others)]
     library = [
         (name, f"{file}: shadows the module {name} of Python's standard library; rename it")
         for name, file, _ in found
         if name in sys.stdlib_module_names
     ]
-    # What follows imports much of the standard library.
+    # `_is_needed` imports much of the standard library, so it must not run before the library is checked.
     return library or [
         (name, f"{file}: shadows the module {name}, which Palaestra needs; rename it")
         for name, file, folder in found
@@ -129,7 +129,7 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
     found = []
     for name in sorted(filter(str.isidentifier, names)):
         mine, other = _spec(name, [folder]), _spec(name, others)
-        if not (mine and mine.origin):  # a folder without `__init__.py` shadows nothing
+        if not (mine and mine.origin):  # a folder without `__init__.py` does not shadow a module
             continue
         # The library tries to import some modules that a system lacks, such as msvcrt, to recognize it.
         if name in sys.stdlib_module_names if other is None else not _same(mine.origin, other.origin):
@@ -138,7 +138,7 @@ def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
 
 
 def _spec(name: str, folders: list[str]) -> ModuleSpec | None:
-    """Return the description of a module in these folders; None also if it is built into Python."""
+    """Return the import spec of a module in these folders; None also for a module built into Python."""
     if BuiltinImporter.find_spec(name) or FrozenImporter.find_spec(name):
         return None
     return PathFinder.find_spec(name, folders)
@@ -156,12 +156,12 @@ def _loaded(name: str, folders: list[str]) -> bool:
 
 
 def _holds_installed(folder: str) -> bool:
-    """Return whether a folder holds installed packages: somebody has chosen their versions."""
+    """Return whether a folder holds installed packages; their versions were chosen on purpose."""
     return any(name.endswith((".dist-info", ".egg-info")) for name in os.listdir(folder or os.curdir))
 
 
 def _is_needed(name: str, folders: list[str]) -> bool:
-    """Return whether a module is from a package that ours need, directly or by another one."""
+    """Return whether a module belongs to a package that ours need, directly or indirectly."""
     from importlib.metadata import distributions
 
     installed = {_normal(each.name): each for each in distributions(path=folders)}

@@ -1,14 +1,14 @@
-"""Which signals a program obeys, at every end alike."""
+"""Select the signals that a program handles, with the same rule for every program."""
 
 import signal
 from collections.abc import Iterable
 
 
 def obeyed(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
-    """Return those of the signals that may get a handler: SIGTERM, and those that are not ignored.
+    """Return the signals that may get a handler: SIGTERM, and those that are not ignored.
 
-    A signal that was ignored when the program started stays ignored: SIGINT of a command in the background of
-    a script, SIGHUP under nohup.
+    A signal that was ignored when the program started stays ignored. Examples are SIGINT for a background
+    command of a script, and SIGHUP under nohup.
     """
     return [
         number

@@ -1,6 +1,6 @@
-"""A simulator as a program: its command line, and the life of its process.
+"""A simulator as a program: its command line, and the lifecycle of its process.
 
-Every simulator that is made of the front and the scene is this program, with a physics of its own.
+Every simulator that uses `ros_controller` and `scene` is an instance of `Program`, with its own physics.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ _WRONG_WORLD = 2
 _NO_MASTER = 1
 
 _EPILOG = """\
-Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes
-what it leaves out into the file PALAESTRA_SIMULATOR_LEFT_OUT, if that is set; a sidecar sets it.
+Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. If
+PALAESTRA_SIMULATOR_LEFT_OUT is set, as by a sidecar, writes the nodes that it leaves out into that file.
 
 faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/reference/faults.md has them.
-PALAESTRA_STUB_FAULTS takes them with blanks between, PALAESTRA_STUB_FAULT_SEED what --fault-seed does,
-PALAESTRA_SIMULATOR_START what --fault-life does.
+PALAESTRA_STUB_FAULTS holds faults with spaces between, PALAESTRA_STUB_FAULT_SEED the value of --fault-seed,
+PALAESTRA_SIMULATOR_START the value of --fault-life.
 
-exit codes: 0 after SIGTERM; what `simulation_quit` says; 1 the ROS master does not answer, or not any more;
-2 the world or the options cannot be used; what a fault says
+exit codes: 0 after SIGTERM; the status of `simulation_quit`; 1 the ROS master does not respond, or no longer;
+2 the world or the options cannot be used; the code that a fault names
 """
 
 
@@ -63,8 +63,8 @@ class Program:
         name: of the program.
         description: for its help.
         physics: returns the physics of a world that is about to be read.
-        mjcf: returns the simulation of an MJCF world, whose files are in a folder or, with None, in the
-            nearest one that holds them all; None: it simulates none.
+        mjcf: returns the simulation of an MJCF world. Its files are in the given folder or, with None, in the
+            nearest folder that holds them all. None if the program does not simulate MJCF.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Program:
         try:
             return self._check(options) if options.check else self._simulate(options)
         except WorldRefusedError as error:
-            # A sidecar reports the last line alone.
+            # A sidecar reports only the last line.
             sys.stderr.write(f"{error}\n{self.name}: {error.summary}\n")
         except SimError as error:
             sys.stderr.write(f"{self.name}: {error}\n")
@@ -94,9 +94,10 @@ class Program:
         return _WRONG_WORLD
 
     def _check(self, options: argparse.Namespace) -> int:
-        """Print what becomes of the world; return 0 if it can be started with these options.
+        """Print the summary of the world; return 0 if it can be started with these options.
 
-        Without --leave-out, everything is left out that the simulator lacks, so that all of it is named.
+        Without --leave-out, all nodes that the simulator does not support are left out, so that all are
+        listed.
         """
         chosen = _leave_out(options.leave_out) if options.leave_out else LeaveOut(everything=True)
         load = self._loader(options, replace(chosen, names=True))
@@ -109,7 +110,7 @@ class Program:
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
 
     def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Load:
-        """Return what loads a world, which is MJCF if it begins with `<`."""
+        """Return the function that loads a world; a file that begins with `<` is MJCF."""
         wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
 
         def load(world_path: Path, mode: Mode) -> Backend:
@@ -123,7 +124,7 @@ class Program:
 
 
 class _Process:
-    """The loop, the nodes in it, and the simulator between them."""
+    """The event loop, its ROS nodes, and the simulator that connects them."""
 
     def __init__(self, options: argparse.Namespace, load: Load) -> None:
         self._ordered = faults.read_options(options, os.environ)
@@ -161,12 +162,12 @@ class _Process:
         return self._exit_code
 
     def end(self, status: int) -> None:
-        """Let `run` return that exit code, once everything is closed in good order."""
+        """Let `run` return that exit code after everything is closed in order."""
         self._exit_code = status
         self._loop.stop()
 
     def lose_master(self) -> None:
-        """End as if the ROS master did not answer any more."""
+        """Exit as if the ROS master no longer responded."""
         log.warning("no ROS master at %s: a fault", self._master_uri)
         for node in self._nodes.values():
             if isinstance(node, faults.FaultyNode):
@@ -174,12 +175,12 @@ class _Process:
         self.end(_NO_MASTER)
 
     def lose_names(self) -> None:
-        """Let the master forget every name, and go on."""
+        """Unregister every name at the master, and continue."""
         for name in self._simulator.controllers:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        self._report_left_out()  # its sidecar reads the report once the simulator answers
+        self._report_left_out()  # first, because a sidecar reads the file when the simulator is ready
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)
         if silent:
@@ -197,7 +198,7 @@ class _Process:
             write_left_out(left_out, Path(file))
 
     def _start_as_ordered(self, course: faults.FaultState) -> None:
-        """Start with the faults of a course: late, or not at all."""
+        """Start with the faults of a fault state: late, or not at all."""
         log.info("faults: %s", self._ordered)
         refused, delay_s = course.start()
         if refused is None:
@@ -207,7 +208,7 @@ class _Process:
             self._loop.later(0.0, lambda: self.end(refused.code))
 
     def _node_maker(self) -> Callable[[str], RosNode]:
-        """Return what makes the node of a name: a plain one, unless faults are ordered."""
+        """Return the function that makes the node of a name: a plain node, unless faults are given."""
         if self._course is None:
             return partial(RosNode, self._loop, master_uri=self._master_uri)
         failing = faults.Failing(course=self._course, effects=faults.ProcessFaults(self))
@@ -220,14 +221,14 @@ class _Process:
         return node
 
     def _lose(self, name: str, reason: str) -> None:
-        """End one controller whose node was shut down; the simulation goes on without it."""
+        """End one controller whose node was shut down; the simulation continues without it."""
         log.warning("the node %s was shut down (%s); its robot has no controller any more", name, reason)
         controller = self._simulator.controllers.pop(name, None)
         if controller is not None:
             controller.close()
 
     def _check_master(self) -> None:
-        """End when the master is gone: its names are lost, and a controller would end too."""
+        """Exit if the master is gone, because it has lost the names; Webots' controller exits too."""
         for name in self._simulator.controllers:
             try:
                 self._nodes[name].check_master()
@@ -248,10 +249,10 @@ def _parser(program: Program) -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--version", action="version", version=version("palaestra-sim"))
     add("world", type=Path, help="the file to load: .wbt, or .xml for MuJoCo")
-    add("--check", action="store_true", help="print what becomes of the world, and start nothing")
-    add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
-    add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")
-    add("--publish-delay-ms", type=milliseconds, default=0.0, help="from the end of a step to its messages")
+    add("--check", action="store_true", help="print a summary of the world and exit")
+    add("--mode", choices=_MODES, default="fast", help="simulation mode at the start (default: %(default)s)")
+    add("--step-sleep-ms", type=milliseconds, default=0.0, help="minimum real time of each step")
+    add("--publish-delay-ms", type=milliseconds, default=0.0, help="delay of the messages after a step")
     add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
     add(
         "--stand-ins",
@@ -259,31 +260,31 @@ def _parser(program: Program) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="a table of PROTOs that are simulated as simple solids, beside those that ship; repeatable",
+        help="a table of PROTOs to simulate as simple solids, in addition to the built-in ones; repeatable",
     )
     add(
         "--leave-out",
         action="append",
         default=[],
         metavar="TYPE",
-        help=f"leave out nodes of this type that cannot be simulated, or {_ALL} of them; repeatable",
+        help=f"leave out nodes of this type if they cannot be simulated; {_ALL}: of any type; repeatable",
     )
     if program.mjcf is not None:
         add(
             "--root",
             type=Path,
             metavar="DIR",
-            help="folder that holds all files that a model of MuJoCo names (default: the nearest such one)",
+            help="folder that holds all files that an MJCF model names (default: the nearest such one)",
         )
     faults.add_options(add)
     return parser
 
 
 def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
-    """Return the entries of these files; the last of a name counts.
+    """Return the entries of these files; of two entries with one name, the last counts.
 
     Raises:
-        StandInError: a file is no such table.
+        StandInError: a file is not a valid table of stand-ins.
         OSError: it cannot be read.
     """
     table: dict[str, StandIn] = {}

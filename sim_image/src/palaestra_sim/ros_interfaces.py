@@ -1,6 +1,6 @@
-"""The ROS node that a controller needs, as a Protocol, and services before they have a node.
+"""The ROS node that a controller needs, as a Protocol, and services that do not yet belong to a node.
 
-The wire is in `ros`; nothing here needs a socket.
+The wire protocol is in `ros`; nothing here needs a socket.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Row = tuple[str, str, Handler]  # of a table of services: last part of the path,
 
 
 class UnsimulatedError(SimError, NotImplementedError):
-    """Webots does what the request asks for, and this simulator does not."""
+    """Webots supports the request, but this simulator does not."""
 
 
 class Service(NamedTuple):
-    """One service: its path below the node's name, its type, and the function that answers."""
+    """One service: its path relative to the node's name, its type, and its handler."""
 
     path: str
     type_name: str
@@ -44,7 +44,7 @@ class PublisherInterface(Protocol):
     def send_value(self, value: Any) -> None:
         """Send a message stamped with the wall clock: the template, and `value` in its last field.
 
-        A field of several numbers takes a tuple of them.
+        If the field has several numbers, `value` is a tuple of them.
         """
         ...
 
@@ -58,8 +58,8 @@ class NodeInterface(Protocol):
 
     Attributes:
         name: of the node.
-        blocked: returns whether requests have to wait; called before each.
-        current_call: identifies the request that is being handled, for `answer`.
+        blocked: returns whether requests have to wait; called before each request.
+        current_call: identifies the request in progress, for `answer`.
     """
 
     name: str
@@ -67,11 +67,11 @@ class NodeInterface(Protocol):
     current_call: object | None
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Answer a service with what `handler` returns for a request, or later if that is LATER."""
+        """Serve a service; `handler` returns the response to a request, or LATER to send it later."""
         ...
 
     def together(self) -> AbstractContextManager[None]:
-        """Make the services and topics of a block known at its end, all at once and in their order."""
+        """Register the services and topics of a block together at its end, in their order."""
         ...
 
     def advertise(
@@ -83,19 +83,19 @@ class NodeInterface(Protocol):
         template: Fields | None = None,
         reading: str = "",
     ) -> PublisherInterface:
-        """Return a publisher of a topic, relative or with a leading slash; `reading` has the value."""
+        """Return a publisher of a topic, relative or with a leading slash; `reading` is the value's field."""
         ...
 
     def withdraw(self, publisher: Any) -> None:
-        """Take a publisher back."""
+        """Withdraw a publisher: its topic ends."""
         ...
 
     def answer(self, call: Any, fields: Fields) -> None:
-        """Answer a call whose handler returned LATER."""
+        """Send the response to a call whose handler returned LATER."""
         ...
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Call back after a delay; 0 is after the answer of the present call was sent."""
+        """Call back after a delay; 0 means after the response of the current call was sent."""
         ...
 
     def close(self) -> None:
@@ -109,14 +109,14 @@ def topic_name(name: str) -> str:
 
 
 def as_ros_name(name: str) -> str:
-    """Return a name with an underscore in the place of each character that `is_ros_name` refuses."""
+    """Return a name in which each character that `is_ros_name` refuses is an underscore."""
     return "/".join(_ILLEGAL.sub("_", part) for part in name.split("/") if part) or "_"
 
 
 def is_ros_name(name: str) -> bool:
-    """Return whether ROS takes a name as a part of paths, in the form that the controller gives it.
+    """Return whether ROS accepts a name as a part of paths, in the form that the controller gives it.
 
-    The controller ends at a name that ROS refuses.
+    Webots' controller exits at a name that ROS refuses.
     """
     return _LEGAL.fullmatch(topic_name(name)) is not None
 

@@ -94,11 +94,11 @@ def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path
     with ExitStack() as stack:
         run = stack.enter_context(subprocess.Popen(["sleep", "600"]))
         stack.callback(run.kill)
-        keeper = stack.enter_context(owner("shared", str(folder), str(run.pid)))
-        started = eventually(lambda: set((found := children(keeper.pid)).values()) >= FIRST and found)
+        restarter = stack.enter_context(owner("shared", str(folder), str(run.pid)))
+        started = eventually(lambda: set((found := children(restarter.pid)).values()) >= FIRST and found)
         run.kill()
         run.wait()
-        keeper.wait(60)
+        restarter.wait(60)
 
     assert all_gone(started)
     assert not folder.exists()

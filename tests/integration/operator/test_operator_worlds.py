@@ -22,10 +22,10 @@ FINE = GivenWorld(field=FIELD, source=costly(20_000))
 REMEDY = "make the world smaller, or put it into the image and name it with world.file"
 PARENT = """
 import sys
-from palaestra.operator.world_check_process import Apart
+from palaestra.operator.world_check_process import WorldCheckProcess
 from palaestra.plan import GivenWorld
 from tests.bench.hostile import costly
-Apart(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_000_000))])
+WorldCheckProcess(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_000_000))])
 """
 
 

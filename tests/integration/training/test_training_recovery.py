@@ -45,7 +45,7 @@ class Trained:
     """One simulator in a vector environment, started.
 
     Attributes:
-        keeper: of the simulator.
+        restarter: of the simulator.
         restarts: how many there were.
     """
 
@@ -53,11 +53,11 @@ class Trained:
         self._sidecar = sidecar
         self.restarts = Restarts()
         simulator = Simulator("collect-0", sidecar, make, 20.0)
-        self.keeper = Restarter(simulator, RestartLimit(restarts=20), self.restarts)
-        self.keeper.begin_start()
-        await_one([self.keeper])
-        assert self.keeper.up()
-        self.env = SimulatorsVecEnv([self.keeper], 0)
+        self.restarter = Restarter(simulator, RestartLimit(restarts=20), self.restarts)
+        self.restarter.begin_start()
+        await_one([self.restarter])
+        assert self.restarter.up()
+        self.env = SimulatorsVecEnv([self.restarter], 0)
         self.env.reset()
         self.step()
 
@@ -89,7 +89,7 @@ class Trained:
     def close(self):
         """End everything."""
         self.env.close()
-        self.keeper.stop()
+        self.restarter.stop()
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
 def left():
     """Return the threads of this process, and the numbers of its descriptors and child processes."""
     for thread in threading.enumerate():
-        if thread.name.startswith("keeper-"):
+        if thread.name.startswith("restarter-"):
             thread.join(PATIENCE_S)
     descriptors = list(Path("/proc/self/fd").iterdir())
     tasks = Path("/proc/self/task").iterdir()
@@ -165,9 +165,9 @@ def test_ending_amid_a_start_waits_for_nobody(train):
     trained = train(options=["--fault=slow_start:start=2,latency_ms=600000"])
     trained.break_by(signal.SIGKILL)
 
-    settle([trained.keeper])
+    settle([trained.restarter])
 
-    assert not trained.keeper.busy
+    assert not trained.restarter.busy
 
 
 class OwnSidecar:
@@ -217,9 +217,9 @@ def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
     trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
     own_sidecar.kill()
     assert trained.fault()["kind"] == "dead"
-    assert trained.keeper.busy
+    assert trained.restarter.busy
     with pytest.raises(SimulatorDead):
-        trained.keeper.member.sidecar.state()
+        trained.restarter.member.sidecar.state()
 
     own_sidecar.start()
 
@@ -235,4 +235,4 @@ def test_ending_does_not_wait_for_a_sidecar_that_is_gone(train, own_sidecar):
 
     trained.close()
 
-    assert not trained.keeper.busy
+    assert not trained.restarter.busy

@@ -28,10 +28,10 @@ class Rested:
 
         self.launcher = ProcessLauncher("arena")
         self.simulator = Simulator("collect-0", self.launcher, make, PATIENCE_S)
-        self.keeper = Restarter(self.simulator)
-        self.keeper.begin_start()
-        await_one([self.keeper])
-        self.env = SimulatorsVecEnv([self.keeper], 0)
+        self.restarter = Restarter(self.simulator)
+        self.restarter.begin_start()
+        await_one([self.restarter])
+        self.env = SimulatorsVecEnv([self.restarter], 0)
         self.env.reset()
 
     def step(self):
@@ -41,7 +41,7 @@ class Rested:
     def close(self):
         """End everything."""
         self.env.close()
-        self.keeper.stop()
+        self.restarter.stop()
         self.launcher.close()
 
 

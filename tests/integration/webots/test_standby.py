@@ -262,17 +262,17 @@ def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandone
     held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
     it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
-    keeper = Restarter(it.member, RestartLimit(restarts=1000))
-    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
+    restarter = Restarter(it.member, RestartLimit(restarts=1000))
+    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
     give_up = time.monotonic() + PATIENCE_S
     while it.first.sidecar.state().starts < 2:
         assert time.monotonic() < give_up
         time.sleep(0.01)
 
     begin = time.monotonic()
-    settle([keeper])
+    settle([restarter])
 
-    assert not keeper.busy
+    assert not restarter.busy
     assert time.monotonic() - begin < LONG_S
 
 

@@ -69,7 +69,7 @@ def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, w
 
     launcher = ProcessLauncher(world(source))
     simulator = Simulator("collect-0", launcher, make, DEADLINE_S)
-    keeper = Restarter(simulator)
+    restarter = Restarter(simulator)
     pids = []
     start = simulator.start
 
@@ -81,15 +81,15 @@ def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, w
 
     simulator.start = start_and_count
     try:
-        keeper.begin_start()
-        await_one([keeper])
+        restarter.begin_start()
+        await_one([restarter])
 
         with pytest.raises(ConfigurationError, match=f"collect-0: robotino: {fact}"):
-            keeper.up()
+            restarter.up()
 
         assert len(set(pids)) == 2
     finally:
-        keeper.stop()
+        restarter.stop()
         launcher.close()
 
 

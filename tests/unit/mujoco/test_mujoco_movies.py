@@ -103,10 +103,10 @@ def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
-        from palaestra_sim.mujoco.video import MujocoFilm
+        from palaestra_sim.mujoco.video import MujocoVideo
         from palaestra_sim.scene.movies import Movie
         names = [f"{tmp_path}/{{name}}.mp4" for name in ("drive", "drive-2")]
-        films = [MujocoFilm(Movie(path=it, size={SIZE}, quality=100, acceleration=1)) for it in names]
+        films = [MujocoVideo(Movie(path=it, size={SIZE}, quality=100, acceleration=1)) for it in names]
         os.kill(os.getpid(), signal.SIGKILL)"""
     subprocess.run([sys.executable, "-c", code], check=False, timeout=60)
     other = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)

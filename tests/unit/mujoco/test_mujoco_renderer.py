@@ -289,13 +289,13 @@ def test_a_camera_and_a_range_finder_save_what_they_see(load, tmp_path):
 HASH = """import hashlib
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.camera_interface import Lens
-from palaestra_sim.scene.frames import Place
+from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.world import builtin
 physics = MujocoPhysics()
 Simulation.load(builtin("arena"), physics)
-place = Place(None, (-1.5, -1.5, 0.5), (0.0, 0.0, 1.0, 0.8))
-eye = physics.eye(place, Lens(size=(160, 120), field_of_view_rad=1.2, near_m=0.01))
+frame = Frame(None, (-1.5, -1.5, 0.5), (0.0, 0.0, 1.0, 0.8))
+eye = physics.eye(frame, Lens(size=(160, 120), field_of_view_rad=1.2, near_m=0.01))
 print(hashlib.sha256(eye.colors()).hexdigest(), hashlib.sha256(eye.depths(0.0, 0.0)).hexdigest())
 """
 

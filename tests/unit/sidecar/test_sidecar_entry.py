@@ -20,5 +20,5 @@ def test_signals_are_held_back_before_anything_else_is_imported():
 
     deciding = ["palaestra_protocol", "palaestra_protocol.shadowing"]
     package = "palaestra_sim.sidecar"
-    starting = ["palaestra_sim", package, f"{package}.blocked", f"{package}.entry"]
+    starting = ["palaestra_sim", package, f"{package}.blocked_signals", f"{package}.entry"]
     assert json.loads(said.stdout) == [*deciding, *starting]

@@ -94,7 +94,7 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
     [
         (cli.train, [], "PALAESTRA_CONFIG: is not set"),
         (cli.train, ["--config", "training.yaml"], "training.yaml: cannot be read"),
-        (cli.evaluate, ["run"], "run/attempt.yaml: cannot be read"),
+        (cli.evaluate, ["run"], "run/training.yaml: cannot be read"),
     ],
 )
 def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, capsys, monkeypatch, tmp_path):

@@ -32,20 +32,20 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
 
 
 def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> FaultTolerantEnv:
-    """Return a gymnasium.Env in a simulator of its own, for a training loop of any library.
+    """Return a gymnasium.Env in its own simulator, for a training loop of any library.
 
     A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
-    `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is mended, within its restart
-    budget.
+    `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is restarted, within its
+    restart budget.
 
-    The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
-    none, it is a free one of PALAESTRA_CONFIG. Without that variable, as in a notebook, one is started: a
-    stub, or MuJoCo for `SeeTarget-v0`.
+    The simulator is that of the newest `Webots` facade of this process that no environment uses, else a free
+    simulator of PALAESTRA_CONFIG. If that variable is not set, as in a notebook, a new simulator is started:
+    a stub, or MuJoCo for `SeeTarget-v0`.
 
     Args:
-        environment: its id; by default the environment of PALAESTRA_CONFIG.
+        environment: id of the environment; by default the environment of PALAESTRA_CONFIG.
         role: the role of the simulator in PALAESTRA_CONFIG, `Collect` or `Evaluate`.
-        options: of the environment.
+        options: options of the environment.
 
     Raises:
         ConfigurationError: the environment is missing or wrong, or no simulator with the role is free.
@@ -62,11 +62,11 @@ def make_vec_env(
     """Return a gymnasium VectorEnv whose simulators step at the same time; see `make_env`.
 
     Episodes are reset in their last step (`AutoresetMode.SAME_STEP`). After a fault, that step waits until
-    the simulator is mended, and the other simulators wait with it.
+    the simulator is restarted, and the other simulators wait with it.
 
     Args:
         environment: see `make_env`.
-        num_envs: how many simulators; by default all of the role in PALAESTRA_CONFIG, else one.
+        num_envs: number of simulators; by default all with this role in PALAESTRA_CONFIG, else one.
         role: see `make_env`.
         options: see `make_env`.
 
@@ -101,11 +101,11 @@ def report(*, step: int, success_rate: float | None = None) -> None:
     """Report the progress of your own training program to /status, /metrics and the operator.
 
     Call it at least once every `stallDeadlineSeconds`. After the first report, the operator ends a program
-    whose step stays the same for longer. Without PALAESTRA_CONFIG (as in a notebook) it does nothing.
+    whose step stays the same for longer. If PALAESTRA_CONFIG is not set, as in a notebook, it does nothing.
 
     Args:
         step: environment steps learned from, over all attempts; the program is complete at the job's `steps`.
-        success_rate: of the last evaluation, 0 to 1; None keeps the previous value.
+        success_rate: success rate of the last evaluation, 0 to 1; None keeps the previous value.
 
     Raises:
         ValueError: the step is negative, or the rate not within 0 to 1.

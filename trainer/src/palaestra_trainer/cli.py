@@ -14,7 +14,8 @@ from typing import Any
 
 from palaestra_protocol.imports import import_without, without_collections
 
-import_without("rich", "structlog")  # it would format tracebacks with it, which the log has as plain text
+# With rich, structlog would format tracebacks, but the log has them as plain text.
+import_without("rich", "structlog")
 
 import structlog
 
@@ -90,7 +91,7 @@ exit codes:
   130 ended by Ctrl-C; nothing is written
   1   any other error; a retry may help
 """
-LEFT_S = 10.0  # for what libraries do at the exit of Python, such as an upload
+LEFT_S = 10.0  # for the work of libraries at the exit of Python, such as an upload
 KEYBOARD_INTERRUPT = 130  # the exit status that shells give a process ended by SIGINT
 
 
@@ -110,7 +111,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
     except (TrainerError, OSError) as error:
         return _refuse(error)
     with leaving_when_asked():
-        # Imported here, so that a wrong configuration is reported at once, not after seconds of imports.
+        # The imports are here so that a wrong configuration is reported at once, not seconds later.
         with without_collections():
             from palaestra_trainer.run import attempt
             from palaestra_trainer.simulators.connect import connect_members
@@ -126,7 +127,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
 
 
 def train_and_leave() -> int:
-    """Run `palaestra-train` as a program: it ends soon, also if a thread of the job's code goes on."""
+    """Run `palaestra-train` as a program that ends soon, even if a thread of the job's code still runs."""
     code = train()
     end_undisturbed()
     return _leaving(code)
@@ -155,7 +156,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
 
 
 def evaluate_and_leave() -> int:
-    """Run `palaestra-eval` as a program: it ends soon, also if a thread of the job's code goes on."""
+    """Run `palaestra-eval` as a program that ends soon, even if a thread of the job's code still runs."""
     return _leaving(evaluate())
 
 
@@ -179,7 +180,7 @@ def export(arguments: Sequence[str] | None = None) -> int:
 
 
 def export_and_leave() -> int:
-    """Run `palaestra-export` as a program: it ends soon, also if a thread of the job's code goes on."""
+    """Run `palaestra-export` as a program that ends soon, even if a thread of the job's code still runs."""
     return _leaving(export())
 
 

@@ -1,8 +1,8 @@
-"""Import PyTorch's compiler only where something is compiled: a second of a processor at each start.
+"""Import PyTorch's compiler only if something is compiled; this saves a second of processor time per start.
 
 The first optimizer of a program imports `torch._dynamo`, and SymPy with it, to call `disable` and
-`graph_break`, which have no effect where nothing is compiled. Here a stand-in has these two. It gives way to
-the compiler itself as soon as a program uses any other part of it, as `torch.compile` does.
+`graph_break`. Without compiled code these two have no effect, so a stand-in provides them. As soon as a
+program uses any other part, as `torch.compile` does, the compiler itself replaces the stand-in.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from types import ModuleType
 from typing import Any
 
 NAME = "torch._dynamo"
-_ANSWER = "__dynamo_disable"  # where PyTorch keeps the answer of `disable` for a function
+_ANSWER = "__dynamo_disable"  # the attribute of a function in which PyTorch keeps the result of `disable`
 
-_OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}  # and who calls them
+# Each function of the stand-in, and the module of PyTorch that calls it.
+_OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}
 
 
 def defer_compiler() -> None:
@@ -41,16 +42,17 @@ class _StandIn(ModuleType):
         return fn
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):  # asked of every module by programs that look through all of them
+        if name.startswith("__"):  # programs that inspect all modules read such names of every module
             raise AttributeError(name)
-        # A function of a user that is disabled here must stay so when another one is compiled.
+        # If a user's function calls `disable`, it must stay disabled when another function is compiled. So
+        # only PyTorch's own calls get the stand-in.
         asks = sys._getframe(1).f_globals.get("__name__")  # noqa: SLF001 - inspect.stack reads source files
         if asks == _OF_PYTORCH.get(name):
             return getattr(self, f"_{name}")
         return getattr(self.give_way(), name)
 
     def give_way(self) -> ModuleType:
-        """Import the compiler in this place; it will be asked again about each function."""
+        """Replace this module by the compiler; PyTorch will call its `disable` again for each function."""
         if sys.modules.get(NAME) is self:
             sys.meta_path[:] = [finder for finder in sys.meta_path if not isinstance(finder, _Finder)]
             del sys.modules[NAME]
@@ -63,7 +65,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of the stand-in; for a part of the compiler, of the part once it is imported."""
+        """Return the spec of the stand-in, or that of a submodule of the compiler after its import."""
         standing = sys.modules.get(NAME)
         if fullname.startswith(f"{NAME}.") and isinstance(standing, _StandIn):
             standing.give_way()
@@ -84,14 +86,14 @@ class _LoaderOfStandIn(SourceFileLoader):
         return _StandIn(spec.name)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing: the compiler is not imported."""
+        """Do nothing, so that the compiler is not imported."""
 
 
 class _Imported(Loader):
-    """Returns a module that was imported while it was looked for."""
+    """Loads a module that was imported while its spec was searched for."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         return sys.modules[spec.name]
 
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing: it has been executed."""
+        """Do nothing, because the module has been executed already."""

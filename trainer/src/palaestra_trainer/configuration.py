@@ -1,16 +1,16 @@
-"""The training.yaml of one replica: what to train, checked as a whole.
+"""The configuration of one replica: reads and checks the whole training.yaml.
 
-The plan writes the file, and everything in this package reads it through this
-module. A wrong file is refused before anything starts. All its mistakes are
+The plan writes the file, and the modules of this package read it only through
+this one. A wrong file is refused before anything starts. All its mistakes are
 reported at once, each with field, fact and remedy. The hyperparameters of each
 algorithm are defined in `palaestra_trainer.algorithms`, not here, because
 reading a configuration must not import a learning library.
 
 Unknown fields are logged and ignored. A job may name a `trainer.image` that is
 older than the operator that writes the file, and a newer operator writes a new
-field only if the job sets it. Users' typing mistakes do not get here: the job
-is checked before the file is written. An unknown value is refused, because it
-would change the training.
+field only if the job sets it. Typing mistakes of users do not reach this
+module, because the job is checked before the file is written. An unknown value
+is refused, because it would change the training.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ DEFAULT_ROBOT = "Robotino"
 
 
 class _Section(BaseModel):
-    """A section of the file: camelCase in YAML, immutable; `parse` handles unknown fields."""
+    """A section of the file: immutable, with names in camelCase in YAML; `parse` handles unknown fields."""
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -57,7 +57,7 @@ class _Section(BaseModel):
 
 
 class Wrapper(_Section):
-    """A wrapper around the environment, see `environments.wrapping`.
+    """A wrapper around the environment, see `environments.wrappers`.
 
     Attributes:
         name: its class, as `module:Class`.
@@ -75,8 +75,8 @@ class Environment(_Section):
         id: name under which the environment is registered with gymnasium.
         reward: Dense gives a reward at each step, Sparse only at the end of an episode.
         options: keyword arguments of the environment.
-        wrappers: the first one is innermost; None: none.
-        frame_stack: how many of the newest observations are one; None: only the newest.
+        wrappers: wrappers around it, the innermost first; None: no wrappers.
+        frame_stack: number of newest observations that are stacked into one; None: no stacking.
     """
 
     id: str
@@ -120,10 +120,10 @@ class Algorithm(_Section):
     Attributes:
         name: a name in the table of algorithms, or `module:Class`.
         hyperparameters: values that differ from that table's defaults.
-        normalize: which values are normalized; None: none.
+        normalize: the values that are normalized; None: no values.
         cnn: the convolutional network for images; None: Stable-Baselines3's NatureCNN.
         policy: a policy of the algorithm, or `module:Class`; None: the one for the observation.
-        callbacks: callbacks of the job's author, in the order of their calls; None: none.
+        callbacks: callbacks of the job's author, in the order of their calls; None: no callbacks.
     """
 
     name: str = "DQN"
@@ -142,8 +142,8 @@ class Evaluation(_Section):
         episodes: episodes of one evaluation, shared among all evaluating simulators.
         stop_at_success_rate: training ends when this share (0 to 1) succeeds, in an evaluation and then in
             its confirmation.
-        confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`. None is
-            left out of the file, since a trainer of a5276f3 refuses the field.
+        confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`. The file
+            omits None, because the trainer of commit a5276f3 refuses the field.
     """
 
     every_steps: Annotated[int, Field(ge=0)] = 2500
@@ -165,11 +165,11 @@ class Checkpoint(_Section):
 
 
 class Recycle(_Section):
-    """When a healthy simulator is restarted between episodes: at the first limit that it reaches.
+    """Limits after which a healthy simulator is restarted between episodes; the first one reached counts.
 
     Attributes:
-        after_resets: resets since it came into use.
-        after_minutes: minutes since it came into use; time as a standby does not count.
+        after_resets: resets since it was taken into use.
+        after_minutes: minutes since it was taken into use; time as a standby does not count.
         above_memory_bytes: memory of all of its processes together.
     """
 
@@ -193,12 +193,12 @@ class SimulatorConfiguration(_Section):
         role: Collect gathers experience, Evaluate measures the policy.
         min_simulators: how many simulators of its group the run needs to continue; None: all of them.
         control: address of its sidecar's control port.
-        driver: how it is started: stub, mujoco, webots or command.
+        driver: the simulator program: stub, mujoco, webots or command.
         options: its command-line options.
         world: path of its generated world.
         names_prefix: readable start of the ROS names of its robots; not used.
-        standby: whether its sidecar has a second simulator that stands by for this one.
-        start_deadline_seconds: seconds within which it must answer after its start.
+        standby: whether its sidecar runs a second simulator as a standby for this one.
+        start_deadline_seconds: seconds after its start within which it must respond.
     """
 
     name: str
@@ -228,8 +228,8 @@ class Configuration(_Section):
             the newest checkpoint there.
         initial_policy: a model.zip whose policy a new run begins with; None: random weights.
         stall_deadline_seconds: the run fails after this long without an environment step.
-        robot: class of the robot, `module:Class` or a name of `robots.choosing`; None: `DEFAULT_ROBOT`. None
-            is left out of the file, since an older trainer ignores the field.
+        robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`. The
+            file omits None, because an older trainer ignores the field.
         command: the user's own program that replaces the built-in loop; not used here.
         status_address: `host:port` of /metrics, /status and /healthz.
     """
@@ -308,7 +308,8 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
 def dump(configuration: Configuration) -> str:
     """Return YAML text from which `load` reads an equal configuration."""
     content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
-    return yaml.safe_dump(content, sort_keys=False)  # ASCII: YAML takes some other characters for line ends
+    # The text is ASCII, because YAML reads some other characters as line ends.
+    return yaml.safe_dump(content, sort_keys=False)
 
 
 def nearest(word: str, known: Mapping[str, object] | list[str], likeness: float = 0.6) -> str:

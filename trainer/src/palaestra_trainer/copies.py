@@ -1,7 +1,7 @@
-"""Copies of what crosses the border to somebody else's code.
+"""Copies of the values that are passed between the trainer and the code of a job's author.
 
 An environment may return the same array at every step, write into an action, or keep the dict that it
-returned. So what is kept on one side of the border is never the object of the other side.
+returned. So the trainer and the environment never share an object.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 
 
 def copied(value: Any) -> Any:
-    """Return a value of which no array, dict, list or set is shared with the original.
+    """Return a copy that shares no array, dict, list or set with the original.
 
-    A mapping of any class becomes a dict, since it may be frozen. Objects of other classes are returned as
-    they are: to copy a robot or a socket would be a fault of its own.
+    A mapping of any class becomes a dict, because the original may be frozen. Objects of other classes are
+    returned as they are: a copy of a robot or a socket would not work.
     """
     if isinstance(value, np.ndarray):
         return value.copy()

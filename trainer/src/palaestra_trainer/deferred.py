@@ -1,9 +1,9 @@
-"""Import Stable-Baselines3 without libraries that most programs never use: a third of their start.
+"""Import Stable-Baselines3 without libraries that most programs never use: a third of their start time.
 
-Its modules import pandas, Matplotlib and rich for functions that no training calls, and TensorBoard's writer
-also where nothing is written. While these modules are executed, stand-ins have the names of the libraries. A
+Its modules import pandas, Matplotlib and rich for functions that no training calls. They import TensorBoard's
+writer even if nothing is written. While these modules are executed, stand-ins replace the libraries. A
 stand-in imports its library at the first use, so everything still works. Other modules import the libraries
-themselves, and a library that is imported already gets no stand-in.
+themselves, and a library that is already imported gets no stand-in.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from importlib.util import spec_from_file_location
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-# A library, and those of its submodules that are imported by name.
+# Each tuple holds a library and those of its submodules that are imported by name.
 _MATPLOTLIB = ("matplotlib", "matplotlib.figure")
 _PANDAS = ("pandas",)
 _PROGRESS_BAR = ("tqdm.rich",)
@@ -43,7 +43,7 @@ class _Finder(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of an importer, with a loader of ours; None leaves a module to other finders."""
+        """Return the spec of a module in `IMPORTERS`, with our loader; None leaves it to other finders."""
         if fullname not in IMPORTERS:
             return None
         found = PathFinder.find_spec(fullname, path, target)
@@ -60,7 +60,7 @@ class _LoaderWithStandIns(SourceFileLoader):
 
 
 class _StandIn(ModuleType):
-    """Stands for a module; its attributes stand for the module's while an importer is executed."""
+    """A stand-in for a module; while an importer is executed, its attributes are stand-ins too."""
 
     def __getattr__(self, name: str) -> Any:
         if sys.modules.get(self.__name__) is self:
@@ -69,7 +69,7 @@ class _StandIn(ModuleType):
 
 
 class _Later:
-    """Stands for a class or function that an importer names: in an annotation, or to call it later."""
+    """A stand-in for a class or function that an importer uses in an annotation, or calls later."""
 
     def __init__(self, home: _StandIn, name: str) -> None:
         self._home, self._name = home, name

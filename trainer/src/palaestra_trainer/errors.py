@@ -4,8 +4,8 @@ TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
-├── Interrupted          a signal asked the run to end (waiting.interruption) exit 75
-├── Enough               the wanted success rate is reached (run.selection)   exit 0
+├── Interrupted          a signal asked the run to end (waiting.signals)      exit 75
+├── Enough               the wanted success rate is reached (run.best_model)  exit 0
 ├── CallbackFailed       a callback of the job raised an error               exit 1
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
@@ -18,8 +18,8 @@ TrainerError
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed
     │   └── SimulatorRefused  its process ended with the exit code of a wrong input
-    ├── SimulatorHung    it is connected and does not answer in time
-    └── WrongData        it answered with invalid data
+    ├── SimulatorHung    it is connected and does not respond in time
+    └── WrongData        it sent invalid data
         └── WorldMisfit  its world lacks a device or node that the program needs
 """
 
@@ -29,7 +29,7 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-# They call the code of a job's author, or are called by it: their lines do not say what to change.
+# These libraries call the code of a job's author, or are called by it; their lines do not show the mistake.
 _LIBRARIES = {
     "gymnasium",
     "importlib",
@@ -42,7 +42,7 @@ _LIBRARIES = {
 
 
 def fact_of(error: BaseException) -> str:
-    """Return class, text and line of an error that the code of a job's author raised."""
+    """Return class, text, file and line of an error that the code of a job's author raised."""
     fact = f"{type(error).__name__}: {error}"
     frames = (
         (frame.f_globals.get("__name__", "").partition(".")[0], frame.f_code.co_filename, line)
@@ -61,18 +61,18 @@ class ConfigurationError(TrainerError, ValueError):
 
 
 class MasterLost(TrainerError, ConnectionError):
-    """The ROS master does not answer; its names are lost and nodes do not register again."""
+    """The ROS master does not respond; its names are lost and nodes do not register again."""
 
 
 class UnreadableAnswer(TrainerError, ValueError):
-    """The ROS master or a node answered with an invalid ROS response.
+    """The ROS master or a node sent an invalid ROS response.
 
-    Services and topics raise it as a fault of the simulator that they belong to.
+    Services and topics convert it to `WrongData`, a fault of the simulator that they belong to.
     """
 
 
 class CallbackFailed(TrainerError, RuntimeError):
-    """A callback of the job raised an error, which is its cause."""
+    """A callback of the job raised an error, which is the `__cause__` of this one."""
 
 
 class FaultBudgetSpent(TrainerError, RuntimeError):
@@ -84,7 +84,7 @@ class Diverged(TrainerError, ArithmeticError):
 
 
 class ExportError(TrainerError, RuntimeError):
-    """An exported policy acts differently from the one it was made from; nothing was written."""
+    """The exported policy acts differently from the policy in model.zip; nothing was written."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):
@@ -92,7 +92,7 @@ class NoSuchSensor(TrainerError, NotImplementedError):
 
 
 class MissingCapability(ConfigurationError, NoSuchSensor):
-    """The robot lacks a capability that the task needs, so they do not fit together."""
+    """The robot lacks a capability that the task needs."""
 
 
 class NoReading(TrainerError, RuntimeError):
@@ -127,26 +127,26 @@ class SimulatorDead(SimulatorFault, ConnectionError):
 
 
 class SimulatorRefused(SimulatorDead):
-    """Its process ended with the exit code by which a program refuses what it is given.
+    """Its process ended with the exit code by which a program refuses its input.
 
-    If two processes in a row refuse in the same words before the run's first step, the job is wrong.
+    If two processes in a row fail with the same message before the run's first step, the job is wrong.
     """
 
 
 class SimulatorHung(SimulatorFault, TimeoutError):
-    """It is connected and does not answer within the deadline."""
+    """It is connected and does not respond within the deadline."""
 
     kind = "hung"
 
 
 class WrongData(SimulatorFault, ValueError):
-    """It answered with invalid data."""
+    """It sent invalid data."""
 
     kind = "wrong_data"
 
 
 class WorldMisfit(WrongData):
-    """Its world lacks a device or node that the program needs; a complete list or a clear answer shows that.
+    """Its world lacks a device or node that the program needs, as a complete list or a clear response shows.
 
     If an earlier process had a right world, this is a fault like others. If two processes in a row report it
     before the run's first step, the configuration is wrong.

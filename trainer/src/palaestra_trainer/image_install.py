@@ -1,8 +1,9 @@
-"""`palaestra-install`: a project of the user's own, into an image that is built from ours.
+"""`palaestra-install`: installs a user's project while an image is built FROM one of ours.
 
-The first folder of PYTHONPATH gets the project and those of its dependencies that the image lacks.
-What the image has stays as it is tested with: nothing replaces or hides it. A project whose dependencies
-are all in the image needs no index, as the image has the build backends hatchling and setuptools.
+The project, and those of its dependencies that the image lacks, go to the first folder of PYTHONPATH. The
+packages of the image stay as they were tested: the project can neither replace nor hide them. If the image
+has all dependencies, no package index is needed, because the image has the build backends hatchling and
+setuptools.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ It may be read-only. Hidden files, __pycache__ and a folder `runs` at its top ar
 Dependencies that the image lacks are installed too; the package index must then be reachable.
 """
 PROJECT_FILES = ("pyproject.toml", "setup.py")
-RUNS = "runs"  # `palaestra run` writes it into the folder of the job
+RUNS = "runs"  # `palaestra run` writes this folder into the folder of the job
 DEFAULT_BACKEND = ("setuptools",)  # Source: PEP 518, for a project without [build-system]
 
 
@@ -70,13 +71,13 @@ def install(folder: Path, target: Path) -> None:
             shutil.copytree(source, staged)
         _check_names(folder, staged, target)
         _check_requirements(staged)
-        # Now, as the root file system of a pod is read-only.
+        # Byte code is compiled now, because the root file system of a pod is read-only.
         compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
         _replace(staged, target)
 
 
 def _replace(staged: Path, target: Path) -> None:
-    """Put all that is staged into `target`, in place of older versions of the same distributions."""
+    """Copy the staged files to `target`, and remove older versions of the same distributions first."""
     new = {canonicalize_name(PathDistribution(path).name) for path in staged.glob("*.dist-info")}
     for path in target.glob("*.dist-info"):
         old = PathDistribution(path)
@@ -98,7 +99,7 @@ def _target() -> Path:
 
 
 def _copy(folder: Path, source: Path) -> None:
-    """Copy a project to where a build backend may write."""
+    """Copy a project to a folder where a build backend may write."""
     if not folder.is_dir():
         raise ConfigurationError(f"{folder}: is not a folder; name the one with your project")
 
@@ -117,7 +118,7 @@ def _copy(folder: Path, source: Path) -> None:
 def _install_project(source: Path, staged: Path) -> None:
     """Build the project and install it into `staged` with everything that the image lacks.
 
-    uv leaves out what the image has, also where another version is wanted; `_check_requirements` finds that.
+    uv skips the packages of the image, even if another version is required; `_check_requirements` finds that.
     """
     project = _pyproject(source)
     there = list(distributions())
@@ -169,7 +170,7 @@ def _elsewhere(name: str, target: Path) -> bool:
 
 
 def _check_requirements(staged: Path) -> None:
-    """Refuse what asks for another version of a package, or for an extra of one, than the image has."""
+    """Refuse a project that needs another version or an extra of a package that the image lacks."""
     new = [PathDistribution(path) for path in staged.glob("*.dist-info")]
     there = [*new, *distributions()]
     for distribution in new:
@@ -183,7 +184,7 @@ def _check_requirements(staged: Path) -> None:
 
 
 def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -> Iterator[Requirement]:
-    """Yield those requirements, and those of the extras that they name, which no distribution meets."""
+    """Yield the requirements that no distribution meets, including those of the extras that they name."""
     for requirement in requirements:
         found = _found(requirement, there)
         if found is None or not requirement.specifier.contains(found.version, prereleases=True):
@@ -194,7 +195,7 @@ def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -
 
 
 def _requirements(distribution: Distribution, extra: str = "") -> Iterator[Requirement]:
-    """Yield what a distribution needs here; with an extra, only what it needs for that."""
+    """Yield the requirements of a distribution on this platform; with an extra, only those of the extra."""
     for requirement in map(Requirement, distribution.requires or ()):
         marker = requirement.marker
         always = marker is None or marker.evaluate({"extra": ""})

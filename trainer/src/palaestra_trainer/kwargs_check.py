@@ -1,4 +1,4 @@
-"""The keyword arguments of a class or function, as options of a job give them."""
+"""Check the options of a job against the keyword arguments of a class or function."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class AcceptedArguments:
         return self._any or name in self._named
 
     def mistakes(self, field: str, options: Iterable[str], others: Iterable[str] = ()) -> Iterator[str]:
-        """Yield field, fact and remedy of each unknown option and of each missing argument.
+        """Yield a message with field, fact and remedy for each unknown option and each missing argument.
 
         Args:
             field: the field of the job with the options.

@@ -1,8 +1,8 @@
 """Locks between processes of one machine, each on a file; the kernel releases them when their process ends.
 
-They are POSIX record locks, which a forked process does not inherit. It would inherit locks of `flock` and
-of libraries that use it. But a forked worker must neither share its parent's lock nor release it. Within
-one process a record lock does not exclude other threads, so a set keeps the locks of this process.
+They are POSIX record locks, which a forked process does not inherit. A forked process would inherit locks of
+`flock` and of libraries that use it, but it must neither share nor release the lock of its parent. A record
+lock does not exclude other threads of its process, so a set keeps the locks of this process.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path, variable: str) -> Self | None:
-        """Return the lock on a file, which is created if missing; None: this or another process holds it.
+        """Lock a file, which is created if missing; return None if this or another process holds the lock.
 
         Args:
             path: the file.
             variable: the environment variable that names a folder above it, for messages.
 
         Raises:
-            ConfigurationError: the file cannot be written, or its file system has no locks.
+            ConfigurationError: the file cannot be written, or its file system does not support locks.
         """
         with _held_lock:
             mine = (os.getpid(), path)
-            if mine in _held:  # to open and close the file again would release the lock
+            if mine in _held:  # opening and closing the file again would release the lock
                 return None
             try:
                 descriptor = _locked(path)
@@ -54,7 +54,7 @@ class FileLock:
 
     @property
     def held(self) -> bool:
-        """Whether this process holds it; a process forked since does not."""
+        """Whether this process holds the lock; a process that was forked later does not."""
         return self._descriptor is not None and self._owner == os.getpid()
 
     def release(self) -> None:

@@ -1,6 +1,6 @@
-"""The folder of one run on its volume: its files, and how they are written.
+"""The folder of one run on its volume: its files, and functions that write them.
 
-The folder alone is enough to see what was run and to resume it. Whole files are
+The folder alone is enough to inspect the run and to resume it. Whole files are
 replaced atomically (temporary name, fsync, rename, fsync of the folder); lines
 are appended with fsync. So after a crash each file is either old or new.
 """
@@ -62,7 +62,7 @@ class RunDirectory:
 
     @property
     def journal(self) -> Path:
-        """The counters of some seconds ago, used after a kill."""
+        """The counters as of some seconds ago; the next attempt reads them after a kill."""
         return self.path / "journal.json"
 
     @property
@@ -82,7 +82,7 @@ class RunDirectory:
 
     @property
     def trackers(self) -> Path:
-        """The id of the run that each experiment tracker has, if the job uses any."""
+        """The id of this run in each experiment tracker that the job uses."""
         return self.path / "trackers.json"
 
     def begin_attempt(self, pod_uid: str, reason: str) -> int:
@@ -139,7 +139,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """Yield a temporary name beside `path`, with its suffix; remove a file of that name at the end."""
+    """Yield a temporary name in the folder of `path`, with its suffix; remove that file at the end."""
     name = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield name
@@ -150,7 +150,7 @@ def temporary(path: Path) -> Iterator[Path]:
 def sync(path: Path) -> None:
     """Wait until a file's or a folder's contents are on the disk.
 
-    File systems over object stores and networks have no such call for a folder; then it is skipped.
+    Some file systems over object stores and networks do not support fsync of a folder; it is then skipped.
     """
     descriptor = os.open(path, os.O_RDONLY)
     try:

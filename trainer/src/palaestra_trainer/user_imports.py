@@ -1,4 +1,4 @@
-"""Code of a job's author: robots, environments, algorithms, policies and their parts, callbacks.
+"""Import the code of a job's author: robots, environments, algorithms, policies and their parts, callbacks.
 
 A job names a class as `module:Class`. The module is imported from where Python finds it: the image, or
 PYTHONPATH. An import runs the author's code, which may raise anything, so every exception becomes a
@@ -31,7 +31,7 @@ def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
         base: the class that it must be a subclass of.
 
     Raises:
-        ConfigurationError: it cannot be imported, or is not such a class.
+        ConfigurationError: the class cannot be imported, or is not a subclass of `base`.
     """
     found = object_named(name, f"{field}: {name}")
     if not (isinstance(found, type) and issubclass(found, base)):
@@ -46,7 +46,7 @@ def object_named(name: str, subject: str) -> Any:
 
     Args:
         name: `module:object`.
-        subject: the subject of messages: a field of the job, and what it names.
+        subject: the subject of messages: a field of the job and its value.
 
     Raises:
         ConfigurationError: it cannot be imported.
@@ -55,12 +55,12 @@ def object_named(name: str, subject: str) -> Any:
     found = module_named(module, subject)
     try:
         return getattr(found, attribute)
-    except Exception as error:  # a module may import its parts here
+    except Exception as error:  # a module may import its parts on access, which can raise anything
         raise _refusal(subject, error, "correct the name") from error
 
 
 def module_named(name: str, subject: str) -> ModuleType:
-    """Return the module of a name; `subject` as in `object_named`.
+    """Return the module with this name; for `subject` see `object_named`.
 
     Raises:
         ConfigurationError: it cannot be imported.
@@ -70,7 +70,7 @@ def module_named(name: str, subject: str) -> ModuleType:
     except ImportError as error:
         remedy = "install its package in the image, or add its folder to PYTHONPATH"
         raise _refusal(subject, error, remedy) from error
-    except (Exception, SystemExit) as error:  # whatever the author's code raises; a script may exit
+    except (Exception, SystemExit) as error:  # the author's code may raise anything, and a script may exit
         raise _refusal(subject, error, "correct the module") from error
 
 

@@ -4,22 +4,22 @@ Requests and answers are plain JSON. The official client merges the files of a k
 not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
 
 - `resources`: the kinds of objects and their addresses
-- `connection`: the API server and the identity to use; `access`: its address and credentials
-- `kubeconfig`, `account`: where they come from, outside a pod and in one
+- `connection`: the API server and the identity to use; `client_config`: its address and credentials
+- `kubeconfig`, `service_account`: where they come from, outside a pod and in one
 - `identity`, `plugin`, `tokens`, `impersonation`: who asks, and for whom
-- `proxies`, `dialing`, `tls`: the way to the server, and whether it is the right one
-- `limits`: deadlines, and waits before the next attempt
+- `proxies`, `connection_pool`, `tls`: the way to the server, and whether it is the right one
+- `timeouts`: deadlines, and waits before the next attempt
 - `api`: one request, with a deadline
 - `transport`: the bytes of a request
 - `errors`: one error for each refusal
-- `watching`: one watch, until it ends
+- `watch`: one watch, until it ends
 - `reflector`: a cache that follows the API server
 - `store`: the objects of that cache
-- `queue`: work for the controller, one worker a key
-- `lease`: leader election; `tenure`: its arithmetic
+- `workqueue`: work for the controller, one worker a key
+- `lease`: leader election; `lease_timing`: its arithmetic
 - `recorder`: events for people
-- `lines`: the log of a running container
-- `executing`: a command in a container
+- `pod_logs`: the log of a running container
+- `pod_exec`: a command in a container
 """
 
 from palaestra.cluster.api import Api

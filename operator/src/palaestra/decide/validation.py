@@ -51,7 +51,7 @@ def accept(raw: Mapping[str, Any]) -> TrainingJob:
     """Return the TrainingJob that `raw` describes, with its status.
 
     Raises:
-        Refused: the spec breaks a rule that an API server cannot check, or the status is unreadable.
+        JobRefused: the spec breaks a rule that an API server cannot check, or the status is unreadable.
     """
     try:
         job = validate({name: value for name, value in raw.items() if name != "status"})

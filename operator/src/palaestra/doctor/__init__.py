@@ -1,10 +1,10 @@
 """Check a cluster and report why TrainingJobs do not run in it, with the remedy.
 
-- `finding`: the result of a check
-- `examining`: all checks in their order
+- `check_result`: the result of a check
+- `run`: all checks in their order
 - `platform`: the cluster: version, CRD, namespace, sidecars and storage
 - `installation`: the operator: its replicas, images, leader, rights and metrics
-- `rights`: the rights of the operator and of users
+- `rbac`: the rights of the operator and of users
 
 No check changes anything; a check that must create an object does a dry run.
 """

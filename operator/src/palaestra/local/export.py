@@ -19,7 +19,7 @@ def export(run: Path, to: str, output: Path | None) -> int:
     """Let the trainer's program write the policy of a run directory; return its exit code.
 
     Raises:
-        Refused: the program is not installed here.
+        RunRefused: the program is not installed here.
     """
     if (problem := lack(PROGRAM)) is not None:
         raise RunRefused(f"{problem}: it is a program of the package palaestra-trainer")

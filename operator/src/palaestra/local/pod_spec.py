@@ -61,7 +61,7 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
     """Return the pod that a Job's template describes, for its attempt with `uid`.
 
     Raises:
-        Refused: it needs something that only a cluster has.
+        RunRefused: it needs something that only a cluster has.
     """
     spec = template["spec"]
     main, *others = spec["containers"]

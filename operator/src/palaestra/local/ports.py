@@ -29,7 +29,7 @@ class HeldPorts:
         """Return `port`, held.
 
         Raises:
-            Refused: another program has it.
+            RunRefused: another program has it.
         """
         try:
             return self._bind(port)

@@ -46,7 +46,7 @@ def check(request: PreflightRequest) -> None:
     """Run every check.
 
     Raises:
-        Refused: a check failed; the message has one line for each problem.
+        RunRefused: a check failed; the message has one line for each problem.
     """
     if problems := [problem for check in CHECKS for problem in check(request)]:
         raise RunRefused("\n".join(problems))

@@ -80,7 +80,7 @@ def chosen_ports(held: HeldPorts, job: TrainingJob, options: RunOptions) -> Port
     """Return free ports for one replica, all chosen before the first is used.
 
     Raises:
-        Refused: the port that the person chose is in use.
+        RunRefused: the port that the person chose is in use.
     """
     simulators = sum(group.count for group in job.spec.simulators)
     return Ports(

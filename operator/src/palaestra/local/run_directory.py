@@ -74,7 +74,7 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     that was started with the descriptor passes it as `taken`.
 
     Raises:
-        Refused: another runner has it, or its file system has no locks.
+        RunRefused: another runner has it, or its file system has no locks.
         StorageFailed: its parent cannot be written.
     """
     path = directory.with_name(f"{directory.name}.lock")
@@ -116,7 +116,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        Refused: they differ in fields that a run cannot change, and this is no correction; one line for each
+        RunRefused: they differ in fields that a run cannot change, and this is no correction; one line for
+        each
             field.
     """
     changes = _changes(directory, record)

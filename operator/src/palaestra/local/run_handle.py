@@ -230,7 +230,7 @@ def _replica(job: TrainingJob, replica: int | None) -> int:
     """Return the number of the replica to run.
 
     Raises:
-        Refused: there is no such replica, or none was chosen of several.
+        RunRefused: there is no such replica, or none was chosen of several.
     """
     count = job.spec.replicas
     if replica is None and count > 1:

@@ -1,21 +1,22 @@
 """The running operator: the control loop, its observations and its writes.
 
 - `controller`: one reconcile: observe, plan, decide, act, one status write, events
-- `looking`: everything that the operator observes of one TrainingJob
-- `caches`, `following`: the watched objects
-- `asking`, `admissions`, `hindrances`, `switchers`, `strangers`: facts that no watch reports, read on demand
-- `denials`, `memory`, `records`: facts of earlier reconciles, bounded; a restart may lose them
-- `checking`: verdicts on worlds; `turns`: whose worlds are checked next
-- `apart`, `world_program`: the process that checks large worlds
-- `definition`: the cluster's definition of TrainingJobs, compared with this release's
+- `observer`: everything that the operator observes of one TrainingJob
+- `caches`, `informer`: the watched objects
+- `foreign_jobs`, `kueue_workloads`, `pod_events`, `suspend_managers`: facts that no watch reports
+- `rate_limited_lookup`: how often they are read
+- `bounded_cache`, `reconcile_state`, `rejected_creations`: facts of earlier reconciles, in memory
+- `world_verdicts`: verdicts on worlds; `fair_queue`: whose worlds are checked next
+- `world_check_process`, `world_check_main`: the process that checks large worlds
+- `crd_check`: the cluster's definition of TrainingJobs, compared with this release's
 - `poller`: the trainers' own reports, over the pod network
-- `schedule`: which trainer to poll next, so that silent pods delay no others
-- `trainers`: the pods to poll
-- `confirming`: reads before a write, because a cache may lag
-- `acting`, `reporting`, `writing`: every write to the cluster; none while another operator leads
-- `tidying`: the claims of jobs that are gone, if nothing was ever in them
+- `poll_schedule`: which trainer to poll next, so that silent pods delay no others
+- `poll_targets`: the pods to poll
+- `preconditions`: reads before a write, because a cache may lag
+- `executor`, `status_writer`, `fenced_client`: every write to the cluster; none while another operator leads
+- `unused_claims`: the claims of jobs that are gone, if nothing was ever in them
 - `workers`: threads that take keys from the queue
-- `families`: every metric by name, as data; `metrics`, `waiting`: their values
+- `metric_definitions`: every metric by name, as data; `metrics`, `waiting_metric`: their values
 - `health`, `logs`, `options`, `run`: the process
 
 `palaestra.plan` and `palaestra.decide`, which are pure, make the decisions; `palaestra.cluster` connects to

@@ -146,7 +146,7 @@ class Controller:
         """Return a job and its observation; the whole job is read if it has to be planned.
 
         Raises:
-            Refused: the operator cannot run the job as it is.
+            JobRefused: the operator cannot run the job as it is.
         """
         job = accept(raw)
         seen = self._looking.look(job)

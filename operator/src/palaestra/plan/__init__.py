@@ -1,7 +1,7 @@
 """Turn a TrainingJob into the objects that it needs.
 
-Pure: the same job and layout, the same objects. No clock, no network, no randomness, so every example
-has its whole plan recorded in tests/golden/, as a cluster gets it and as a laptop does.
+Pure: the same job and layout, the same objects. No clock, no network, no randomness, so the plan of every
+example is recorded in tests/golden/, as a cluster gets it and as a laptop does.
 
     plan(job, layout).objects
 """

@@ -34,7 +34,7 @@ def begin(folder: Path, sweep: Sweep) -> None:
     A line of `trials.jsonl` that a crash has cut is removed, so that the next one begins a line.
 
     Raises:
-        Refused: the folder has another sweep.
+        RunRefused: the folder has another sweep.
         StorageFailed: it cannot be written.
     """
     record = sweep.model_dump(mode="json", by_alias=True, exclude_none=True)

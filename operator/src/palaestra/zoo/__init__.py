@@ -2,11 +2,11 @@
 
 Pure: text in, text out. Whatever a TrainingJob cannot hold exactly becomes a note, never silence.
 
-- `converting`: one entry of a file as a TrainingJob with its notes
+- `conversion`: one entry of a file as a TrainingJob with its notes
 - `draft`: the job and the notes that the words of an entry fill
 - `expressions`: Python expressions in a file, read as data and never evaluated
-- `reading`: a file, its entries and its algorithm
-- `words`: the place of each word in a TrainingJob
+- `hyperparameter_file`: a file, its entries and its algorithm
+- `mapping`: the place of each word in a TrainingJob
 """
 
 from palaestra.zoo.conversion import Converted, convert

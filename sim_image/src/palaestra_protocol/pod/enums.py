@@ -2,7 +2,7 @@
 
 from enum import IntEnum, StrEnum
 
-# Why a trainer's exit code 0 is no complete training.
+# Reason of the failure if a trainer exits with 0 but its training is not complete.
 SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
 
 
@@ -51,14 +51,14 @@ class Cause(StrEnum):
 
 
 class StandbyState(StrEnum):
-    """Whether a simulator's spare could replace it now."""
+    """The states of a simulator's standby."""
 
     STARTING = "starting"
     READY = "ready"
 
 
 class Role(StrEnum):
-    """What a simulator's episodes are for: to learn from, or to measure the policy."""
+    """The purpose of a simulator's episodes: to learn from, or to evaluate the policy."""
 
     COLLECT = "Collect"
     EVALUATE = "Evaluate"

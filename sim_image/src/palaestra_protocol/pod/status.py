@@ -1,7 +1,7 @@
-"""A trainer's reports: `/status` while it runs, and its last word, which is the termination message.
+"""A trainer's reports: `/status` while it runs, and the termination message at its end.
 
 The operator reads both from a pod that it does not trust, so readers are strict and bounded. Writers keep the
-bounds, so that a long error message of a trainer never hides its status.
+same bounds, so that a long error message of a trainer never hides its status.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ __all__ = [
 T = TypeVar("T")
 
 MOST_SIMULATORS = 32
-MOST_FAULTS = 10  # the newest ones, in a last word
-MOST_LINES = 10  # the last lines of the trainer's log, in a last word
-MOST_LINE = 200  # characters of such a line, and of the fact of such a fault
+MOST_FAULTS = 10  # the newest ones, in a termination message
+MOST_LINES = 10  # the last lines of the trainer's log, in a termination message
+MOST_LINE = 200  # characters of such a log line, and of the fact of such a fault
 MOST_REASON = 2000
 MOST_TERMINATION_BYTES = 4096  # Source: Kubernetes cuts a container's termination message there
 
@@ -66,7 +66,7 @@ class CheckpointStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -95,7 +95,7 @@ class SuccessInterval:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -116,11 +116,11 @@ class SimulatorStatus:
         name: group and number, such as collect-0.
         role: Collect or Evaluate.
         state: one of the states of a sidecar.
-        restarts: after faults, in this attempt; recycling is not counted.
-        last_fault: in a sentence; None: no fault in this attempt.
-        flapping: whether it fails again and again.
+        restarts: after faults, in this attempt; planned recycling is not counted.
+        last_fault: in a sentence; None if it had no fault in this attempt.
+        flapping: whether it fails repeatedly.
         given_up: whether its restart budget is spent, so that the run continues without it.
-        standby: starting or ready, the state of its spare; None: it has none.
+        standby: the state of its standby, starting or ready; None if it has no standby.
     """
 
     name: str
@@ -133,7 +133,7 @@ class SimulatorStatus:
     standby: str | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, texts cut to what a reader takes."""
+        """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
         return {
             "name": clipped(self.name, MOST_NAME),
             "role": self.role,
@@ -147,7 +147,7 @@ class SimulatorStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -173,25 +173,26 @@ class TrainerStatus:
         step: valid environment steps learned from, over all attempts.
         target: steps at which the run ends.
         episodes: training episodes that ended.
-        mean_return: of recent training episodes; None: none ended yet.
-        success_rate: of the last evaluation or confirmation, 0 to 1; None: none yet, or the environment
-            reports no success.
-        success_interval: around `success_rate`; None: as there, or a trainer of an older release. Absent,
-            not null.
-        steps_per_second: recently; None: unknown.
-        simulators: each of them.
-        last_checkpoint: the newest; None: none yet.
-        last_progress: when an environment last stepped (RFC 3339); None: never yet.
+        mean_return: of recent training episodes; None if none has ended yet.
+        success_rate: of the last evaluation or confirmation, 0 to 1; None before the first one, or if the
+            environment does not report success.
+        success_interval: around `success_rate`; None in the same cases, and from a trainer of an older
+            release. Absent, not null.
+        steps_per_second: recently; None if unknown.
+        simulators: one status for each.
+        last_checkpoint: the newest; None if there is no checkpoint yet.
+        last_progress: time of the last environment step (RFC 3339); None before the first one.
         last_progress_age_s: seconds since then by the trainer's monotonic clock, which does not depend on
-            the wall clock; None: never yet, or a trainer of an older release. Absent, not null.
-        phase: what the trainer does now, in one word.
-        attempt: number of this attempt by the run directory's record, from 1; None: not recorded yet.
+            the wall clock. None before the first step, and from a trainer of an older release. Absent, not
+            null.
+        phase: the current activity of the trainer, in one word.
+        attempt: number of this attempt in the run directory's record, from 1; None if not recorded yet.
         faults: how many of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
-        steps_lost: valid steps that were lost, over all attempts: after the checkpoint from which an attempt
-            resumed, or in an episode of training or evaluation that a fault cut short.
-        left_out: what the simulators leave out of their worlds, in lines that begin with the group. Absent,
-            not empty.
+        steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
+            attempt resumed, and steps in a training or evaluation episode that a fault cut short.
+        left_out: the nodes that the simulators leave out of their worlds, in lines that begin with the group.
+            Absent, not empty.
     """
 
     step: int
@@ -213,7 +214,7 @@ class TrainerStatus:
     left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data; a number that is not finite counts as unknown."""
+        """Return it as JSON data; a number that is not finite becomes null or absent, which means unknown."""
         checkpoint, age_s = self.last_checkpoint, known(self.last_progress_age_s)
         content = {
             "step": self.step,
@@ -240,7 +241,7 @@ class TrainerStatus:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -269,14 +270,14 @@ class TrainerStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRecord:
-    """One fault of one simulator, in a last word.
+    """One fault of one simulator, in a termination message.
 
     Attributes:
-        time: when it was noticed (RFC 3339).
+        time: when the trainer detected it (RFC 3339).
         simulator: group and number, such as collect-0.
         kind: one of `FaultKind`.
         fact: what happened, in a sentence.
-        step: how many valid environment steps the run had then.
+        step: number of valid environment steps that the run had then.
     """
 
     time: str
@@ -286,7 +287,7 @@ class FaultRecord:
     step: int
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, texts cut to what a reader takes."""
+        """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
         return {
             "time": self.time,
             "simulator": clipped(self.simulator, MOST_NAME),
@@ -297,7 +298,7 @@ class FaultRecord:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -314,17 +315,17 @@ class FaultRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Termination:
-    """A trainer's last word, which reaches the operator even if no poll came in time.
+    """A trainer's termination message, which reaches the operator even if no poll came in time.
 
     Attributes:
         step: valid environment steps learned from.
-        reason: why it ended, in a sentence.
-        success_rate: of the last evaluation or confirmation, 0 to 1; None: none, or the environment
-            reports no success.
-        success_interval: around `success_rate`; None: as there. Absent, not null.
-        last_checkpoint: the newest; None: none.
-        attempt: number of this attempt by the run directory's record, from 1; None: not recorded.
-        restarts: of simulators after faults, in this attempt; None: not reported.
+        reason: the reason for its end, in a sentence.
+        success_rate: of the last evaluation or confirmation, 0 to 1; None if there was none, or if the
+            environment does not report success.
+        success_interval: around `success_rate`; None in the same cases. Absent, not null.
+        last_checkpoint: the newest; None if there is no checkpoint.
+        attempt: number of this attempt in the run directory's record, from 1; None if not recorded.
+        restarts: of simulators after faults, in this attempt; None if not reported.
         log: the last lines of the trainer's log, the newest last; at most ten.
         faults: the last ones of this attempt, the newest last; at most ten.
     """
@@ -342,7 +343,7 @@ class Termination:
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.
 
-        To fit, the oldest lines and faults are dropped; if none is left, the reason is cut.
+        To fit, the oldest lines and faults are dropped; after the last of them, the reason is cut.
         """
         word = self
         while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:
@@ -378,7 +379,7 @@ class Termination:
 
     @classmethod
     def from_message(cls, message: str) -> Self:
-        """Return what `to_message` wrote.
+        """Return the object that `to_message` wrote.
 
         Raises:
             ProtocolError: it is anything else, such as the end of a log, or too long.
@@ -387,7 +388,7 @@ class Termination:
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
-        """Return what `to_json` wrote.
+        """Return the object that `to_json` wrote.
 
         Raises:
             ProtocolError: `content` is anything else.
@@ -414,7 +415,7 @@ def _length(content: object) -> int:
 def _table(
     fields: Fields, name: str, rows: Iterable[StrEnum], read: Callable[[Fields, str], T]
 ) -> dict[str, T]:
-    """Return an object's values for the names in `rows` that it has; a newer release may have more."""
+    """Return an object's values for those names in `rows` that it has; a newer release may add names."""
     if not fields.has(name):
         return {}
     table = fields.part(name, Fields)

@@ -1,4 +1,4 @@
-"""The values of a ROS message, to and from bytes.
+"""Encode the values of a ROS message to bytes, and decode them.
 
 A message of fixed size is one precompiled struct; any other is written and read section by section.
 """
@@ -16,12 +16,12 @@ from palaestra_protocol.ros.variable import Piece, Sections
 
 
 class Codec(Protocol):
-    """Turns the values of one message into bytes and back."""
+    """Encodes the values of one message to bytes, and decodes them."""
 
     def encode(self, fields: Mapping[str, Any]) -> bytes:
         """Return the bytes of a message; absent fields are zero, empty or False.
 
-        A message inside is a mapping too, or a tuple of all its fields in order, as `decode` returns.
+        A nested message is a mapping too, or a tuple of all its fields in order, as `decode` returns.
 
         Raises:
             ValueError: a value does not fit its field.
@@ -29,7 +29,7 @@ class Codec(Protocol):
         ...
 
     def frame(self, fields: Mapping[str, Any]) -> bytes:
-        """Return the bytes of a message after their length, as TCPROS requires.
+        """Return the bytes of a message, preceded by their length as TCPROS requires.
 
         Raises:
             ValueError: a value does not fit its field.
@@ -37,9 +37,9 @@ class Codec(Protocol):
         ...
 
     def decode(self, payload: bytes | memoryview) -> Any:
-        """Return a named tuple of the fields; a name that Python reserves has an underscore, as `from_`.
+        """Return a named tuple of the fields; a name that Python reserves gets an underscore, as `from_`.
 
-        Numbers of an array are a tuple, those of `uint8` and `char` bytes; other elements are a list.
+        An array of numbers is a tuple, or bytes for `uint8` and `char`; an array of other elements is a list.
         Characters that are not UTF-8 are replaced.
 
         Raises:

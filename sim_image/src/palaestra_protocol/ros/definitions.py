@@ -1,6 +1,6 @@
-"""The definitions of the ROS types of the interface, as text and read.
+"""The definitions of the ROS types of the interface, as text and parsed.
 
-They are in `definitions.txt`, also those of nested messages, so no ROS package has to be installed.
+The file `definitions.txt` holds them, nested messages included, so no ROS package has to be installed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def text(name: str) -> str:
-    """Return the text of the type's `.msg` or `.srv` file, a field a line.
+    """Return the text of the type's `.msg` or `.srv` file, one field per line.
 
     Raises:
         KeyError: `definitions.txt` has no such type.

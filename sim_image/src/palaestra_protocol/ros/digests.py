@@ -1,6 +1,6 @@
-"""The md5 sum by which peers recognize a type, and the full text that they send for tools.
+"""The md5 sum by which peers recognize a type, and the full text that they send for ROS tools.
 
-The sum covers constants, fields and the sums of nested messages, but no comments and no names of packages.
+The sum covers constants, fields and the sums of nested messages, but not comments or package names.
 Source: http://wiki.ros.org/ROS/Technical%20Overview#Message_serialization_and_msg_MD5_sums
 """
 
@@ -15,7 +15,7 @@ _LINE = "=" * 80
 
 
 def md5(find: Callable[[str], Message], *messages: Message) -> str:
-    """Return the sum of a message, or that of a service, of its request and response.
+    """Return the md5 sum of a message, or of a service given as its request and response.
 
     Args:
         find: returns the definition of a nested message by its name.
@@ -26,7 +26,7 @@ def md5(find: Callable[[str], Message], *messages: Message) -> str:
 
 
 def full_text(find: Callable[[str], Message], message: Message) -> str:
-    """Return the text of a message, then that of each message inside it.
+    """Return the text of a message, followed by the text of each message inside it.
 
     Args:
         find: returns the definition of a nested message by its name.

@@ -1,6 +1,6 @@
-"""Messages of fixed size: their values become numbers in a row, for one struct.
+"""Messages of fixed size: their values become a flat sequence of numbers, for one struct.
 
-Every motor command and every step is one, so encoding and decoding them decides how fast a simulator steps.
+Every motor command and every step is such a message, so this codec limits the speed of a simulator.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ TIMES = {
     "duration": parse("duration", "int32 secs\nint32 nsecs"),
 }
 
-# What Python raises for a value that does not fit its field.
+# The exceptions that Python raises for a value that does not fit its field.
 UNFIT = (AttributeError, OverflowError, TypeError, ValueError, struct.error)
 
 Find = Callable[[str], Message]
 
 
 class FixedPart(Protocol):
-    """A field of fixed size that is more than one number."""
+    """A field of fixed size that holds more than one number."""
 
     @property
     def codes(self) -> str:
-        """Return the codes of its numbers, for `struct`."""
+        """Return the format codes of its numbers, for `struct`."""
         ...
 
     @property
@@ -45,21 +45,21 @@ class FixedPart(Protocol):
         ...
 
     def build(self, numbers: Sequence[Any], at: int) -> Any:
-        """Return the value whose numbers begin `at`."""
+        """Return the value whose numbers begin at index `at`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A message, or fields of one, of fixed size.
+    """A message of fixed size, or some consecutive fields of a message.
 
     Attributes:
         names: of the fields.
-        parts: for each field None if it is one number.
-        placed: the parts, each with the place of its first number among all.
+        parts: one for each field; None if the field is one number.
+        placed: the parts, each with the index of its first number among all.
         empties: the value of each field if it is absent.
-        codes: of all numbers, in order.
-        make: makes the tuple with attributes.
+        codes: the format codes of all numbers, in order.
+        make: makes a named tuple of the values.
         flat: whether all fields are numbers.
     """
 
@@ -94,7 +94,7 @@ class Record:
         return numbers
 
     def build(self, numbers: Sequence[Any], at: int = 0) -> Any:
-        """Return the message whose numbers begin `at`."""
+        """Return the message whose numbers begin at index `at`."""
         if self.flat:
             return self.make(numbers[at : at + len(self.names)])
         return self.make(
@@ -102,7 +102,7 @@ class Record:
         )
 
     def unfit(self, fields: Mapping[str, Any]) -> str:
-        """Return the first field whose value does not fit, found by packing each without the others."""
+        """Return the name of the first field whose value does not fit; each is packed without the others."""
         for name in filter(fields.__contains__, self.names):
             try:
                 struct.pack(f"<{self.codes}", *self.flatten({name: fields[name]}))
@@ -135,27 +135,27 @@ class _Array:
 
 
 def collection(type_: str) -> Callable[[Iterable[Any]], Sequence[Any]]:
-    """Return what holds the numbers of an array of that type: bytes for `uint8` and `char`, else a tuple."""
+    """Return the constructor for an array of that type: bytes for `uint8` and `char`, else a tuple."""
     return bytes if NUMBERS.get(type_) == "B" else tuple
 
 
 def check_length(value: Sequence[Any], length: int) -> None:
-    """Refuse an array with another number of elements.
+    """Check the number of elements of an array.
 
     Raises:
-        ValueError: it has.
+        ValueError: it is not `length`.
     """
     if len(value) != length:
         raise ValueError(f"{len(value)} elements for {length}")
 
 
 def attribute(field: MessageField) -> str:
-    """Return the attribute of a field: as in genpy, that of a field called `from` is `from_`."""
+    """Return the attribute name of a field; as in genpy, a field called `from` becomes `from_`."""
     return field.name + "_" * keyword.iskeyword(field.name)
 
 
 def maker(message: Message, fields: Sequence[MessageField]) -> Callable[[Iterable[Any]], Any]:
-    """Return what makes a named tuple of the values of these fields."""
+    """Return a function that makes a named tuple of the values of these fields."""
     name = message.name.rpartition("/")[2]
     names = tuple(map(attribute, fields))
     made: Any = collections.namedtuple(name, names)  # type: ignore[misc]  # noqa: PYI024 - a run-time name
@@ -163,7 +163,7 @@ def maker(message: Message, fields: Sequence[MessageField]) -> Callable[[Iterabl
 
 
 def message_of(type_: str, find: Find) -> Message:
-    """Return the definition of a type that is a message, as times are too."""
+    """Return the definition of a type that is a message; a time counts as a message."""
     return TIMES.get(type_) or find(type_)
 
 

@@ -1,4 +1,4 @@
-"""The ROS types of the interface: each with the md5 that peers compare, and its codecs."""
+"""The ROS types of the interface, each with the md5 that peers compare and its codecs."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ class ServiceType(NamedTuple):
         name: `package/name`.
         md5: that of Webots R2023b.
         request: of a call.
-        response: of an answer.
-        later_md5: that of Webots R2025a, whose clients send the same bytes; equal if it renamed nothing.
+        response: to a call.
+        later_md5: that of Webots R2025a, whose clients send the same bytes; equal to `md5` if nothing was
+            renamed.
     """
 
     name: str
@@ -106,9 +107,10 @@ def last_field(name: str) -> struct.Struct | None:
 
 @cache
 def reading_field(name: str, field: str) -> tuple[struct.Struct, int] | None:
-    """Return the layout of a field of the message type `package/Name`, and how many bytes follow it.
+    """Return the layout of a field of the message type `package/Name`, and the number of bytes after it.
 
-    It is None if the field is no number nor a message of numbers, or if a field behind it may have any size.
+    It is None if the field is neither a number nor a message of numbers, or if a later field has variable
+    size.
 
     Args:
         name: of the message type.

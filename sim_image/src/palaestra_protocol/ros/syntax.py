@@ -1,7 +1,7 @@
-"""The text of a ROS message, read: its fields and constants.
+"""The parser for the text of a ROS message: its fields and constants.
 
-The rules are those of ROS's own parser, also where they surprise: the value of a constant of type `string` is
-the rest of its line, so that a `#` begins no comment.
+The rules are those of ROS's own parser, even where they are surprising. For example, the value of a constant
+of type `string` is the rest of its line, so a `#` there does not begin a comment.
 Source: http://wiki.ros.org/msg
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-# The types that are one number, with their codes of `struct`.
+# The types that are one number, with their format codes for `struct`.
 NUMBERS = {
     "bool": "?",
     "int8": "b",
@@ -38,7 +38,7 @@ class MessageField:
     Attributes:
         type: of the field, or of one element: built in, or `package/Name`.
         array: empty, `[]` for any number of elements, or the number, as in `[9]`.
-        name: as it is written, also if Python reserves it.
+        name: as in the text, even if Python reserves it.
     """
 
     type: str
@@ -57,8 +57,8 @@ class Message:
 
     Attributes:
         name: `package/Name`.
-        text: as it is written.
-        constants: each as its line in the text that the md5 is computed of.
+        text: the source text of the definition.
+        constants: for each one, its line in the text from which the md5 is computed.
         fields: in the order of their bytes.
     """
 
@@ -104,7 +104,7 @@ def _field(message: str, bare: str) -> MessageField:
 
 
 def _resolved(type_: str, message: str) -> str:
-    """Return a type with its package, which is that of the message if the text names none."""
+    """Return a type name with its package; without one, the package is that of the message."""
     if type_ == "Header":
         return "std_msgs/Header"
     if type_ in BUILT_IN or "/" in type_:

@@ -1,6 +1,6 @@
-"""The wire of ROS 1: connection headers and length-prefixed frames, as bytes.
+"""The wire format of ROS 1: connection headers and length-prefixed frames, as bytes.
 
-Pure: no socket is touched here, so both ends (the stub simulator and the trainer) share it.
+Pure: no socket is used here, so both ends (the simulator and the trainer) share it.
 Source: http://wiki.ros.org/ROS/TCPROS and http://wiki.ros.org/ROS/Connection%20Header
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 LENGTH = struct.Struct("<I")
 
-# No message of the interface comes near this; a longer length means that the stream is out of step.
+# No message of the interface comes near this; a longer length means that the stream is out of sync.
 MAX_FRAME_BYTES = 64 * 1024 * 1024
 
 
@@ -20,7 +20,7 @@ class FramingError(ValueError):
 
 
 def frame(payload: bytes) -> bytes:
-    """Return `payload` behind its little-endian 32-bit length."""
+    """Return `payload`, preceded by its little-endian 32-bit length."""
     return LENGTH.pack(len(payload)) + payload
 
 
@@ -50,7 +50,7 @@ def decode_header(payload: bytes) -> dict[str, str]:
 
 
 class FrameReader:
-    """Cuts a stream into frames, however the network delivered it."""
+    """Cuts a stream into frames, in whatever pieces the network delivered it."""
 
     __slots__ = ("_buffer",)
 
@@ -61,7 +61,7 @@ class FrameReader:
         """Return the payload of every frame that `data` completes, to be iterated over once.
 
         Raises:
-            FramingError: while iterating, a frame claims more than MAX_FRAME_BYTES.
+            FramingError: during iteration, a frame claims more than MAX_FRAME_BYTES.
         """
         begins_here = not self._buffer and len(data) >= LENGTH.size
         if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= MAX_FRAME_BYTES:

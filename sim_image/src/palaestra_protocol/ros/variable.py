@@ -1,9 +1,9 @@
 """Messages with strings and lists, written and read section by section.
 
-Fields of fixed size that follow each other are one section, with one struct. A string, a list, and a message
-that has one are sections of their own.
+Consecutive fields of fixed size are one section, with one struct. A string, a list, and a nested message
+that has one are each a section of their own.
 
-Peers are not trusted: a length is compared with the bytes that are left before anything is made of it.
+Peers are not trusted: a length is compared with the remaining bytes before an object of that length is made.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _length_at = LENGTH.unpack_from
 
 
 class _Layout(Protocol):
-    """How a value is laid out in bytes."""
+    """The layout of a value in bytes."""
 
     @property
     def empty(self) -> Any:
@@ -46,7 +46,7 @@ class _Layout(Protocol):
         ...
 
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
-        """Return the value that begins `at`, and where it ends."""
+        """Return the value that begins at offset `at`, and the offset of its end."""
         ...
 
 
@@ -71,7 +71,7 @@ class Sections:
         """Append the bytes of a message, given as a mapping, or as a tuple of all fields in order.
 
         Raises:
-            ValueError: a value does not fit its field, or is of no field.
+            ValueError: a value does not fit its field, or its name is not a field.
         """
         fields = dict(zip(self._names, value, strict=True)) if isinstance(value, tuple) else value
         if not fields.keys() <= self._known:
@@ -84,7 +84,7 @@ class Sections:
                 raise ValueError(f"{field}: {error}") from error
 
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
-        """Return the message that begins `at`, and where it ends.
+        """Return the message that begins at offset `at`, and the offset of its end.
 
         Raises:
             ValueError, struct.error: the bytes are not such a message.
@@ -100,7 +100,7 @@ class Sections:
 
 
 class _Packed:
-    """Fields of fixed size that follow each other."""
+    """Consecutive fields of fixed size."""
 
     empty: Mapping[str, Any] = {}
 
@@ -134,7 +134,7 @@ class _Text:
 
 
 class _Octets:
-    """A list of `uint8` or `char`, as bytes; a picture is not copied before it is sent."""
+    """A list of `uint8` or `char`, as bytes; an image is not copied before it is sent."""
 
     empty = b""
 
@@ -189,7 +189,7 @@ class _Records:
 
 
 class _Elements:
-    """A list, or an array of fixed length, of strings or of messages with such inside."""
+    """A list, or an array of fixed length, of strings or of messages of variable size."""
 
     def __init__(self, element: _Layout, length: int | None) -> None:
         self._element = element
@@ -217,10 +217,10 @@ class _Elements:
 
 
 def _counted(data: bytes, at: int, size: int) -> tuple[int, int, int]:
-    """Return where a list begins and ends, and how many elements of `size` bytes it has.
+    """Return the offsets of a list's first element and end, and its number of elements of `size` bytes.
 
     Raises:
-        ValueError, struct.error: the data ends before it does.
+        ValueError, struct.error: the data ends before the list.
     """
     (count,) = _length_at(data, at)
     start = at + _LENGTH_SIZE

@@ -1,16 +1,16 @@
-"""Injected faults: a stub that fails like a simulator, to test training code.
+"""Injected faults: the stub fails as a simulator does, to test training code.
 
 - `kinds`: the faults, as data
-- `language`: from `crash:probability=0.0005` to data, or to a sentence about the mistake
+- `parser`: parses `crash:probability=0.0005`, or raises an error with the mistake
 - `options`: the faults from the command line and the environment
 - `schedule`, pure: the faults of the k-th step, reset, call or start of a life
-- `course`, pure: the fate of each request and message, from counts and the schedule
-- `damage`, pure: wrong messages and answers, as bytes
-- `survey`: the paths that a world serves, so that a misspelt one is noticed
-- `wire`, the edge: a ROS node whose traffic the course decides about
-- `effects`, the edge: signals, memory, the end
+- `fault_state`, pure: the fate of each request and message, from counts and the schedule
+- `corruption`, pure: damaged messages and responses, as bytes
+- `known_paths`: the paths that a world serves, so that a misspelled path is an error
+- `faulty_node`, with I/O: a ROS node whose traffic passes through the fault state
+- `process_faults`, with I/O: signals, memory, exits
 
-A stub without faults has the plain node, and nothing of this package in its way.
+A stub without faults uses the plain node, so this package costs it nothing.
 """
 
 from palaestra_sim.faults.fault_state import FaultState

@@ -1,6 +1,6 @@
-"""Damage messages and answers, as bytes.
+"""Damage messages and responses, as bytes.
 
-Pure. The length prefix of a message stays right, so that the reader finds the next message.
+Pure. The length prefix of a message stays correct, so that the reader finds the next message.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from palaestra_protocol.ros.tcpros import LENGTH, frame
 from palaestra_sim.faults.fault_state import Damage
 from palaestra_sim.faults.kinds import WrongValue
 
-_FRACTIONS = frozenset("fd")  # the codes of `struct`
+_FRACTIONS = frozenset("fd")  # the format codes of floats in `struct`
 _FLOAT32 = struct.Struct("<f")
 
 
 def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], field: str = "") -> bytes:
-    """Return a framed message of a topic with all `damages`; `field` has the reading, "" is the last one."""
+    """Return a framed message of a topic with all `damages`; `field` is its reading, "" the last field."""
     payload = data[LENGTH.size :]
     reading = reading_field(type_name, field) if type_name else None
     for damage in damages:
@@ -51,7 +51,7 @@ def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value:
 
 
 def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:
-    """Return a message with `value` in place of each number with a fraction in its reading."""
+    """Return a message with `value` in place of each float in its reading."""
     end = len(payload) - behind
     start = end - reading.size
     codes = reading.format.lstrip("<")
@@ -61,9 +61,9 @@ def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: fl
 
 
 def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> bytes:
-    """Return a service's answer, its first byte and its frame, with all `damages`.
+    """Return a service's response, a status byte and a frame, with all `damages`.
 
-    The answer of a failed service stays unchanged.
+    The response of a failed call stays unchanged.
     """
     succeeded, payload = data[:1], data[1 + LENGTH.size :]
     if succeeded != b"\1":
@@ -83,6 +83,6 @@ def _with_floats(part: Any, value: float) -> Any:
         return value
     if isinstance(part, list | tuple):
         changed = [_with_floats(it, value) for it in part]
-        make = getattr(part, "_make", None)  # of a message inside, a named tuple
+        make = getattr(part, "_make", None)  # a nested message is a named tuple
         return changed if make is None else make(changed)
     return part

@@ -1,7 +1,7 @@
-"""The course of one life: it decides the fate of each request and message.
+"""The state of the faults in one life: it decides the fate of each request and message.
 
-Pure: it only counts, and knows no socket, process or clock. A fault that names a service and happens at a
-step or reset lasts from then on; so does a hang of a service.
+Pure: it only counts, and uses no socket, process or clock. A fault that names a service and occurs at a step
+or reset lasts from then on; so does a hang of a service.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class Ruling:
     """The fate of a request or a message.
 
     Attributes:
-        lost: it is dropped.
-        delay_s: how long it waits.
-        damages: the faults of the answer, or of the message.
-        effects: what happens to the process first, in this order.
+        lost: whether it is dropped.
+        delay_s: its delay.
+        damages: the faults of the response or the message.
+        effects: the faults that the process suffers first, in this order.
     """
 
     lost: bool = False
@@ -66,7 +66,7 @@ class FaultState:
         return self._schedule
 
     def start(self) -> tuple[StartRefused | None, float]:
-        """Return the fault that keeps the stub from starting, if any, and the delay of the start."""
+        """Return the fault that prevents the start, if any, and the delay of the start."""
         number = self._schedule.life.number
         found = self._schedule.at(FaultEvent.START, number)
         refused = next((finding for finding in found if isinstance(finding, StartRefused)), None)
@@ -89,7 +89,7 @@ class FaultState:
         return self._with_service_faults(path, delay_s, tuple(effects))
 
     def message(self, path: str) -> Ruling:
-        """Return the ruling on a message of the topic `path`; with a leading slash it belongs to no robot."""
+        """Return the ruling on a message of the topic `path`; a leading slash means that no robot owns it."""
         number = self._counts[FaultEvent.STEP]
         faults = [message for message in self._messages if _matches(path, message.topic)]
         if not faults:
@@ -101,12 +101,12 @@ class FaultState:
         )
 
     def closed(self, robot: str) -> None:
-        """Record that a robot's controller ended; then the steps of another robot count."""
+        """Record the end of a robot's controller; if its steps were counted, another robot's count next."""
         if self._stepping == robot:
             self._stepping = None
 
     def _count(self, robot: str, path: str) -> tuple[int, tuple[InjectedFault, ...]]:
-        """Return the number of a step or reset that a request asks for, and the faults that happen at it."""
+        """Return the number of the step or reset that a request starts, or 0, and the faults at it."""
         event = FaultEvent.RESET if path in RESET_PATHS else None
         if path == STEP_PATH:
             self._stepping = self._stepping or robot
@@ -132,7 +132,7 @@ class FaultState:
         return Ruling(lost=lost, delay_s=delay_s, damages=tuple(damages), effects=effects)
 
     def _befalls(self, fault: InjectedFault) -> bool:
-        """Count a call of a service that `fault` names, and return whether it goes wrong."""
+        """Count a call of a service that `fault` names, and return whether the call is affected."""
         self._calls[fault] += 1
         if fault.trigger.event is FaultEvent.CALL and self._schedule.happens(fault, self._calls[fault]):
             if isinstance(fault, Hang):

@@ -1,7 +1,7 @@
-"""A ROS node whose requests, answers and messages go through the course of faults.
+"""A ROS node whose requests, responses and messages pass through the fault state.
 
-It is between the links and the node. After the header of a link, each message is forwarded, changed,
-delayed or dropped. The node below it is the same that runs without faults.
+It sits between the connections and the node. After the header of a connection, each message is forwarded,
+changed, delayed or dropped. The node below it is the same that runs without faults.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from palaestra_sim.ros.topics import PublishedTopic
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failing:
-    """The course and the effects that the nodes of one stub share."""
+    """The fault state and the process faults that the nodes of one stub share."""
 
     course: FaultState
     effects: ProcessFaults
@@ -32,7 +32,7 @@ class FaultyNode(RosNode):
     """A RosNode with injected faults.
 
     Args:
-        loop: watches its sockets.
+        loop: the event loop of its sockets.
         name: the node's name and the prefix of its relative paths.
         master_uri: the master.
         failing: shared by all nodes of a stub.
@@ -49,7 +49,7 @@ class FaultyNode(RosNode):
         self._master_lost = True
 
     def close(self) -> None:
-        """Close like a RosNode, but unregister no names at a lost master."""
+        """Close like a RosNode; if the master is lost, leave the names registered."""
         self._failing.course.closed(self.name)
         if self._master_lost:
             self.abandon()
@@ -57,7 +57,7 @@ class FaultyNode(RosNode):
             super().close()
 
     def request(self, end: ServiceEnd, payload: bytes) -> None:
-        """Take a request; during a slow step it waits, as during any step."""
+        """Handle a request; during a slow step it waits, as during any step."""
         if self._held_steps:
             self._waiting.append((end, payload))
         else:
@@ -69,7 +69,7 @@ class FaultyNode(RosNode):
             super().take_waiting()
 
     def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
-        """Take a request from a link, and forward, delay or drop it by the ruling of the course."""
+        """Forward, delay or drop a request from a connection, by the ruling of the fault state."""
         ruling = self._failing.course.request(self.name, path)
         if not self._failing.effects.happen(ruling.effects) or ruling.lost:
             return
@@ -105,12 +105,12 @@ class FaultyNode(RosNode):
         return _Requests(self, self._path(name), answers, super()._greet(answers, header))
 
     def _path(self, name: str) -> str:
-        """Return a name in the form that faults use: below the robot's, or with a leading slash."""
+        """Return a name in the form that faults use: relative to the robot, or with a leading slash."""
         return name.removeprefix(f"/{self.name}/")
 
 
 class _Requests:
-    """Takes one client's requests to one service."""
+    """Receives one client's requests to one service."""
 
     def __init__(self, node: FaultyNode, path: str, answers: _Answers, endpoint: Endpoint) -> None:
         self._node = node
@@ -126,11 +126,11 @@ class _Requests:
 
 
 class _Answers:
-    """A client's link, on which the answer to the current request may be damaged.
+    """A client's connection, on which the response to the current request may be damaged.
 
     Attributes:
-        link: the link itself.
-        damages: of the next answer.
+        link: the connection itself.
+        damages: of the next response.
     """
 
     def __init__(self, link: Connection, response: Codec | None) -> None:
@@ -159,10 +159,10 @@ class _Answers:
 
 
 class _Messages:
-    """A subscriber's link, on which messages may be lost, late or damaged.
+    """A subscriber's connection, on which messages may be lost, late or damaged.
 
     Attributes:
-        link: the link itself.
+        link: the connection itself.
     """
 
     def __init__(

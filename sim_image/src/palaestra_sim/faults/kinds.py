@@ -14,9 +14,10 @@ RESET_PATHS = frozenset(
 
 
 class FaultEvent(StrEnum):
-    """Events that are counted, from 1, in each life of a stub; the program that starts it counts the lives.
+    """Events that are counted, from 1, in each life of a stub; the parent program counts the lives.
 
-    - step: a `time_step` request of the robot that asked first, so once a step for any number of robots.
+    - step: a `time_step` request of the first robot that sent one, so one event a step for any number of
+    robots.
     - reset: a request for a reset of the world.
     - call: a call of a service that the fault names.
     """
@@ -29,13 +30,13 @@ class FaultEvent(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """The events at which a fault happens: one, every n-th, a share of them, or all.
+    """The events at which a fault occurs: one, every n-th, a random share of them, or all.
 
     Attributes:
-        event: which events.
-        at: the only one; None: see the others.
-        every: each multiple of this.
-        probability: of each.
+        event: the kind of events.
+        at: the number of the only event; None if another attribute decides.
+        every: the fault occurs at each multiple of this.
+        probability: of the fault at each event.
     """
 
     event: FaultEvent
@@ -44,7 +45,7 @@ class Trigger:
     probability: float = 1.0
 
     def fires(self, number: int, draw: float) -> bool:
-        """Return whether the fault happens at that event, counted from 1; `draw` is uniform in [0, 1)."""
+        """Return whether the fault occurs at event `number`, counted from 1; `draw` is uniform in [0, 1)."""
         if self.at is not None:
             return number == self.at
         return number % self.every == 0 and draw < self.probability
@@ -56,8 +57,8 @@ class InjectedFault:
 
     Attributes:
         text: as it was written.
-        trigger: when it happens.
-        service: the affected services, below the robot's name, `*` for anything; "": none.
+        trigger: the events at which it occurs.
+        service: the affected services, relative to the robot, `*` for anything; "" for no service.
         topic: the affected topics, in the same form.
     """
 
@@ -69,26 +70,26 @@ class InjectedFault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crash(InjectedFault):
-    """A signal ends the process, without an answer to the request."""
+    """A signal terminates the process, without a response to the request."""
 
     signal: Signals = Signals.SIGSEGV
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit(InjectedFault):
-    """The process closes everything and ends, too early."""
+    """The process closes everything and exits too early."""
 
     code: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hang(InjectedFault):
-    """The process stops with its sockets open; or one service never answers again."""
+    """The process stops with its sockets open, or one service never responds again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delayed(InjectedFault):
-    """A delay: the latency, plus up to the jitter."""
+    """A delay: the latency, plus a random share of the jitter."""
 
     latency_s: float = 0.0
     jitter_s: float = 0.0
@@ -101,12 +102,12 @@ class Slow(Delayed):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Late(Delayed):
-    """Messages of a step come later than its answer."""
+    """Messages of a step arrive after its response."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lost(InjectedFault):
-    """Messages of a step never come."""
+    """Messages of a step are dropped."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +132,7 @@ class MemoryGrowth(InjectedFault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartRefused(InjectedFault):
-    """The process ends before it has registered any name."""
+    """The process exits before it has registered any name."""
 
     code: int = 1
 

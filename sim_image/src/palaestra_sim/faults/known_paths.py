@@ -1,6 +1,6 @@
-"""Find the services and topics of a world: its controllers start on nodes that only record, without sockets.
+"""Find the services and topics of a world: its controllers start on nodes that only record them.
 
-So a fault that names a path that does not exist is refused before the start, instead of never happening.
+So a fault that names an unknown path is an error at the start, instead of a fault that never occurs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
 from palaestra_sim.ros_interfaces import Fields, Handler
 
 _ENABLES = ("/enable", "/recognition_enable")
-_HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs from job to job
+_HASH = re.compile(r"_[0-9a-f]{6}$")  # end of generated ROS names, which differs from job to job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +34,8 @@ class KnownPaths:
 
     Attributes:
         simulator: the name of its first robot, without the part that differs from job to job.
-        services: the type of each, by its path below the robot's name.
-        topics: in the same way, those of sensors only once they are enabled.
+        services: the type of each, by its path relative to the robot.
+        topics: in the same way; those of sensors appear only after the sensors are enabled.
     """
 
     simulator: str
@@ -47,7 +47,7 @@ def survey(load: Load, world_path: Path) -> KnownPaths:
     """Return the services and topics of the world in that file, loaded by `load`.
 
     Raises:
-        WorldError: the file is wrong, or has something that cannot be simulated.
+        WorldError: the file is wrong, or contains an object that cannot be simulated.
         OSError: it cannot be read.
     """
     nodes: list[_Listener] = []
@@ -68,7 +68,7 @@ def survey(load: Load, world_path: Path) -> KnownPaths:
 
 
 def begin(ordered: Ordered, load: Load, world_path: Path) -> FaultState:
-    """Return the course of a life with the given faults, in the world that `load` loads.
+    """Return the fault state of a life with the given faults, in the world that `load` loads.
 
     Raises:
         FaultError: a fault names a path that the world does not have.
@@ -104,13 +104,13 @@ class _Silent:
     heard = False
 
     def send(self, fields: Fields) -> None:
-        """Send it to nobody."""
+        """Do nothing: it has no subscriber."""
 
     def send_stamped(self, fields: Fields) -> None:
-        """Send it to nobody."""
+        """Do nothing: it has no subscriber."""
 
     def send_value(self, value: float) -> None:
-        """Send it to nobody."""
+        """Do nothing: it has no subscriber."""
 
 
 class _Listener:
@@ -125,7 +125,7 @@ class _Listener:
         self.topics: dict[str, str] = {}
 
     def enable_all(self, period_ms: int) -> None:
-        """Enable every sensor, because only then its topic exists; a device that refuses has none."""
+        """Enable every sensor, because only this creates its topic; a device that refuses gets no topic."""
         for path, handler in self.services.items():
             if path.endswith(_ENABLES):
                 with contextlib.suppress(ServiceFailed):
@@ -158,10 +158,10 @@ class _Listener:
         """Keep the topic in the record."""
 
     def answer(self, call: Any, fields: Fields) -> None:
-        """Answer nobody."""
+        """Do nothing: no client called."""
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Never call back: nothing is stepped here."""
+        """Never call back: no step runs here."""
 
     def close(self) -> None:
-        """Close nothing."""
+        """Do nothing: it has no sockets."""

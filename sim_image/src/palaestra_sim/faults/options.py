@@ -22,10 +22,10 @@ class Ordered:
     """The faults of this process.
 
     Attributes:
-        faults: in the order they were written, options before the environment's.
-        seed: of all draws.
+        faults: in the order in which they were written, options before those of the environment.
+        seed: of all random draws.
         life: the number of this start of the simulator, from 1.
-        counted: whether a sidecar or a person counts the lives; otherwise `life` was drawn.
+        counted: whether a sidecar or a person counts the lives; otherwise `life` is random.
     """
 
     faults: tuple[InjectedFault, ...]
@@ -39,14 +39,14 @@ class Ordered:
 
 
 def add_options(add: Callable[..., Any]) -> None:
-    """Add the options about faults to a parser, by its `add_argument`."""
+    """Add the options for faults to a parser, by its `add_argument`."""
     add("--fault", action="append", default=[], metavar="KIND[:KEY=VALUE,...]", help="fail so; repeatable")
-    add("--fault-seed", metavar="N", help="what all draws follow from (default: 0)")
-    add("--fault-life", metavar="N", help="which life of the simulator this is, from 1 (default: drawn)")
+    add("--fault-seed", metavar="N", help="seed of all random draws (default: 0)")
+    add("--fault-life", metavar="N", help="number of this start of the simulator, from 1 (default: random)")
 
 
 def read_options(options: argparse.Namespace, environment: Mapping[str, str]) -> Ordered | None:
-    """Return the faults of the options and the environment together; None: no faults.
+    """Return the faults of the options and the environment together; None if there are no faults.
 
     Raises:
         FaultError: a description or a number is wrong.
@@ -83,7 +83,7 @@ def _check(faults: tuple[InjectedFault, ...], *, counted: bool) -> None:
 
 
 def _whole(least: int, *given: tuple[str, str | None]) -> int | None:
-    """Return the first given number; None if there is none."""
+    """Return the first given number; None if no number is given."""
     for where, text in given:
         if text is None:
             continue

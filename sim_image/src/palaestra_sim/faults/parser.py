@@ -1,6 +1,6 @@
-"""The language of faults: KIND, or KIND:KEY=VALUE,KEY=VALUE, with blanks between faults.
+"""The language of faults: KIND, or KIND:KEY=VALUE,KEY=VALUE, with spaces between faults.
 
-Pure: text in, data or an error out. It needs no quotes in YAML, and in a shell only for `*`.
+Pure: it returns data, or raises an error. A fault needs no quotes in YAML; in a shell only `*` needs them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-_FLOAT32: Final = struct.Struct("<f")  # the narrowest field that a value may be put into
+_FLOAT32: Final = struct.Struct("<f")  # the narrowest field that may receive a value
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 
 
 class FaultError(SimError, ValueError):
-    """The description of a fault is wrong, so nothing is started."""
+    """The description of a fault is wrong, so the stub does not start."""
 
 
 def _whole(least: int, most: int) -> Callable[[str], int]:
@@ -90,10 +90,10 @@ _COUNT: Final = _whole(1, 10**12)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Kind:
-    """A word of the language: what it makes, its keys, and the events at which it can happen.
+    """A word of the language: the fault class, its keys, and the events at which it can occur.
 
-    The first event is the one that `every` and `probability` are about. `topic` is what it is about
-    if it says neither topic nor service; `needs` lists keys of which there has to be one.
+    `every` and `probability` count the first event. `topic` is the default if the text names neither a topic
+    nor a service. If `needs` is not empty, the text must contain at least one of these keys.
     """
 
     make: type[InjectedFault]

@@ -1,4 +1,4 @@
-"""The effects of faults on the process: signals, memory, the end. Other modules decide when."""
+"""The effects of faults on the process: signals, memory, exits. Other modules decide when they occur."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ log = logging.getLogger(__name__)
 
 
 class Endings(Protocol):
-    """The effects for which the whole process is needed."""
+    """The effects that concern the whole process."""
 
     def end(self, status: int) -> None:
-        """Close everything and end with that exit code."""
+        """Close everything and exit with that code."""
         ...
 
     def lose_master(self) -> None:
-        """End as if the ROS master no longer answered."""
+        """Exit as if the ROS master no longer responded."""
         ...
 
     def lose_names(self) -> None:
@@ -43,7 +43,7 @@ class ProcessFaults:
     """Applies faults to this process.
 
     Args:
-        endings: of the process.
+        endings: the methods that end this process, or unregister its names.
     """
 
     def __init__(self, endings: Endings) -> None:
@@ -69,11 +69,11 @@ class ProcessFaults:
         return True
 
     def _crash(self, fault: Crash) -> bool:
-        # A core file in the work folder would only take space.
+        # A core file in the work folder would only take up space.
         resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
         if fault.signal is not signal.SIGKILL:
             signal.signal(fault.signal, signal.SIG_DFL)
-        signal.raise_signal(fault.signal)  # to this thread, so that nothing more is answered
+        signal.raise_signal(fault.signal)  # to this thread, so that it sends no further response
         return False
 
     def _exit(self, fault: Exit) -> bool:
@@ -82,7 +82,7 @@ class ProcessFaults:
 
     def _hang(self, _fault: Hang) -> bool:
         signal.raise_signal(signal.SIGSTOP)
-        return True  # somebody sent SIGCONT
+        return True  # the process received SIGCONT
 
     def _lose_master(self, _fault: MasterLostFault) -> bool:
         self._endings.lose_master()
@@ -95,6 +95,6 @@ class ProcessFaults:
     def _grow(self, fault: MemoryGrowth) -> bool:
         if self._kept_mib + fault.mib <= fault.most_mib:
             self._kept_mib += fault.mib
-            # Pages of zeros would be shared, and no memory taken.
+            # The kernel shares pages of zeros, so they would occupy no memory.
             self._kept.append(b"\1" * int(fault.mib * _MIB))
         return True

@@ -1,8 +1,9 @@
 """The schedule of a life: the faults at its k-th event.
 
-Pure, and a function rather than a stream: the draw for an event is a hash over the seed, the simulator, its
-life, the fault and the event's number. So a draw does not depend on earlier draws, and an additional fault
-changes no other. Two lives of a simulator, or two simulators of a group, have different draws.
+Pure, and a function rather than a stream: the random draw for an event is a hash over the seed, the
+simulator, its life, the fault and the event's number. So a draw does not depend on earlier draws, and one
+more fault does not change the others. Two lives of a simulator, or two simulators of a group, have different
+draws.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ class Life:
 
     Attributes:
         seed: chosen by a person.
-        simulator: which one it is among those with that seed.
+        simulator: its name, which distinguishes it from others with that seed.
         number: of the life, counted from 1 by the program that starts the simulator.
     """
 
@@ -40,17 +41,17 @@ class FaultSchedule:
     life: Life
 
     def happens(self, fault: InjectedFault, number: int) -> bool:
-        """Return whether `fault` happens at the event of that number, counted from 1."""
+        """Return whether `fault` occurs at event `number`, counted from 1."""
         return fault.trigger.fires(number, self._draw(fault, number, "happens"))
 
     def at(self, event: FaultEvent, number: int) -> tuple[InjectedFault, ...]:
-        """Return the faults that happen at the event of that number, in the order they were written."""
+        """Return the faults that occur at event `number`, in the order in which they were written."""
         return tuple(
             fault for fault in self.faults if fault.trigger.event is event and self.happens(fault, number)
         )
 
     def delay_s(self, fault: Delayed, number: int) -> float:
-        """Return how long the fault delays the event of that number: latency, and a share of the jitter."""
+        """Return the delay of event `number` by the fault: the latency, plus a random share of the jitter."""
         return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
 
     def _draw(self, fault: InjectedFault, number: int, purpose: str) -> float:

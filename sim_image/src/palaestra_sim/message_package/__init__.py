@@ -1,8 +1,8 @@
-"""The ROS package webots_ros, made from the definitions of the interface.
+"""The ROS package webots_ros, generated from the definitions of the interface.
 
-ROS's own tools and a program's `import webots_ros.srv` need it; simulators, sidecars and trainers do not.
+ROS's own tools and programs with `import webots_ros.srv` need it; simulators, sidecars and trainers do not.
 
 - `files`: every file of the package, as text
-- `writing`: the package in a folder, written atomically
+- `package_writer`: writes the package into a folder, atomically
 - `cli`: `palaestra-webots-ros`
 """

@@ -15,10 +15,10 @@ from palaestra_sim.message_package.package_writer import make_importable, write
 _WRONG = 2
 
 _EPILOG = """\
-Writes FOLDER/webots_ros; ROS's tools find it with FOLDER on ROS_PACKAGE_PATH, or in /usr/share without.
-An installed webots_ros wins: one that is importable, or earlier on ROS_PACKAGE_PATH.
+Writes FOLDER/webots_ros. ROS's tools find it if FOLDER is on ROS_PACKAGE_PATH; they find /usr/share without
+that. An installed webots_ros is used instead if it is importable, or earlier on ROS_PACKAGE_PATH.
 
-exit codes: 0; 2 the folder cannot be written, or has a webots_ros of another origin
+exit codes: 0; 2 the folder cannot be written, or has a webots_ros that Palaestra did not write
 """
 
 

@@ -1,15 +1,15 @@
 """Every file of the package webots_ros, as text: a manifest, the definitions, and genpy's Python modules.
 
-The package has two peculiarities, so that an installed webots_ros and a plain Debian both work.
+The package has two peculiarities, so that it works next to an installed webots_ros and on a plain Debian.
 
-`src/webots_ros` has no `__init__.py`. Python takes a folder without one only if no `sys.path` entry, also a
-later one, has a package of that name: an installed webots_ros is imported instead.
+`src/webots_ros` has no `__init__.py`. Python uses a folder without one only if no entry of `sys.path`, not
+even a later one, has a package of that name. So an installed webots_ros is imported instead.
 
 The manifest is a `manifest.xml` and names no dependencies. Only for such a package does roslib add `src` to
 the path of ROS's tools, and only if each dependency has a manifest. Debian has the manifests of std_msgs,
 geometry_msgs and sensor_msgs in their C++ packages.
 
-Only this module needs genpy and genmsg: its Python modules are for rospy, which has them.
+Only this module needs genpy and genmsg: its Python modules are for rospy, which depends on both.
 """
 
 from __future__ import annotations
@@ -79,6 +79,6 @@ def _context() -> Any:
 
 
 def _text(lines: Iterable[str]) -> str:
-    # genpy counts variables across modules; from 1 for each, a type has the same text every time.
+    # genpy counts variables across modules; a reset before each module keeps the text of a type the same.
     genpy.generator.reset_var()
     return "".join(f"{line}\n" for line in lines)

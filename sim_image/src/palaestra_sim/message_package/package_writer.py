@@ -13,7 +13,7 @@ from palaestra_sim.message_package.files import MANIFEST, NAME, package_files
 def write(folder: Path) -> Path:
     """Write the package into `folder`, in place of one of an earlier release, and return its path.
 
-    If the process is killed, the folder has the earlier package, the new one, or none, but never a part.
+    If the process is killed, the folder has the whole earlier package, the whole new one, or neither.
 
     Raises:
         ForeignPackageError: the folder has a webots_ros that Palaestra did not write.
@@ -21,7 +21,7 @@ def write(folder: Path) -> Path:
     target = folder / NAME
     _check_ours(target)
     folder.mkdir(parents=True, exist_ok=True)
-    # rospkg does not look into hidden folders.
+    # The temporary folder is hidden because rospkg skips hidden folders.
     with tempfile.TemporaryDirectory(prefix=f".{NAME}-", dir=folder) as temporary:
         made = Path(temporary) / NAME
         _fill(made)
@@ -33,7 +33,10 @@ def write(folder: Path) -> Path:
 
 
 def make_importable(package: Path, packages_of_python: Path) -> None:
-    """Make the package importable for the Python with the folder `packages_of_python`, unless it has one."""
+    """Make the package importable for the Python whose packages are in `packages_of_python`.
+
+    A package webots_ros that is installed there is imported instead.
+    """
     lines = packages_of_python / f"{NAME}.pth"
     part = lines.with_suffix(".part")
     part.write_text(f"{package.resolve() / 'src'}\n")

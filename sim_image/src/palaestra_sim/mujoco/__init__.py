@@ -1,21 +1,21 @@
-"""MuJoCo under the scene: masses, forces, contacts, and loose things that move when they are pushed.
+"""MuJoCo as the physics of a scene: masses, forces, contacts, and dynamic solids that move when pushed.
 
 - `cli`: `palaestra-mujoco`
 - `physics`: the bodies and obstacles of a world
-- `model`: from robots and shapes to MuJoCo's model
-- `geoms`: from shapes to parts of a model, and what they touch
+- `model`: builds MuJoCo's model from robots and shapes
+- `geoms`: builds parts of a model from shapes, and sets which of them may touch
 - `friction`: between materials
 - `links`: parts of robots on joints, and doors
 - `body`: a robot that drives
-- `loose`: a thing that moves when it is pushed
+- `free_bodies`: dynamic solids
 - `library`: MuJoCo itself
-- `rays`: how far the beams of sensors travel until a boundingObject
-- `sight`: how far those of lidars travel until a shape
-- `eye`, `pictures`: what cameras see
-- `visible`: from visible shapes to a model of their own
-- `canvas`, `pixels`: OpenGL
-- `film`: the file of a movie
-- `mjcf`: worlds in MuJoCo's own format, beside all of these
+- `rays`: the distances that the beams of sensors travel to a boundingObject
+- `lidar_rays`: the distances that the beams of lidars travel to a shape
+- `camera`, `renderer`: the images of cameras
+- `visual_model`: a separate model of the visible shapes
+- `gl_context`, `pixels`: OpenGL
+- `video`: the file of a movie
+- `mjcf`: worlds in MuJoCo's own format, independent of the modules above
 
-Worlds, devices and the interface are those of all simulators: `scene` and `front`.
+Worlds, devices and the interface are those of all simulators: `scene` and `ros_controller`.
 """

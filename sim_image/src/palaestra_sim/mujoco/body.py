@@ -1,7 +1,7 @@
 """A robot in MuJoCo: three joints on the floor, and three force-limited servos in the robot's own axes.
 
-The speed that the servos aim at comes from the law of the wheels, once a basic step. The wheels themselves
-touch nothing: rollers and capsules as wheels are 4 to 25 times as slow, and drift by decimeters
+Once a basic step, the wheel kinematics set the target speed of the servos. The wheels themselves touch
+nothing: rollers and capsules as wheels are 4 to 25 times as slow, and drift by decimeters
 (docs/decisions/0017).
 """
 
@@ -24,9 +24,9 @@ class MujocoBody:
     """A robot that drives; see `Body`.
 
     Attributes:
-        build: what it is made of.
+        build: its parts.
         base: its wheels.
-        poses: where each shape of its outline is, in its own frame.
+        poses: the pose of each shape of its outline, in its own frame.
         radius_m: of the circle around its outline.
         x, y, heading_rad, c, s, velocity, touched: see `Body`.
     """
@@ -35,11 +35,11 @@ class MujocoBody:
         self.build = build
         self.base = build.base
         self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
-        # Read now, in the robot's frame; later the places are those in the world.
+        # Read now, while they are relative to the robot; later they are poses in the world.
         self.poses = tuple(shape.pose for shape in build.outline)
         self.touched = 0
         self.velocity = (0.0, 0.0, 0.0)
-        self._joints: Any = None  # views of MuJoCo's arrays, once there is a model
+        self._joints: Any = None  # views of MuJoCo's arrays; None before the first model
         self._speeds: Any = None
         self._controls: Any = None
         # In the robot's axes: see `command`.
@@ -51,7 +51,7 @@ class MujocoBody:
         self.c = 1.0
 
     def attach(self, joints: Any, speeds: Any, controls: Any) -> None:
-        """Take the parts of a new model's arrays that belong to this body, and write its state there."""
+        """Use the parts of a new model's arrays that belong to this body, and write its state there."""
         self._joints, self._speeds, self._controls = joints, speeds, controls
         self.write()
 
@@ -61,32 +61,32 @@ class MujocoBody:
         self._speeds[:] = self.velocity
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the parts of the body that these shapes are, as bits of `touched`."""
+        """Return the parts of the body that match these shapes, as bits of `touched`."""
         parts = (*self.build.outline, *(shape for link in self.build.links for shape in link.shapes))
         return sum(1 << index for index, shape in enumerate(parts) if shape in outline)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Place the robot somewhere; its motion continues."""
+        """Set the position and heading of the robot; its motion continues."""
         self._stand(x, y, heading_rad)
         if self._joints is not None:
             self._joints[:] = x, y, heading_rad
 
     def halt(self) -> None:
-        """Stop all motion; the motors begin again from rest."""
+        """Stop all motion; the motors start from rest."""
         self.base.halt()
         self.touched = 0
         self._set_speed(0.0, 0.0, 0.0)
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors start from there."""
+        """Give the body a velocity in world axes; its motors continue from there."""
         self.base.push(vx * self.c + vy * self.s, vy * self.c - vx * self.s, omega)
         self._set_speed(vx, vy, omega)
 
     def command(self, step_s: float, *, powered: bool) -> None:
         """Turn the wheels for one basic step, and set the speeds of the servos.
 
-        A servo needs a part of the step to reach a new speed, and the next step makes up for the distance
-        that this cost. So a robot stops where the law of its wheels says.
+        A servo needs a part of the step to reach a new speed. The next step compensates for the distance that
+        is lost in this time. So a robot stops where the wheel kinematics say.
         """
         if powered:
             self.base.turn(step_s)
@@ -97,7 +97,7 @@ class MujocoBody:
         self._controls[:] = self._aims
 
     def follow(self, step_s: float) -> None:
-        """Take the pose that MuJoCo has computed."""
+        """Copy the pose that MuJoCo has computed."""
         x, y, turned = self._joints.tolist()
         heading = math.remainder(turned, 2.0 * math.pi)
         omega = math.remainder(heading - self.heading_rad, 2.0 * math.pi) / step_s
@@ -106,10 +106,10 @@ class MujocoBody:
         self._stand(x, y, heading)
 
     def _lagged(self, heading_rad: float) -> list[float]:
-        """Return the mean speed that the servos missed in this step, seen from the middle of it.
+        """Return the mean speed that the servos missed in this step, seen from the middle of the step.
 
-        It is at most the change of the speed that was wanted. An obstacle that holds a robot back changes
-        nothing that was wanted, so the robot does not jump when it is free again.
+        It is at most the change of the target speed. An obstacle that holds a robot back does not change the
+        target speed, so the robot does not jump when it is free again.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
         vx, vy, omega = self.velocity
@@ -120,7 +120,7 @@ class MujocoBody:
         ]
 
     def _forget(self) -> None:
-        """Let the servos begin again from rest."""
+        """Let the servos start from rest."""
         self._wanted = self._changes = self._aims = self._lags = _REST
 
     def _set_speed(self, vx: float, vy: float, omega: float) -> None:
@@ -137,8 +137,8 @@ class MujocoBody:
         self.s = math.sin(heading_rad)
 
 
-_RESERVE: Final = 2.0  # of the force for the largest acceleration: a servo that lags must catch up
-GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within a substep of 4 ms or two
+_RESERVE: Final = 2.0  # times the force for the largest acceleration: a servo that lags must catch up
+GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within one or two substeps of 4 ms
 
 
 def servo(axis: int, inertia: float) -> tuple[float, float]:
@@ -147,7 +147,7 @@ def servo(axis: int, inertia: float) -> tuple[float, float]:
 
 
 def _reach(shape: Shape) -> float:
-    """Return how far a shape in the robot's frame reaches from its origin, seen from above."""
+    """Return the distance from the robot's origin to the farthest point of a shape, seen from above."""
     x, y, _ = shape.pose.position
     return math.hypot(x, y) + (
         shape.size[0] / 2.0 if shape.kind != "box" else math.hypot(shape.size[0], shape.size[1]) / 2.0

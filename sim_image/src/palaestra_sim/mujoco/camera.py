@@ -1,4 +1,4 @@
-"""A camera in MuJoCo: see `Eye`."""
+"""A camera in MuJoCo: see `CameraInterface`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BLACK: Final = bytes((0, 0, 0, 255))
 
 
 class MujocoCamera:
-    """A place and a lens, and the pictures of the world from there."""
+    """A frame and a lens, and the images of the world from there."""
 
     def __init__(self, pictures: Renderer, place: Frame, lens: Lens) -> None:
         self._pictures = pictures
@@ -25,7 +25,7 @@ class MujocoCamera:
         self._lens = lens
 
     def open(self) -> None:
-        """Get ready to draw."""
+        """Prepare to render."""
         self._pictures.open()
 
     def colors(self) -> memoryview:
@@ -41,17 +41,17 @@ class MujocoCamera:
         return memoryview(depths).cast("B")
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
-        """Return where each owner is visible."""
+        """Return the image rectangle in which each owner is visible."""
         numbers = self._pictures.segments(self._place, self._lens)
         owners = [owner(thing.node) for thing in self._pictures.things]
         known = list(dict.fromkeys(it for it in owners if it is not None))
-        # By the number of a thing, the number of its owner; the last one is for pixels without a thing.
+        # From the number of a visible shape to that of its owner; the last entry is for pixels without one.
         table = np.array([*(-1 if it is None else known.index(it) for it in owners), -1])
         of_owner = table[numbers]
         return {known[at]: _corners(of_owner == at) for at in np.unique(of_owner).tolist() if at >= 0}
 
     def painted(self, color: Callable[[SceneNode], bytes | None]) -> memoryview:
-        """Return a picture in which each shape has one color."""
+        """Return an image in which each shape has one color."""
         numbers = self._pictures.segments(self._place, self._lens)
         colors = [color(thing.node) or _BLACK for thing in self._pictures.things]
         table = np.frombuffer(b"".join((*colors, _BLACK)), np.uint8).reshape(-1, len(_BLACK))

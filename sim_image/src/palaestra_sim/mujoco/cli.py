@@ -12,8 +12,8 @@ from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import LeaveOut
 
-# MuJoCo is imported in these functions, so that the program can report its absence as its own error, and
-# `--help` needs no MuJoCo.
+# These functions import MuJoCo, so that the program can report a missing MuJoCo as its own error, and
+# `--help` works without it.
 
 
 def _physics() -> Physics:
@@ -41,7 +41,7 @@ def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut, root: Path | None) 
 
 MUJOCO = Program(
     name="palaestra-mujoco",
-    description="Simulate a world with MuJoCo, and answer over ROS 1 like the `ros` controller of Webots.",
+    description="Simulate a world in MuJoCo with the ROS 1 interface of Webots' `ros` controller.",
     physics=_physics,
     mjcf=_mjcf,
 )

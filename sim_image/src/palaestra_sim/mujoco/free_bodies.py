@@ -1,4 +1,4 @@
-"""A loose thing in MuJoCo: a body on a free joint."""
+"""A dynamic solid in MuJoCo: a body on a free joint."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from palaestra_sim.scene.dynamic_solids import BodyState, DynamicFrame
 from palaestra_sim.scene.geometry import Pose, quaternion_to_matrix, to_quaternion
 
 _PLACE: Final = 7  # numbers of a free joint: a position, and a quaternion w, x, y, z
-_SPEED: Final = 6  # a velocity in world axes, and a turning in the body's
+_SPEED: Final = 6  # a velocity in world axes, and an angular velocity in the body's
 
 
 class FreeBody:
-    """One loose thing of a model; its place follows it.
+    """One dynamic solid of a model; its frame follows it.
 
     Attributes:
         place: its frame in the scene.
@@ -28,7 +28,7 @@ class FreeBody:
         self._speed = data.qvel[speed : speed + _SPEED]
 
     def begin(self, course: BodyState, changed: dict[DynamicFrame, None]) -> None:
-        """Begin at a place with a speed; what clients do to the place puts it among `changed`."""
+        """Start from a state; a client's change to the frame adds the frame to `changed`."""
         self._write(course.pose)
         self._move(course)
         self.place.put = False
@@ -38,7 +38,7 @@ class FreeBody:
         self.place.follow = self._course
 
     def take(self) -> None:
-        """Take what clients did to it: put it somewhere, or pushed it."""
+        """Apply a client's changes: a new pose or a push."""
         place = self.place
         if place.put:
             self._write(place.ground_pose)
@@ -58,5 +58,5 @@ class FreeBody:
         self._where[:] = (*pose.position, w, x, y, z)
 
     def _move(self, course: BodyState) -> None:
-        """Write the speed of a course, whose turning is in world axes."""
+        """Write the velocities of a state; its angular velocity is in world axes."""
         self._speed[:] = (*course.velocity, *course.pose.inverse.turned(course.turning))

@@ -1,8 +1,8 @@
-"""Frictions of pairs of materials, in MuJoCo, whose geoms have one friction each.
+"""Frictions between pairs of materials in MuJoCo, where each geom has only one friction.
 
-Of two geoms, the one with the higher priority decides. The rarer a material is, the higher is its priority,
-and its friction is the one with the most common material. Pairs of materials for which that is wrong are
-written as pairs of geoms.
+If two geoms touch, MuJoCo uses the friction of the one with the higher priority. The rarer a material is, the
+higher is its priority, and its friction is the one with the most common material. Where this gives a wrong
+friction, the pairs of geoms are listed explicitly.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Surface = tuple[Any, str]  # a geom, and its material
 
 
 def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: PhysicsSettings) -> None:
-    """Give all geoms of a model that is being made the frictions of their materials."""
+    """Give all geoms of a model under construction the frictions of their materials."""
     ranks = [material for material, _ in Counter(material for _, material in surfaces).most_common()]
     friction = {material: surroundings.friction(material, ranks[0]) for material in ranks}
     for geom, material in surfaces:
@@ -43,7 +43,7 @@ def set_frictions(spec: Any, surfaces: Sequence[Surface], surroundings: PhysicsS
 def _exceptions(
     spec: Any, surfaces: Sequence[Surface], friction: dict[str, float], surroundings: PhysicsSettings
 ) -> Iterator[tuple[Surface, Surface]]:
-    """Yield the pairs of geoms that may touch, and have another friction than the rarer material's."""
+    """Yield the pairs of geoms that may touch and whose friction differs from the rarer material's."""
     ranks = list(friction)
     wrong = {
         frozenset((one, other))

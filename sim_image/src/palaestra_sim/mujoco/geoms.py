@@ -1,6 +1,6 @@
-"""Shapes as MuJoCo's geoms: their sizes, what they touch, and their masses.
+"""Shapes as MuJoCo's geoms: their sizes, the geoms that they touch, and their masses.
 
-Which geoms meet is decided by 32 bits, one for each robot's heights and three for all.
+32 bits decide which geoms touch: one for the height range of each robot, and three for all.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from palaestra_sim.mujoco.body import MujocoBody
 
 SEEN: Final = 0  # the group of geoms that rays and contacts meet
-UNSEEN: Final = 1  # that of a robot's own links while it looks
+UNSEEN: Final = 1  # the group of a robot's own links during its rays
 ROBOTS: Final = 1 << 0  # all robots touch each other
-LOOSE: Final = 1 << 1  # loose things touch each other and robots
-STANDING: Final = 1 << 2  # and whatever stands
+LOOSE: Final = 1 << 1  # dynamic solids touch each other and robots
+STANDING: Final = 1 << 2  # robots' links and dynamic solids touch obstacles and floors
 _FIRST_ROBOT: Final = 3
 _BITS: Final = 32
 _LEAST_M3: Final = 1e-9
-FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
+FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' default coulombFriction between materials
 
 _GEOMS: Final = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -38,7 +38,7 @@ _GEOMS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What a geom touches, as bits of MuJoCo: its own type, and the types that it meets."""
+    """The geoms that a geom touches, as bits of MuJoCo: its own type, and the types that it meets."""
 
     contype: int
     conaffinity: int
@@ -46,17 +46,17 @@ class Touch:
 
 @dataclass(slots=True, eq=False)
 class Marks:
-    """The geoms of a model while it is made, each with its shape, and a robot's with its body and bit."""
+    """The geoms of a model under construction, each with its shape; for a robot also its body and bit."""
 
     entries: list[tuple[Any, Shape, MujocoBody | None, int]] = field(default_factory=list)
 
     def note(self, geom: Any, shape: Shape, body: MujocoBody | None = None, bit: int = 0) -> None:
-        """Note whose a geom is."""
+        """Record the shape of a geom, and its robot's body."""
         self.entries.append((geom, shape, body, bit))
 
 
 def own_bit(index: int) -> int:
-    """Return the bit of the heights of a robot; robots beyond the last bit share it."""
+    """Return the bit for the height range of a robot; robots beyond the last bit share it."""
     return 1 << min(_FIRST_ROBOT + index, _BITS - 2)
 
 
@@ -78,7 +78,7 @@ def add_geom(body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
 
 
 def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
-    """Give a body the mass of a Solid, whose frame is at `frame` in the body's; `geoms` are its shapes'."""
+    """Give a body the mass of a Solid with the pose `frame` in the body; `geoms` are those of its shapes."""
     if matter.mass_kg <= 0.0:
         return
     if matter.shapes and matter.center is None and matter.inertia is None:
@@ -93,7 +93,7 @@ def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Sh
 
 
 def spread(mass_kg: float, shapes: Sequence[Shape], geoms: Iterable[Any]) -> None:
-    """Give geoms a mass together, by their volumes."""
+    """Divide a mass among geoms by their volumes."""
     density = mass_kg / max(sum(map(volume_m3, shapes)), _LEAST_M3)
     for geom in geoms:
         geom.density = density

@@ -1,7 +1,7 @@
-"""The one canvas of a process: an OpenGL context without a window, loaded for the first picture.
+"""The one OpenGL context of a process: it has no window, and is opened for the first image.
 
-A simulator without cameras needs no OpenGL. One context serves all worlds of a process, one at a time: what a
-world has put on it is freed when another one draws, and at the end of the process.
+A simulator without cameras needs no OpenGL. One context serves all worlds of a process, one at a time: the
+objects of a world in it are freed when another world renders, and at the end of the process.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from palaestra_sim.ros_interfaces import UnsimulatedError
 _BACKENDS: Final = {
     "egl": "libegl1 libgl1-mesa-dri libopengl0",
     "osmesa": "libosmesa6",
-}  # with their packages in Debian
-_FONT: Final = mujoco.mjtFontScale.mjFONTSCALE_100.value  # the smallest; no text is drawn
+}  # values: the packages in Debian
+_FONT: Final = mujoco.mjtFontScale.mjFONTSCALE_100.value  # the smallest font, because no text is rendered
 
 
 class GlContext:
-    """An OpenGL context, and what the present world has put on it."""
+    """An OpenGL context, and the objects of the current world in it."""
 
     def __init__(self) -> None:
         self._context: Any = _open_context()
         self._drawing: Any = None
         self._owner: object = None
         self._size = (0, 0)
-        atexit.register(self.close)  # after the one of mujoco.egl, so it is called before
+        atexit.register(self.close)  # registered after the hook of mujoco.egl, so it runs before that
 
     def take(self, owner: object, model: Any, size: tuple[int, int]) -> Any:
-        """Return the drawing context of a model, with room for a picture of `size`.
+        """Return the rendering context of a model, with room for an image of `size`.
 
-        `owner` has the canvas until another one takes it, and always has the same model.
+        `owner` keeps the context until another owner takes it, and always passes the same model.
         """
         self._context.make_current()
         if self._owner is not owner or self._drawing is None:
@@ -52,24 +52,24 @@ class GlContext:
         return self._drawing
 
     def release(self) -> None:
-        """Free what the present world has put on the canvas."""
+        """Free the objects of the current world in the context."""
         if self._drawing is not None:
             self._context.make_current()
             self._drawing.free()
         self._drawing = self._owner = None
 
     def close(self) -> None:
-        """Free everything; safe to repeat."""
+        """Free everything; safe to call again."""
         self.release()
         self._context.free()
 
 
 @cache
 def canvas() -> GlContext:
-    """Return the canvas of this process.
+    """Return the OpenGL context of this process.
 
     Raises:
-        UnsimulatedError: this machine cannot draw; the message names what to install.
+        UnsimulatedError: this machine cannot render; the message names the packages to install.
     """
     return GlContext()
 
@@ -83,15 +83,13 @@ def _open_context() -> Any:
     name = os.environ.get("MUJOCO_GL", "").strip().lower() or "egl"
     if name not in _BACKENDS:
         raise UnsimulatedError(f"MUJOCO_GL={name} draws no pictures; use {' or '.join(_BACKENDS)}")
-    # Mesa would otherwise draw with threads of its own, which wait for each other in small pictures.
+    # Mesa would otherwise render with its own threads, which wait for each other in small images.
     os.environ.setdefault("LP_NUM_THREADS", "0")
-    # It reports an accelerator that is not needed.
+    # The logger reports a missing accelerator that is not needed.
     logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     try:
         return import_module(f"mujoco.{name}").GLContext(1, 1)
-    except (
-        Exception
-    ) as error:  # libraries of OpenGL fail with ImportError, AttributeError and errors of their own
+    except Exception as error:  # OpenGL libraries raise ImportError, AttributeError and their own errors
         raise UnsimulatedError(
             f"pictures need OpenGL ({name}), which does not work here: {error};"
             f" install the Debian packages {_BACKENDS[name]}"

@@ -1,4 +1,4 @@
-"""Rays of MuJoCo that see shapes: the lidars of one robot, on the model that pictures are drawn from."""
+"""Rays of MuJoCo for the lidars of one robot, cast in the model from which images are rendered."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)],
 class LidarBeams:
     """The beams of one robot; beams that begin at one point are cast together.
 
-    A beam passes its robot, and what contains its origin: from inside, a surface is not drawn either.
+    A beam passes through its robot, and through shapes that contain its origin: the renderer does not show
+    a surface from inside either.
     """
 
     def __init__(self, pictures: Renderer, figure: Figure, beams: Sequence[Beam]) -> None:
@@ -32,7 +33,7 @@ class LidarBeams:
         self._own: tuple[VisualModel | None, Any] = (None, np.empty(0, int))
 
     def cast(self) -> list[float]:
-        """Return how far each beam travels now, in meters; its full reach if it meets nothing."""
+        """Return the distance that each beam travels now, in meters; its full reach if it meets nothing."""
         visible = self._pictures.placed()
         pose = self._figure.place.world_pose
         turned = np.array(pose.rotation).reshape(3, 3)
@@ -49,7 +50,7 @@ class LidarBeams:
         return travelled
 
     def _own_geoms(self, visible: VisualModel) -> Any:
-        """Return the numbers of the geoms that the robot carries; they are looked up once for each model."""
+        """Return the numbers of the geoms that the robot carries; they are computed once for each model."""
         if self._own[0] is not visible:
             carrier = self._figure.place
             places = [thing.place for thing in visible.things]
@@ -59,7 +60,7 @@ class LidarBeams:
 
 
 def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any]) -> Any:
-    """Return the distances to what faces the beams; adds the geoms that contain the origin to `passed`."""
+    """Return the distances to surfaces that face the beams; add geoms around the origin to `passed`."""
     count = len(directions)
     hits, distances, normals = np.empty(count, np.int32), np.empty(count), np.empty((count, 3))
     while True:

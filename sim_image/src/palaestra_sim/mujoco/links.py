@@ -1,7 +1,7 @@
-"""Links in MuJoCo: bodies on joints, servos that turn them, and sensors of the force on what is fixed.
+"""Links in MuJoCo: bodies on joints, servos that turn them, and sensors of the force on fixed links.
 
-A servo aims at the speed that the motor demands, with a force of at most the motor's. It adds what gravity
-takes, so a motor that holds a weight does not sag. Links touch everything but their own robot.
+A servo targets the speed that the motor demands, with at most the motor's force. It adds the force against
+gravity, so a motor that holds a weight does not sag. Links touch everything except their own robot.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.links import Link, frames_between, link_around
 from palaestra_sim.scene.motors import Motor
 
-_STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # of friction: with the default a held weight creeps
+_STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # of friction: with the default, a held weight creeps
 _TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)
 
 
 @dataclass(slots=True, eq=False)
 class Added:
-    """The parts of a link in a model that is being made.
+    """The parts of a link in a model under construction.
 
     Attributes:
         body: its body.
-        joint, servo, sensor: None if it has none.
+        joint, servo, sensor: None if the link does not have it.
     """
 
     link: Link
@@ -41,11 +41,11 @@ class Added:
 
 @dataclass(slots=True, eq=False)
 class Ground:
-    """What links are mounted on.
+    """The bodies on which links are mounted.
 
     Attributes:
-        roots: the bodies of robots and loose things, by their places.
-        stands: the bodies of what stands, by their places; mounting adds to them.
+        roots: the bodies of robots and dynamic solids, by their frames.
+        stands: the bodies of obstacles, by their frames; mounting a link adds to them.
     """
 
     spec: Any
@@ -54,7 +54,7 @@ class Ground:
     names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
 
     def under(self, place: Frame | None) -> tuple[Frame | None, Any]:
-        """Return the body around a place, with the place of that body."""
+        """Return the frame of the body around the frame `place`, and that body."""
         around = () if place is None else place.chain()
         for outer in around:
             if outer in self.roots:
@@ -67,7 +67,7 @@ class Ground:
 
 
 def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoBody | None) -> list[Added]:
-    """Add the links of one robot, outer ones first, or one that is on none; `body` is the robot's."""
+    """Add the links of one robot, outer ones first, or a link without a robot; `body` is the robot's."""
     added: dict[Link, Added] = {}
     bit = 0 if body is None else len(body.build.outline)
     for link in links:
@@ -123,7 +123,7 @@ def _add_joint(ground: Ground, added: Added) -> None:
 
 
 def _exclude(ground: Ground, added: Sequence[Added]) -> None:
-    """Let the links of a robot touch neither each other nor what they are mounted on."""
+    """Prevent contacts of a robot's links with each other and with the bodies on which they are mounted."""
     pairs = [(one.body.name, other.body.name) for one, other in combinations(added, 2)]
     for it in added:
         around = [place for place in it.link.place.chain() if place in ground.stands or place in ground.roots]
@@ -133,15 +133,15 @@ def _exclude(ground: Ground, added: Sequence[Added]) -> None:
 
 
 class LinkBody:
-    """One link of a compiled model, which its joint and motor follow.
+    """One link of a compiled model; it updates its joint and motor in the scene.
 
     Args:
-        added: where it is in the model.
+        added: its parts in the model.
         model: the model.
         data: its data.
 
     Attributes:
-        link: as in the scene.
+        link: the link in the scene.
     """
 
     def __init__(self, added: Added, model: Any, data: Any) -> None:
@@ -150,7 +150,7 @@ class LinkBody:
         self._joint: Joint | None = added.link.joint
         self._motor: Motor | None = None if self._joint is None else self._joint.motor
         self._known: tuple[float, float] | None = None
-        self._aim = 0.0  # in rad/s or m/s: the acceleration limits its changes, as in Webots
+        self._aim = 0.0  # target speed in rad/s or m/s: the acceleration limits its changes, as in Webots
         self._set: tuple[float, float, bool] | None = None
         self._sensor = -1 if added.sensor is None else int(model.sensor_adr[added.sensor.id])
         self._servo = -1 if added.servo is None else int(added.servo.id)
@@ -160,11 +160,11 @@ class LinkBody:
             self._gain = GAIN * float(model.dof_M0[self._dof])
 
     def forget(self) -> None:
-        """Write position and speed of the joint anew before the next step."""
+        """Write position and speed of the joint again before the next step."""
         self._known = None
 
     def take(self) -> bool:
-        """Take what clients did to the joint; return whether they did anything."""
+        """Copy a client's changes of the joint to MuJoCo; return whether there were any."""
         joint = self._joint
         if joint is None or self._known == (joint.now, joint.turning):
             return False
@@ -174,7 +174,7 @@ class LinkBody:
         return True
 
     def command(self, step_s: float, *, powered: bool) -> None:
-        """Set what the servo aims at in the next basic step."""
+        """Set the target of the servo for the next basic step."""
         joint, motor = self._joint, self._motor
         if joint is None:
             return
@@ -191,11 +191,11 @@ class LinkBody:
         data.ctrl[self._servo] = self._aim + load / self._gain
 
     def follow(self) -> None:
-        """Take what MuJoCo has computed."""
+        """Copy the values that MuJoCo has computed."""
         data, joint, motor = self._data, self._joint, self._motor
         if joint is None:
             x, y, z = data.sensordata[self._sensor : self._sensor + 3].tolist()
-            self.link.force = (-x, -y, -z)  # MuJoCo measures what holds it
+            self.link.force = (-x, -y, -z)  # MuJoCo measures the force that holds the link
             return
         position, speed = float(data.qpos[self._at]), float(data.qvel[self._dof])
         joint.follow(position, speed)
@@ -204,7 +204,7 @@ class LinkBody:
             motor.feedback_nm = float(data.actuator_force[self._servo])
 
     def _limit(self, joint: Joint, motor: Motor | None) -> None:
-        """Set what limits and slows the joint, if that has changed."""
+        """Set the limit and the damping of the joint, if they have changed."""
         model, dof = self._model, self._dof
         damping = joint.braking
         limit, direct = 0.0, False
@@ -224,5 +224,5 @@ class LinkBody:
 
 
 def bodies(added: Mapping[Any, Sequence[Added]], model: Any, data: Any) -> dict[Any, tuple[LinkBody, ...]]:
-    """Return the links of a compiled model, by the robot that they are on."""
+    """Return the links of a compiled model, by their robot."""
     return {whose: tuple(LinkBody(it, model, data) for it in links) for whose, links in added.items()}

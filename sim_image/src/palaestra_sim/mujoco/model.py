@@ -1,7 +1,7 @@
-"""From the robots, shapes and links of a world to MuJoCo's model.
+"""Build MuJoCo's model from the robots, shapes and links of a world.
 
-A robot is one body on three joints, an obstacle a body without joints. Which of them meet is decided by
-heights, as in the stub: what a robot drives over or under does not touch it.
+A robot is one body on three joints, an obstacle a body without joints. Heights decide which of them touch, as
+in the stub: a robot does not touch an object that it drives over or under.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
 
-MASS_KG: Final = 23.0  # of a robot without physics: a Robotino 3 with its batteries
-STANDING_KG: Final = 1e5  # of one that nothing drives: it stands like a wall
+MASS_KG: Final = 23.0  # of a robot without Physics: that of a Robotino 3 with its batteries
+STANDING_KG: Final = 1e5  # of a robot without a drive, so that it stands like a wall
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
 
 
 @dataclass(slots=True, eq=False)
 class Built:
-    """A compiled model with its data, and which part of it is of what.
+    """A compiled model with its data, and the objects of the scene to which its parts belong.
 
     Attributes:
-        figures: each robot that moves, with its body and the number of this in the model.
-        geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
-        stands: the number of the body of each place that has obstacles, or links mounted on it.
-        loose: the loose things.
-        links: the links of each robot, and under None those on no robot.
-        own_geoms: the numbers of the geoms on them.
-        fixed: where the obstacles are that do not move.
-        of_robots: whether a geom is a part of a robot, by number.
-        changed: the loose things that clients moved since the physics looked.
+        figures: each robot that moves, with its body and the number of this body in the model.
+        geoms: by number, the shape of an obstacle or outline; for a robot also its body.
+        stands: by frame, the number of the body that has obstacles, or links mounted on it.
+        loose: the dynamic solids.
+        links: the links of each robot; the key None has those without a robot.
+        own_geoms: the numbers of the geoms on these links.
+        fixed: the poses of the obstacles that do not move.
+        of_robots: by number, whether a geom is part of a robot.
+        changed: the dynamic solids that clients moved since the last step.
     """
 
     model: Any
@@ -74,13 +74,13 @@ class Built:
     changed: dict[DynamicFrame, None]
 
     def body_of(self, figure: Figure) -> int:
-        """Return the number of a robot's body; -1 if it has none."""
+        """Return the number of a robot's body; -1 if it does not have one."""
         found = self.figures.get(figure)
         return -1 if found is None else found[1]
 
     @contextmanager
     def unseen(self, figure: Figure) -> Iterator[None]:
-        """Let rays pass the links of a robot meanwhile."""
+        """Let rays pass through the links of a robot during the block."""
         own = self.own_geoms.get(figure)
         if own is None:
             yield
@@ -92,7 +92,7 @@ class Built:
             self.model.geom_group[own] = SEEN
 
     def put_obstacles(self) -> None:
-        """Put the obstacles where their places are now."""
+        """Set the poses of the obstacles to those of their frames."""
         for place, number in self.stands.items():
             mocap = self.model.body_mocapid[number]
             if mocap < 0:
@@ -102,11 +102,11 @@ class Built:
             self.model.body_pos[number][2] = figure.place.height_m
 
     def displaced(self) -> frozenset[Frame]:
-        """Return the places of the obstacles that are no longer where the model has them."""
+        """Return the frames of obstacles that have moved since the model was built."""
         return frozenset(place for place, pose in self.fixed.items() if place.ground_pose != pose)
 
     def feel(self) -> None:
-        """Note which parts of robots are touched."""
+        """Record which parts of robots are touched."""
         touched = self.data.contact.geom.ravel()
         for geom in touched[self.of_robots[touched]].tolist():
             _, body, bit = self.geoms[geom]
@@ -114,7 +114,7 @@ class Built:
                 body.touched |= bit
 
     def take(self) -> bool:
-        """Take what clients did to loose things and joints; return whether they did anything."""
+        """Apply clients' changes of dynamic solids and joints; return whether there were any."""
         changed = list(self.changed)
         self.changed.clear()
         for place in changed:
@@ -123,12 +123,12 @@ class Built:
         return bool(changed or moved)
 
     def all_links(self) -> Iterator[LinkBody]:
-        """Yield the links of all robots, and those of none."""
+        """Yield the links of all robots, and the links without a robot."""
         for links in self.links.values():
             yield from links
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
-        """Let a force act on a robot or a loose thing until the forces are cleared."""
+        """Apply a force to a robot or a dynamic solid until the forces are cleared."""
         found = self.figures.get(target) if not isinstance(target, DynamicSolid) else None
         number = self.loose[target.place].number if isinstance(target, DynamicSolid) else -1
         number = number if found is None else found[1]
@@ -138,13 +138,13 @@ class Built:
         self.data.xfrc_applied[number] += np.concatenate((push.force, torque))
 
     def settle(self) -> None:
-        """Compute where everything is, from the joints and the obstacles."""
+        """Compute all poses, from the joints and the obstacles."""
         mujoco.mj_kinematics(self.model, self.data)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contents:
-    """What a model is made of; see `Physics.arrange`."""
+    """The contents of a model; see `Physics.arrange`."""
 
     figures: tuple[Figure, ...] = ()
     solids: tuple[Shape, ...] = ()
@@ -158,12 +158,12 @@ class Contents:
 
 
 def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Frame] = frozenset()) -> Built:
-    """Return the model of robots, obstacles, loose things and links, in their present state.
+    """Return the model of robots, obstacles, dynamic solids and links, in their current state.
 
-    What touches a body that can be put elsewhere never sleeps. So obstacles cannot, where there are things
-    that sleep, except those that have `moved`.
+    A body that touches a movable obstacle never sleeps in MuJoCo. So if there are bodies that can sleep,
+    obstacles are fixed, except those that have `moved`.
     """
-    courses = [thing.place.course for thing in contents.loose]  # of the model before, if there was one
+    courses = [thing.place.course for thing in contents.loose]  # from the previous model, if there was one
     spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
     stands, fixed = _add_obstacles(spec, contents, moved, marks)
     robots = {figure: _add_robot(spec, figure, body, at, marks) for at, (figure, body) in enumerate(moving)}
@@ -200,12 +200,12 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
 
 
 def _begin_spec(spec: Any, surroundings: PhysicsSettings) -> list[Any]:
-    """Set what holds everywhere in a model; return the floors."""
+    """Set the options of the whole model; return the floors."""
     spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
-    spec.compiler.balanceinertia = True  # Webots takes any matrix
+    spec.compiler.balanceinertia = True  # Webots accepts any inertia matrix
     spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
-    # The fast one drops terms between x and y: a robot is then slower across the axes than along them.
+    # The fast integrator drops terms between x and y: a robot is then slower across the axes than along them.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return [
@@ -241,7 +241,7 @@ def _of_robots(count: int, marks: Marks) -> Any:
 
 
 def _begin(built: Built) -> None:
-    """Put obstacles and robots where they are; what is on a robot makes its servos stronger."""
+    """Set the poses of obstacles and robots; scale the servos of a robot to the mass of its links."""
     built.put_obstacles()
     model, data = built.model, built.data
     for figure, (body, number) in built.figures.items():
@@ -280,7 +280,7 @@ def _add_obstacle(
     robots: Sequence[tuple[Figure, MujocoBody]],
     marks: Marks,
 ) -> Any:
-    # MuJoCo looks at the pose of bodies without mocap once.
+    # MuJoCo fixes the pose of a body without mocap at compile time.
     added = spec.worldbody.add_body(mocap=pose is None, name=f"stand {len(marks.entries)}")
     if pose is not None:
         put(added.pos, added.quat, pose)

@@ -1,7 +1,7 @@
-"""The physics of MuJoCo: one model of all robots and obstacles, made anew when one comes or goes.
+"""The physics of MuJoCo: one model of all robots and obstacles, rebuilt when one is added or removed.
 
 A basic step is a whole number of MuJoCo's steps. After it, every body has the pose that the scene's devices
-read. Rays are cast when a sensor is sampled. Pictures have a model of their own.
+read. Rays are cast when a sensor is sampled. Images are rendered from a separate model.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.visuals import View
 
-LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
+LONGEST_STEP_S: Final = 0.004  # of MuJoCo: with a longer step, contacts are soft
 
 
 class MujocoPhysics:
@@ -55,7 +55,7 @@ class MujocoPhysics:
         return MujocoBody(build)
 
     def begin(self, surroundings: PhysicsSettings) -> None:
-        """Take gravity and frictions of the world."""
+        """Set gravity and frictions of the world."""
         self._surroundings = surroundings
         self._stale = True
 
@@ -66,7 +66,7 @@ class MujocoPhysics:
         loose: Sequence[DynamicSolid],
         doors: Sequence[Link] = (),
     ) -> None:
-        """Take these robots, obstacles, loose things and doors as the contents of the world."""
+        """Set these robots, obstacles, dynamic solids and doors as the contents of the world."""
         contents = Contents(
             figures=tuple(figures), solids=tuple(solids), loose=tuple(loose), doors=tuple(doors)
         )
@@ -85,7 +85,7 @@ class MujocoPhysics:
         self._settled = False
 
     def advance(self, step_s: float) -> None:
-        """Move the bodies on by one basic step."""
+        """Move the bodies by one basic step."""
         built = self._fresh()
         steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
         built.model.opt.timestep = step_s / steps
@@ -111,7 +111,7 @@ class MujocoPhysics:
         self._settled = False
 
     def reset(self) -> None:
-        """Forget the past, such as the forces of the last step, from which the solver would start."""
+        """Discard the past, such as the forces of the last step, from which the solver would start."""
         mujoco.mj_resetData(self._built.model, self._built.data)
         self._built.put_obstacles()
         self._pushes.clear()
@@ -124,7 +124,7 @@ class MujocoPhysics:
         self._settled = False
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
         bundle = Beams(figure, beams)
 
         def cast() -> Sequence[float]:
@@ -134,27 +134,27 @@ class MujocoPhysics:
         return cast
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        """Return the same function for beams that meet visible objects and pass through the robot itself."""
         return LidarBeams(self._pictures, figure, beams).cast
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
-        """Let a force act on a robot or a loose thing in the next basic step."""
+        """Apply a force to a robot or a dynamic solid in the next basic step."""
         self._pushes.append((target, push))
 
     def show(self, view: View) -> None:
-        """Take what cameras see of the world."""
+        """Set the visible part of the world, for cameras and lidars."""
         self._pictures = Renderer(view)
 
     def eye(self, place: Frame, lens: Lens) -> MujocoCamera | None:
-        """Return a camera; None if its picture would not be flat."""
+        """Return a camera; None if its image would not be flat."""
         return MujocoCamera(self._pictures, place, lens) if lens.flat else None
 
     def film(self, movie: Movie) -> MujocoVideo:
-        """Return a film to record a movie on."""
+        """Return a writer for a movie."""
         return MujocoVideo(movie)
 
     def contacts(self) -> Iterator[ContactPoint]:
-        """Yield where robots touch obstacles and each other now."""
+        """Yield the contact points of robots with obstacles and with each other now."""
         self._settle()
         mujoco.mj_collision(self._built.model, self._built.data)
         contacts = self._built.data.contact
@@ -165,7 +165,7 @@ class MujocoPhysics:
                 yield ContactPoint((x, y, z), (_solid(sides[0][0].node), _solid(sides[1][0].node)))
 
     def _fresh(self) -> Built:
-        """Return the model, made anew if things came, went, or moved that stood until now."""
+        """Return the model; rebuild it if objects were added or removed, or if a fixed obstacle moved."""
         if self._stale:
             self._stale = False
             self._built = build(self._contents, self._surroundings, self._moved)
@@ -178,6 +178,6 @@ class MujocoPhysics:
 
 
 def _solid(node: SceneNode) -> SceneNode:
-    """Return the Solid, Robot or device whose boundingObject has a node."""
+    """Return the Solid, Robot or device whose boundingObject contains a node."""
     around = (node, *node.ancestors())
     return next((it for it in around if it.place is not None and not it.outline), node)

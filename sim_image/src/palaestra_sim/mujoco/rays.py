@@ -1,4 +1,4 @@
-"""Rays of MuJoCo: how far the beams of one robot travel, not counting the robot itself."""
+"""Rays of MuJoCo: the distances that the beams of one robot travel, without hits on the robot itself."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Beams:
         self._bundles = bundles(self._origins)
 
     def cast(self, built: Built) -> list[float]:
-        """Return how far each beam travels, in meters; its full reach if it meets nothing."""
+        """Return the distance that each beam travels, in meters; its full reach if it meets nothing."""
         pose = self._figure.place.ground_pose
         turned = np.array(pose.rotation).reshape(3, 3)
         origins = self._origins @ turned.T + pose.position
@@ -63,13 +63,13 @@ class Beams:
 
 
 def bundles(origins: Any) -> list[tuple[int, int]]:
-    """Return the first beam, and the one after the last, of each run of beams that begin at one point."""
+    """Return the first and the last index, exclusive, of each run of beams that begin at one point."""
     order = groupby(range(len(origins)), key=lambda index: tuple(origins[index]))
     return [(run[0], run[-1] + 1) for _, indices in order if (run := list(indices))]
 
 
 def origins_and_directions(beams: Sequence[Beam]) -> tuple[Any, Any]:
-    """Return where beams begin, and where they go, in the robot's frame; each (n, 3), meters and units."""
+    """Return the origins and unit directions of beams in the robot's frame, each (n, 3), in meters."""
     origins = np.array([[beam.ray[0], beam.ray[1], beam.height_m] for beam in beams])
     stretch = [math.hypot(1.0, beam.slope) for beam in beams]
     directions = np.array(

@@ -1,8 +1,8 @@
-"""Pictures of a world: colors, distances, and which thing is where.
+"""Images of a world: colors, distances, and the shape in each pixel.
 
-They are drawn from a model of their own, which has visible shapes alone. So the physics knows no colors, and
-what is drawn may differ from what robots run into. Before each picture, the shapes on robots and joints are
-put where their places are; the others only after something was put elsewhere.
+They are rendered from a separate model, which has only visible shapes. So the physics needs no colors, and
+visible shapes may differ from the obstacles of robots. Before each image, the shapes on robots and joints get
+their current poses; other shapes get theirs only after one of them was moved.
 """
 
 from __future__ import annotations
@@ -22,45 +22,45 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.visuals import Drawn, View
 
-_HORIZON_M: Final = 1000.0  # how far a camera without `far` sees
-_BEYOND: Final = 1.1  # times the distance of the sky, so that the sky itself is drawn: the end of the frustum
+_HORIZON_M: Final = 1000.0  # the view distance of a camera without `far`
+_BEYOND: Final = 1.1  # end of the frustum, times the distance of the sky, so that the sky itself is rendered
 # Webots' cameras look along x with z up; MuJoCo's look along -z with y up. Columns: right, up, back.
 _TURNED: Final = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 class Renderer:
-    """Draws one world.
+    """Renders one world.
 
     Args:
-        view: what of the world is visible.
+        view: the visible part of the world.
     """
 
     def __init__(self, view: View) -> None:
         self._view = view
-        self._seen = (-1, -1)  # changes and moves of the view that the model has
+        self._seen = (-1, -1)  # the view's counts of changes and moves that the model includes
         self._visible: VisualModel = build((), (0.0, 0.0, 0.0), SUN)
         self._carried: list[tuple[Frame, slice, Any, Any]] = []
 
     @property
     def things(self) -> tuple[Drawn, ...]:
-        """The visible things of the last picture, by number."""
+        """The visible shapes of the last image, by number."""
         return self._visible.things
 
     def placed(self) -> VisualModel:
-        """Return the model with every shape where it is now."""
+        """Return the model with every shape at its current pose."""
         self._refresh()
         return self._visible
 
     def open(self) -> None:
-        """Get ready to draw.
+        """Prepare to render.
 
         Raises:
-            UnsimulatedError: this machine cannot draw; the message names what to install.
+            UnsimulatedError: this machine cannot render; the message names the packages to install.
         """
         canvas()
 
     def colors(self, place: Frame, lens: Lens) -> memoryview:
-        """Return blue, green, red, alpha of each pixel, row by row from the top left; a byte each."""
+        """Return blue, green, red, alpha of each pixel, row by row from the top left, one byte each."""
         context, rect = self._draw(place, lens)
         width, height = lens.size
         read = np.empty((height, width, 3), np.uint8)
@@ -68,23 +68,23 @@ class Renderer:
         return blue_first(read)
 
     def depths(self, place: Frame, lens: Lens) -> Any:
-        """Return how far along the axis of the lens each pixel is, in meters: (height, width) float32.
+        """Return the distance of each pixel along the axis of the lens, in meters: (height, width) float32.
 
-        Beyond the far end of the lens it is infinite.
+        It is infinite beyond the far end of the lens.
         """
         context, rect = self._draw(place, lens, segments=True)
         width, height = lens.size
         read = np.empty((height, width), np.float32)
         mujoco.mjr_readPixels(None, read, rect, context)
         near, far = lens.near_m, _BEYOND * _far(lens)
-        # The depth buffer is 1 at the near end and 0 at the far one, and even in 1 / distance.
+        # The depth buffer is 1 at the near end and 0 at the far one, and linear in 1 / distance.
         depths = read[::-1].astype(np.float64)
         meters = near * far / (near + depths * (far - near))
         meters[meters > _far(lens)] = math.inf
         return meters.astype(np.float32)
 
     def segments(self, place: Frame, lens: Lens) -> Any:
-        """Return which of `things` each pixel shows, -1 for none: (height, width) int32."""
+        """Return the index in `things` of each pixel's shape, -1 for none: (height, width) int32."""
         context, rect = self._draw(place, lens, segments=True)
         width, height = lens.size
         read = np.empty((height, width, 3), np.uint8)
@@ -98,7 +98,7 @@ class Renderer:
         return owners[numbers]
 
     def _draw(self, place: Frame, lens: Lens, *, segments: bool = False) -> tuple[Any, Any]:
-        """Draw; return the context to read from, and the rectangle to read."""
+        """Render; return the context to read from, and the rectangle to read."""
         self._refresh()
         visible = self._visible
         model, scene = visible.model, visible.scene
@@ -116,7 +116,7 @@ class Renderer:
         return context, rect
 
     def _aim(self, place: Frame, lens: Lens) -> None:
-        """Put the camera to a place, and the sky behind everything."""
+        """Set the camera to a frame, and the sky behind everything."""
         model, data = self._visible.model, self._visible.data
         pose = place.world_pose
         turned = np.reshape(pose.rotation, (3, 3))
@@ -135,7 +135,7 @@ class Renderer:
         data.geom_xmat[-1] = turned.ravel()
 
     def _refresh(self) -> None:
-        """Put every shape where it is now."""
+        """Set every shape to its current pose."""
         seen = (self._view.changes, self._view.moves)
         if seen[0] != self._seen[0]:
             things = self._view.things()
@@ -153,7 +153,7 @@ class Renderer:
             rotations[part] = (turned @ turns).reshape(-1, 9)
 
     def _place_all(self) -> None:
-        """Place everything that does not move by itself, and note what carries the rest."""
+        """Set the poses of all shapes that do not move by themselves; record the carriers of the others."""
         visible = self._visible
         self._carried = []
         for place, group in groupby(range(len(visible.things)), lambda at: visible.things[at].place):
@@ -174,5 +174,5 @@ class Renderer:
 
 
 def _far(lens: Lens) -> float:
-    """Return how far a lens sees, in meters."""
+    """Return the view distance of a lens, in meters."""
     return lens.far_m or _HORIZON_M

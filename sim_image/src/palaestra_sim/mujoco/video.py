@@ -1,6 +1,6 @@
 """The file of a movie: H.264 in MP4, encoded by PyAV, which is loaded for the first movie.
 
-It is written under a hidden name beside its own, and gets its name when it is whole. The simulator that
+It is written under a hidden name in the same folder, and renamed when it is complete. The simulator that
 writes it holds a lock on it. So a hidden file without a lock is from a simulator that was killed, and the
 next movie of the same name removes it.
 """
@@ -24,13 +24,13 @@ from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.movies import Movie
 
 _CODEC: Final = "libx264"
-_WORST, _STEPS = 51, 41  # of the constant rate factor: the quality 100 has 10
+_WORST, _STEPS = 51, 41  # of the constant rate factor: quality 0 has 51, quality 100 has 10
 _PUBLIC: Final = 0o644
 _UNFINISHED: Final = ".unfinished"
 
 
 class MujocoVideo:
-    """The film of one movie; see `Film`.
+    """The writer of one movie; see `VideoWriter`.
 
     Raises:
         OSError: the file cannot be written.
@@ -49,7 +49,7 @@ class MujocoVideo:
         self._stream.pix_fmt = "yuv420p"
         rate = _WORST - _STEPS * movie.quality // 100
         self._stream.options = {"crf": str(rate), "preset": "veryfast"}
-        self._stream.thread_count = 1  # the simulator's own: several share the processor
+        self._stream.thread_count = 1  # the simulator's own: several simulators share the processor
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame."""
@@ -59,7 +59,7 @@ class MujocoVideo:
             self._encode(self._av.VideoFrame.from_ndarray(picture, format="bgra"))
 
     def finish(self) -> None:
-        """Put the file where it belongs."""
+        """Rename the complete file to its final name."""
         with self._failures():
             self._encode(None)
             self._container.close()
@@ -83,23 +83,23 @@ def _new_file(path: Path) -> tuple[int, str]:
     """Return the descriptor that holds the lock of a new hidden file, and the file's name."""
     while True:
         lock, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=_UNFINISHED)
-        with suppress(OSError):  # a file system without locks: nothing is removed there either
+        with suppress(OSError):  # on a file system without locks, no file is removed either
             fcntl.flock(lock, fcntl.LOCK_EX)
         if os.fstat(lock).st_nlink:
             return lock, name
-        os.close(lock)  # another simulator removed it before it was locked
+        os.close(lock)  # another simulator removed it before the lock
 
 
 def _abandon(lock: int, name: str) -> None:
-    """Remove a hidden file, if it still has this name, and its lock."""
+    """Remove a hidden file, if it still has this name, and release its lock."""
     Path(name).unlink(missing_ok=True)
     os.close(lock)
 
 
 def _remove_stale(path: Path) -> None:
-    """Remove the hidden files of a movie that no simulator writes any more."""
+    """Remove the hidden files of a movie that no simulator writes any longer."""
     for stale in path.parent.glob(f".{glob.escape(path.name)}-*{_UNFINISHED}"):
-        with suppress(OSError), stale.open("rb+") as file:  # locked, or removed meanwhile
+        with suppress(OSError), stale.open("rb+") as file:  # it may be locked, or already removed
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             stale.unlink()
 

@@ -1,4 +1,4 @@
-"""The model of what is visible: one geom for each shape, a camera, two lights, and the sky."""
+"""The model of the visible shapes: one geom for each shape, a camera, two lights, and the sky."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ _GEOMS: Final = {
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
-# Neither shadows nor smoothed edges, and few corners: 10 times as fast without a graphics card.
+# No shadows, no smoothed edges and few corners: rendering is 10 times as fast without a graphics card.
 _QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks": 10, "numquads": 1}
 _AMBIENT: Final = 0.45
 _FROM_CAMERA: Final = 0.25
 _FROM_ABOVE: Final = 0.30
-SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, where z points up
-SKY: Final = 1  # the group of its geom, the last one of the model
-PASSED: Final = 2  # the group of what a lidar does not see, while it looks
+SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, in axes where z points up
+SKY: Final = 1  # the group of its geom, which is the last one of the model
+PASSED: Final = 2  # the group of geoms through which a lidar's beams pass, during its rays
 
 
 @dataclass(slots=True, eq=False)
 class VisualModel:
-    """A compiled model, and what is needed to draw it.
+    """A compiled model, and the objects that are needed to render it.
 
     Attributes:
-        things: by the number of their geom; the last geom is the sky.
-        positions, rotations: of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
+        things: the visible shapes, by the number of their geom; the last geom is the sky.
+        positions, rotations: of the geoms in the frames of their shapes, (n, 3) and (n, 3, 3).
         sun: the direction of its light.
         scene, option, camera: of MuJoCo's visualizer.
     """
@@ -53,10 +53,10 @@ class VisualModel:
 
 
 def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
-    """Return the model of these things.
+    """Return the model of these shapes.
 
     Args:
-        things: all that is visible, but for the sky.
+        things: all visible shapes, without the sky.
         sky: its color, red, green and blue from 0 to 1.
         sun: the direction of its light.
     """
@@ -69,7 +69,7 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
     for thing in things:
         _add(spec, thing, meshes)
     _hang_sky(spec)
-    spec.stat.extent = 1.0  # the ends of the frustum are multiples of it
+    spec.stat.extent = 1.0  # the ends of the frustum are multiples of the extent
     model = spec.compile()
     model.stat.extent = 1.0
     model.geom_rgba[-1] = (*sky, 1.0)
@@ -102,9 +102,9 @@ def _light(spec: Any, sun: Vector) -> None:
 
 
 def _hang_sky(spec: Any) -> None:
-    """Add the sky, a board behind everything: MuJoCo's own costs more time than all the rest."""
+    """Add the sky as a board behind everything: MuJoCo's own sky takes more time than all other shapes."""
     material = spec.add_material(name="sky")
-    material.emission = 0.5  # replaced before each picture
+    material.emission = 0.5  # replaced before each image
     spec.worldbody.add_geom(
         name="sky",
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -117,7 +117,7 @@ def _hang_sky(spec: Any) -> None:
 
 
 def glow(forward: Sequence[float], sun: Vector) -> float:
-    """Return the emission with which the sky has its own color, if a camera looks `forward`."""
+    """Return the emission that gives the sky its own color, if a camera looks along `forward`."""
     from_above = max(0.0, sum(a * b for a, b in zip(forward, sun, strict=True)))
     return 1.0 - _AMBIENT - _FROM_CAMERA - _FROM_ABOVE * from_above
 

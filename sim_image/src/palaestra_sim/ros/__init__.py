@@ -1,8 +1,8 @@
-"""The ROS side of the stub: nodes that behave like roscpp's to clients, in one loop.
+"""The ROS side of a simulator: nodes that behave like roscpp's to clients, in one loop.
 
-rospy has one node in a process and a thread for each connection, but a stub has a node for each robot and one
-hot path. So the stub implements the protocols itself: XML-RPC with the master (`master`), connections
-(`links`), one selector loop for all sockets (`loop`), and names, services and topics (`node`).
+rospy has one node in a process and a thread for each connection, but a simulator has a node for each robot
+and one hot path. So it implements the protocols itself: XML-RPC with the master (`master`), connections
+(`links`), one selector loop for all sockets (`loop`), topics (`topics`), and names and services (`node`).
 """
 
 from palaestra_sim.ros.loop import Loop

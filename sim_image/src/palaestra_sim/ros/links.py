@@ -1,7 +1,7 @@
 """One TCPROS connection each: a client of a service, or a subscriber of a topic.
 
-Sockets are non-blocking. A service client's answers are queued without loss; a subscriber that reads too
-slowly gets the newest message only, as with a publisher of queue size 1.
+Sockets are non-blocking. Responses to a service client are queued without loss; a subscriber that reads too
+slowly gets only the newest message, as with a publisher of queue size 1.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# Long enough for roscpp and rospy to close first. A client that reads until the end waits for it.
+# Long enough for roscpp and rospy to close first. A client that reads until the end of stream waits for it.
 LINGER_S = 1.0
 
-# For a client that stops reading in the middle of a long answer.
+# For a client that stops reading in the middle of a long response.
 SEND_S = 60.0
 
 
@@ -25,7 +25,7 @@ class Endpoint(Protocol):
     """The receiver of a connection after its header has been read."""
 
     def receive(self, payload: bytes) -> None:
-        """Take one frame from the peer."""
+        """Handle one frame from the peer."""
         ...
 
     def lost(self) -> None:
@@ -38,7 +38,7 @@ class Connection(Protocol):
 
     @property
     def closed(self) -> bool:
-        """Return whether it is closed, so that nothing can be sent."""
+        """Return whether it is closed; then nothing can be sent."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -50,25 +50,25 @@ class Connection(Protocol):
         ...
 
     def finish(self) -> None:
-        """Take nothing more, and close it once the peer has, or some time after all was sent."""
+        """Receive nothing more; close when the peer closes, or some time after all was sent."""
         ...
 
     def close(self) -> None:
-        """Close it; safe to repeat."""
+        """Close it; safe to call again."""
         ...
 
 
 class HeaderRefused(Exception):
-    """The header names a service or topic that is not here; the text is sent to the peer."""
+    """The header names a service or topic that this node does not have; the text is sent to the peer."""
 
 
 Greet = Callable[["RosLink", Mapping[str, str]], Endpoint]
 
 
 class Lingering:
-    """The connections that are finished; closes each after one to two times LINGER_S.
+    """The finished connections; each is closed after one to two times LINGER_S.
 
-    All have one timer, because a client without a persistent connection may call a thousand times a second.
+    They share one timer, because a client without a persistent connection may make a thousand calls a second.
     """
 
     def __init__(self, loop: Loop) -> None:
@@ -77,13 +77,13 @@ class Lingering:
         self._old: set[RosLink] = set()
 
     def add(self, link: RosLink) -> None:
-        """Close `link` in time."""
+        """Close `link` later."""
         if not (self._new or self._old):
             self._loop.later(LINGER_S, self._close_old)
         self._new.add(link)
 
     def discard(self, link: RosLink) -> None:
-        """Forget a link that is closed."""
+        """Remove a link that is already closed."""
         self._new.discard(link)
         self._old.discard(link)
 
@@ -99,11 +99,11 @@ class RosLink:
     """A connection from accept to close.
 
     Args:
-        loop: watches its socket.
-        connection: the socket, accepted.
+        loop: the event loop of its socket.
+        connection: the accepted socket.
         greet: turns the header into an endpoint.
-        lingering: closes it in time once it is finished.
-        gone: called when it is closed, also before its header was read.
+        lingering: closes it later, after it is finished.
+        gone: called when it is closed, even before its header was read.
     """
 
     __slots__ = (
@@ -159,10 +159,10 @@ class RosLink:
             self._write(data)
 
     def finish(self) -> None:
-        """Take nothing more, and close the connection once the peer has, or some time after all was sent.
+        """Receive nothing more; close the connection when the peer does, or some time after all was sent.
 
-        Roscpp drops an answer that it has not read yet when the server closes (ros/ros_comm#1976).
-        A long answer has SEND_S, so that a client that has stopped reading does not keep it in memory.
+        Roscpp drops a response that it has not read yet when the server closes (ros/ros_comm#1976).
+        A long response gets SEND_S, so that a client that has stopped reading does not keep it in memory.
         """
         if self.closed:
             return
@@ -173,7 +173,7 @@ class RosLink:
             self._lingering.add(self)
 
     def close(self) -> None:
-        """Close the connection; safe to repeat."""
+        """Close the connection; safe to call again."""
         if self.closed:
             return
         self.closed = True
@@ -193,7 +193,7 @@ class RosLink:
             self.close()
             return
         if sent < len(data):
-            self._unsent = memoryview(data)[sent:]  # a picture is sent in many parts; none is copied
+            self._unsent = memoryview(data)[sent:]  # an image is sent in many parts, without copies
             self._loop.watch(self._socket, self._ready, writing=True)
         elif self._unsent:
             self._unsent = b""

@@ -1,6 +1,7 @@
-"""One selector loop for every socket and timer of the stub.
+"""One selector loop for every socket and timer of a simulator.
 
-It knows no ROS: links register sockets, the simulator registers timers. Other threads may only call `post`.
+It is independent of ROS: links register sockets, the simulator registers timers. Other threads may only call
+`post`.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ from collections.abc import Callable
 Callback = Callable[[], None]
 _File = int | socket.socket
 
-# In a virtual machine a wake-up costs 30 us, more than the answer to a request. So if all of the last waits
-# were short, the loop polls a few times before it waits, and yields the processor in between. One longer wait
-# in every step is enough to stop polling, because polls in vain take a processor from other simulators.
+# In a virtual machine a wake-up costs 30 us, more than the response to a request. So if all recent waits were
+# short, the loop polls a few times before it waits, and yields the processor in between. One longer wait in
+# every step is enough to stop polling, because useless polls take processor time from other simulators.
 _QUICK_S = 200e-6
 _STREAK = 10  # waits; a trainer's step has fewer
 _LOOKS = 30
 
-_EVENTS = 32  # at a time; others that are ready come with the next look
+_EVENTS = 32  # in one poll; further ready files come with the next poll
 
-# The peers wait for a callback that is due as soon as this, such as the end of a step. They send nothing
-# before it, so looking at the sockets would only delay it, and take the processor from other programs.
+# If a callback, such as the end of a step, is due within this time, the peers are waiting for it. They send
+# nothing before it, so a poll would only delay it, and take processor time from other programs.
 _NEAR_S = 10e-3
 
 
@@ -58,24 +59,24 @@ class Loop:
         self._watched[number] = ready
 
     def forget(self, file: _File) -> None:
-        """Stop watching `file`, before it is closed."""
+        """Stop watching `file`; call this before it is closed."""
         number = _number(file)
         if self._watched.pop(number, None) is not None:
             self._epoll.unregister(number)
 
     def later(self, delay_s: float, callback: Callback) -> None:
-        """Call `callback` once, `delay_s` seconds from now; 0 is after what is ready now."""
+        """Call `callback` once, `delay_s` seconds from now; 0 means after the callbacks that are ready."""
         heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._order), callback))
 
     def post(self, callback: Callback) -> None:
-        """Call `callback` in the loop's thread; the one method for other threads and signal handlers."""
+        """Call `callback` in the loop's thread; only `post` is safe in other threads and signal handlers."""
         self._posted.append(callback)
         # If the pipe is full, a wake-up is already pending.
         with contextlib.suppress(BlockingIOError):
             os.write(self._wake_write, b"\0")
 
     def wake_on_signals(self) -> None:
-        """Let signals end the wait, so that a handler runs even if its signal came just before."""
+        """Let signals end the wait, so that a handler runs even if its signal came just before the wait."""
         signal.set_wakeup_fd(self._wake_write, warn_on_full_buffer=False)
         self._wakes_on_signals = True
 
@@ -103,7 +104,7 @@ class Loop:
         os.close(self._wake_write)
 
     def _ready(self) -> list[tuple[int, int]]:
-        """Return the ready files after a wait; if a short one is expected, poll a few times first."""
+        """Return the ready files after a wait; if a short wait is expected, poll a few times first."""
         wait_s = self._wait_s()
         if wait_s == 0.0:
             return self._epoll.poll(0, _EVENTS)
@@ -115,7 +116,7 @@ class Loop:
         return ready
 
     def _look(self) -> list[tuple[int, int]]:
-        """Return the ready files after a few polls; none if it takes longer."""
+        """Return the ready files after a few polls; an empty list if none becomes ready."""
         for _ in range(_LOOKS):
             if ready := self._epoll.poll(0, _EVENTS):
                 return ready

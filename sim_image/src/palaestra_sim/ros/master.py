@@ -1,7 +1,7 @@
-"""The XML-RPC side of a node: its calls to the ROS master, and the slave API that others call.
+"""The XML-RPC side of a node: its calls to the ROS master, and the slave API that other nodes call.
 
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
-The slave API runs in a thread of its own, because it is used rarely, and passes all work to the loop.
+The slave API runs in a separate thread, because it is used rarely, and passes all work to the loop.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 _OK = 1
 _FAILED = 0
 _TIMEOUT_S = 5.0
-_POLL_S = 0.05  # how soon `close` is noticed
+_POLL_S = 0.05  # interval at which the server checks for `close`
 
 
 class MasterUnreachable(ConnectionError):
-    """The ROS master does not answer at its address."""
+    """The ROS master does not respond at its address."""
 
 
 class _Transport(xmlrpc.client.Transport):
-    """Keeps one connection and gives up on a master that does not answer."""
+    """Keeps one connection, and gives up on a master that does not respond."""
 
     _kept: http.client.HTTPConnection | None = None
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         if self._kept is None:
             self._kept = http.client.HTTPConnection(host, timeout=_TIMEOUT_S)
-            self._connection = host, self._kept  # where the base class looks for what to close
+            self._connection = host, self._kept  # the base class closes the connection in this attribute
         return self._kept
 
     def close(self) -> None:
@@ -45,7 +45,7 @@ class _Transport(xmlrpc.client.Transport):
 
 
 class Master:
-    """The master, for the calls of one node.
+    """The ROS master, for the calls of one node.
 
     Args:
         uri: its address, e.g. http://localhost:11311
@@ -62,12 +62,12 @@ class Master:
         """Return the value of a call in the node's name.
 
         Raises:
-            MasterUnreachable: no answer, or an invalid one.
+            MasterUnreachable: no response, or an invalid one.
         """
         return self._checked(method, self._sent(method, self._node, *arguments))
 
     def tell(self, method: str, *arguments: Any) -> None:
-        """Make a call whose value does not matter: at once, or with others at the end of `together`.
+        """Make a call whose value is not needed: at once, or with others at the end of `together`.
 
         Raises:
             MasterUnreachable: as `call`.
@@ -79,10 +79,10 @@ class Master:
 
     @contextmanager
     def together(self) -> Iterator[None]:
-        """Send what the block tells in one request, in its order: a robot has hundreds of services.
+        """Send all `tell` calls of the block in one request: a robot has hundreds of services.
 
-        A master without `system.multicall` gets one call after another. If the block raises an error, nothing
-        is sent.
+        If the master has no `system.multicall`, the calls are sent one after another. If the block raises an
+        error, nothing is sent.
 
         Raises:
             MasterUnreachable: as `call`.
@@ -136,10 +136,10 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class Bus(Protocol):
-    """What a node publishes, and to whom; asked in another thread."""
+    """The topics of a node and their subscribers; called from another thread."""
 
     def publications(self) -> list[list[str]]:
-        """Return name and type of each topic."""
+        """Return the name and type of each topic."""
         ...
 
     def connections(self) -> list[list[Any]]:
@@ -148,13 +148,13 @@ class Bus(Protocol):
 
 
 class SlaveApi:
-    """Answers the master, subscribers and tools on behalf of one node.
+    """Serves requests of the master, subscribers and tools for one node.
 
     Args:
         host: the name under which others reach this machine.
         bus: the topics that the node publishes, and their subscribers.
-        tcpros_port: where the node's TCPROS listener is.
-        on_shutdown: called in another thread when the master asks the node to end.
+        tcpros_port: the port of the node's TCPROS listener.
+        on_shutdown: called in another thread when the master requests the end of the node.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ class SlaveApi:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop answering; the port is free afterwards."""
+        """Stop serving requests and free the port."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join(_TIMEOUT_S)
@@ -213,5 +213,5 @@ def host_name() -> str:
 
 
 def bind_address(host: str) -> str:
-    """Return the address to listen on: loopback when `host` is, else every interface."""
+    """Return the address to listen on: loopback if `host` is loopback, else every interface."""
     return "127.0.0.1" if host in {"localhost", "127.0.0.1"} else ""

@@ -1,8 +1,8 @@
-"""A ROS node: services that answer and topics that publish, under one name.
+"""A ROS node: services and published topics, under one name.
 
 The robot's controller uses this interface. A handler gets the decoded request and returns the fields of the
-response. It returns `LATER` if it will call `answer` itself, like a step that waits for another robot or
-for the end of a pause.
+response. If it returns `LATER`, it calls `answer` itself later. A step does so while it waits for another
+robot or for the end of a pause.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _BACKLOG = 128
 
 
 class ServiceFailed(Exception):
-    """The service cannot answer; the client gets the text as a ServiceException."""
+    """The service cannot return a response; the client gets the text as a ServiceException."""
 
 
 class RosNode:
     """One node with its services and topics, registered at the master from `start` to `close`.
 
     Args:
-        loop: watches its sockets.
+        loop: the event loop of its sockets.
         name: the node's name and the prefix of its relative paths, e.g. "robotino".
         master_uri: the master, e.g. http://localhost:11311
     """
@@ -67,10 +67,10 @@ class RosNode:
         return path if path.startswith("/") else f"/{self.name}/{path}"
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Answer a service, registered at once, or at the end of `together`.
+        """Serve a service; it is registered at once, or at the end of `together`.
 
         Raises:
-            MasterUnreachable: the master did not take the registration.
+            MasterUnreachable: the master did not accept the registration.
         """
         name = self.resolve(path)
         self._services[name] = (service_type(type_name), handler)
@@ -95,8 +95,8 @@ class RosNode:
             path: relative to the node, or global with a leading slash.
             type_name: e.g. sensor_msgs/Range
             latched: whether a late subscriber gets the last message.
-            template: the fields that stay the same, for `Publisher.send_value`.
-            reading: the field of the value, for faults; "" is the last one.
+            template: the constant fields, for `Publisher.send_value`.
+            reading: the field of the value, for faults; "" for the last one.
         """
         name = self.resolve(path)
         topic = self._topics.get(name)
@@ -109,7 +109,7 @@ class RosNode:
         return Publisher(topic, dict(template or {}))
 
     def withdraw(self, publisher: Publisher) -> None:
-        """Take one publisher back; the last one of a topic closes it."""
+        """Remove one publisher; without publishers, the topic is closed."""
         topic = publisher.topic
         topic.publishers -= 1
         if topic.publishers == 0:
@@ -119,13 +119,13 @@ class RosNode:
                 link.close()
 
     def answer(self, call: object, fields: Mapping[str, Any]) -> None:
-        """Answer a call whose handler returned LATER, then the requests that waited behind it."""
+        """Send the response to a call whose handler returned LATER, then handle the requests that waited."""
         if isinstance(call, ServiceEnd):
             call.answer(fields)
         self._loop.later(0, self.take_waiting)
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
-        """Call `callback` after `delay_s` seconds; 0 is after the answer of the present call was sent."""
+        """Call `callback` after `delay_s` seconds; 0 means after the response to the current call."""
         self._loop.later(delay_s, callback)
 
     def take_waiting(self) -> None:
@@ -135,7 +135,7 @@ class RosNode:
             end.handle(payload)
 
     def request(self, end: ServiceEnd, payload: bytes) -> None:
-        """Take a request: handled now, or after the step that blocks the controller."""
+        """Handle a request now, or after the step that blocks the controller."""
         if self.blocked():
             self._waiting.append((end, payload))
         else:
@@ -148,7 +148,7 @@ class RosNode:
 
     def unregister(self) -> None:
         """Unregister every service and topic at the master; connections stay open."""
-        # A master that is gone has forgotten us already.
+        # A master that is gone has already lost our names.
         with contextlib.suppress(MasterUnreachable), self._master.together():
             for name in self._services:
                 self._master.tell("unregisterService", name, self._rosrpc)
@@ -165,7 +165,7 @@ class RosNode:
         self._master.close()
 
     def check_master(self) -> None:
-        """Check that the master answers.
+        """Check that the master responds.
 
         Raises:
             MasterUnreachable: it does not.
@@ -173,7 +173,7 @@ class RosNode:
         self._master.call("getPid")
 
     def publications(self) -> list[list[str]]:
-        """Return name and type of each topic, for `getPublications`."""
+        """Return the name and type of each topic, for `getPublications`."""
         return [[topic.name, topic.type.name] for topic in tuple(self._topics.values())]
 
     def connections(self) -> list[list[Any]]:
@@ -181,9 +181,9 @@ class RosNode:
         return list(self._subscribers.values())
 
     def on_end(self, callback: Callable[[str], None]) -> None:
-        """Set the function to call with the reason when this node is asked to end.
+        """Set the function to call with the reason when this node is requested to end.
 
-        `rosnode kill` asks, and so does the master when a newer node registers with its name.
+        `rosnode kill` sends such a request; so does the master when a newer node registers the same name.
         """
         self._ended = callback
 
@@ -267,11 +267,11 @@ class ServiceEnd:
         self._persistent = persistent
 
     def receive(self, payload: bytes) -> None:
-        """Take a request from the link."""
+        """Receive a request from the connection."""
         self._node.request(self, payload)
 
     def handle(self, payload: bytes) -> None:
-        """Handle a request, and answer it, unless the handler answers later."""
+        """Handle a request, and send the response, unless the handler sends it later."""
         self._node.current_call = self
         try:
             fields = self._handler(self._service.request.decode(payload))
@@ -282,11 +282,11 @@ class ServiceEnd:
             self.answer(fields)
 
     def answer(self, fields: Mapping[str, Any]) -> None:
-        """Answer the request that was handled last."""
+        """Send the response to the last request."""
         self._send(b"\1" + self._service.response.frame(fields))
 
     def lost(self) -> None:
-        """Do nothing: an answer to a connection that is closed is dropped."""
+        """Do nothing: a response to a closed connection is dropped."""
 
     def _send(self, data: bytes) -> None:
         self._link.send(data)

@@ -1,4 +1,4 @@
-"""Topics that a node publishes: the subscribers that are connected, and the messages they get."""
+"""Topics that a node publishes: the connected subscribers, and the messages that they get."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class PublishedTopic:
     """A published topic and the connections of its subscribers.
 
     Attributes:
-        links: of the subscribers that are connected.
-        publishers: how many share the topic.
-        reading: the field of the value; "" is the last one.
+        links: of the connected subscribers.
+        publishers: number of publishers that share the topic.
+        reading: the field of the value; "" for the last one.
     """
 
     __slots__ = ("_last", "latched", "links", "name", "publishers", "reading", "type")
@@ -37,7 +37,7 @@ class PublishedTopic:
         self._last: bytes | None = None
 
     def connect(self, link: Connection, dropped: Callable[[Connection], object]) -> Endpoint:
-        """Take a subscriber, with the last message if the topic is latched."""
+        """Add a subscriber; if the topic is latched, send it the last message."""
         self.links.append(link)
         if self._last is not None:
             link.send(self._last)
@@ -52,7 +52,7 @@ class PublishedTopic:
 
 
 class _SubscriberEnd:
-    """The publisher's end of one subscriber's connection, which only ever closes."""
+    """The publisher's end of one subscriber's connection; it only waits for the close."""
 
     __slots__ = ("_dropped", "_link", "_topic")
 
@@ -80,7 +80,7 @@ class Publisher:
         self.topic = topic
         self._template = template
         self._sequence = 0
-        # Of `send_value`, made when it is first called.
+        # `send_value` makes these at its first call.
         self._frame = bytearray()
         self._reading_at = 0
         self._pack: _Pack = _STAMP.pack_into
@@ -95,7 +95,7 @@ class Publisher:
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
     def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
-        """Send a stamped message whose last field is `value`, the rest as in the template.
+        """Send a stamped message: the fields of the template, with `value` in the last one.
 
         Without a subscriber no message is sent or counted.
 
@@ -115,7 +115,7 @@ class Publisher:
         self.topic.send(bytes(data))
 
     def send_stamped(self, fields: Mapping[str, Any]) -> None:
-        """Send a message of `fields`, over the template's, with the wall clock in its header.
+        """Send a message with the template's fields, `fields`, and the wall clock in its header.
 
         Without a subscriber no message is sent or counted.
         """
@@ -127,7 +127,7 @@ class Publisher:
         self.send({**fields, "header": {**self._template.get("header", {}), **stamp}})
 
     def _prepare(self) -> None:
-        """Make the frame of all values, and find the reading in it."""
+        """Encode the template to a frame once, and find the reading in it."""
         type_ = self.topic.type
         reading = last_field(type_.name)
         if reading is None:

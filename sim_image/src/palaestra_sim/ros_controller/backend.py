@@ -1,7 +1,7 @@
-"""The simulation as the front needs it: robots with devices that carry values, nodes and fields, and steps.
+"""The simulation that `ros_controller` needs: robots with devices, nodes with fields, and steps.
 
-The front turns it into names, services and topics. A simulator other than the scene implements this Protocol
-to answer the same clients.
+`ros_controller` turns it into names, services and topics. A simulator other than the scene implements this
+Protocol to serve the same clients.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class MotionBackend(Protocol):
     """The motion of nodes: m/s, rad/s, N and N m, in the axes of the world file."""
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
-        """Return the velocity of a node and its turning."""
+        """Return the linear and angular velocity of a node."""
         ...
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
-        """Give a node a velocity and a turning; nothing happens to one that does not move."""
+        """Give a node a linear and an angular velocity; no effect on a node that cannot move."""
         ...
 
     def halt(self, node: SceneNode) -> None:
@@ -37,11 +37,11 @@ class MotionBackend(Protocol):
     def add_force(
         self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
     ) -> None:
-        """Let a force act in the next basic step, at an offset in the node's frame or the center of mass."""
+        """Apply a force in the next basic step, at an offset in the node's frame or at the center of mass."""
         ...
 
     def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
-        """Let a torque act in the next basic step."""
+        """Apply a torque in the next basic step."""
         ...
 
 
@@ -50,10 +50,10 @@ class Backend(Protocol):
 
     Attributes:
         tree: the nodes of the world.
-        time_ms: simulated so far, back to 0 at a reset.
+        time_ms: simulated time; a reset sets it to 0.
         mode: in PAUSE nothing moves.
-        quit_status: the exit status that `quit` asked for; None before.
-        movies: of what the Viewpoint shows.
+        quit_status: the exit status that `quit` requested; None before.
+        movies: recordings of the Viewpoint's view.
     """
 
     movies: Movies
@@ -74,12 +74,12 @@ class Backend(Protocol):
 
     @property
     def left_out(self) -> Sequence[WorldError]:
-        """What the simulator lacks and the user left out, each with its place."""
+        """The unsupported nodes that the user left out, each with its place."""
         ...
 
     @property
     def forces(self) -> bool:
-        """Whether the nodes of the world have masses and frictions that matter."""
+        """Whether the masses and frictions of the world's nodes affect the motion."""
         ...
 
     @property
@@ -92,7 +92,7 @@ class Backend(Protocol):
         ...
 
     def sample(self) -> None:
-        """Give every sensor its value of this moment."""
+        """Set the value of every sensor to that of this moment."""
         ...
 
     def before_next_step(self, change: Callable[[], None], /) -> None:
@@ -100,7 +100,7 @@ class Backend(Protocol):
         ...
 
     def changed(self, node: SceneNode, field: str, /) -> None:
-        """Take the effect of a field that has a new value."""
+        """Apply the effect of a field that has a new value."""
         ...
 
     def reset(self) -> None:
@@ -112,7 +112,7 @@ class Backend(Protocol):
         ...
 
     def quit(self, status: int) -> None:
-        """Ask for the end of the simulator."""
+        """Request the end of the simulator."""
         ...
 
     def robot_of(self, node: SceneNode) -> Robot | None:
@@ -120,22 +120,22 @@ class Backend(Protocol):
         ...
 
     def add(self, text: str, field: NodeField, index: int) -> bool:
-        """Insert the nodes of `text` into a field; False if the field has no place at `index`."""
+        """Insert the nodes of `text` into a field; return False if `index` is not a valid position in it."""
         ...
 
     def remove(self, node: SceneNode) -> None:
-        """Remove a node and all inside it."""
+        """Remove a node and all nodes inside it."""
         ...
 
     def export_image(self, path: str, quality: int) -> bool:
-        """Save what the Viewpoint shows to a file; return whether that was possible.
+        """Save an image of the Viewpoint's view to a file; return whether that was possible.
 
         `quality` is that of a JPEG file, from 1 to 100.
         """
         ...
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> Sequence[tuple[Vector, int]]:
-        """Return where a node touches others: points in meters, each with the number of a node."""
+        """Return a node's contact points: positions in meters, each with the number of a node."""
         ...
 
     def save_state(self, node: SceneNode, name: str) -> None:
@@ -143,9 +143,9 @@ class Backend(Protocol):
         ...
 
     def load_state(self, node: SceneNode, name: str) -> None:
-        """Return a node to a saved state; "__init__" is that of the world file."""
+        """Return a node to a saved state; "__init__" is the state in the world file."""
         ...
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Put a joint to a position, in rad or m; `index` counts its axes from 1."""
+        """Set the position of a joint, in rad or m; `index` counts its axes from 1."""
         ...

@@ -1,16 +1,16 @@
-"""The `ros` controller of one robot: its services, its steps, and what it publishes after them.
+"""The `ros` controller of one robot: its services, its steps, and the messages that it publishes after them.
 
-The real controller's main loop is a thread that polls; this one is a few rules:
+The real controller's main loop is a thread that polls; this one follows a few rules:
 
 - `time_step` is refused unless it is 0 or a positive multiple of the basic step. While it is pending, the
   robot is `blocked`: Webots holds a mutex that every other service needs.
-- Messages come after the answer, once a step, for every enabled sensor that is due: (count * step) % period
+- Messages follow the response, once a step, for every enabled sensor that is due: (count * step) % period
   is 0. They go to the subscribers that are connected at that moment.
-- The count goes up before the step is made, and the step of the last accepted call counts. Elapsed time is a
-  product, not a sum, so changing the step disturbs the phase of longer periods.
+- The count increases before the step runs, and the step of the last accepted call is used. Elapsed time is a
+  product, not a sum, so a change of the step disturbs the phase of longer periods.
 
-With `lost_wakeup`, a step that is requested while the loop still handles the one before is made and answered,
-but its messages never come. Without it, the messages of the one before go out first.
+With `lost_wakeup`, a step that is requested while the loop still handles the previous one runs and gets a
+response, but its messages are lost. Without it, the messages of the previous step are sent first.
 """
 
 from __future__ import annotations
@@ -94,12 +94,12 @@ class RosController:
         self._log = NodeLog(node)
         self._clock: PublisherInterface | None = None
         self._basic_ms = self.simulation.basic_step_ms
-        self._step_ms = self._basic_ms  # of the last accepted time_step
+        self._step_ms = self._basic_ms  # the step of the last accepted time_step
         self._count = 0
         self._call: object | None = None
         self._answer: Any = None
-        self._asking = False  # the request for the step is still being handled
-        self._heard = True  # the main loop saw the last step
+        self._asking = False  # the request for the step is still in progress
+        self._heard = True  # whether the main loop noticed the last step
         self._publish_due = False
         self._published_s = -math.inf
         self._paced_until_s = -math.inf
@@ -135,7 +135,7 @@ class RosController:
         self._serve(services.device_list())
 
     def close(self) -> None:
-        """End: no step waits for this robot any more, and its services and topics are gone."""
+        """Remove the robot from the steps, and its services and topics from ROS."""
         self._closed = True
         self._publish_due = False
         self._stepping.leave(self.robot)
@@ -157,7 +157,7 @@ class RosController:
             self._published_s = self._host_clock()
 
     def _enable_all(self) -> None:
-        """Enable every device that can be; log why another one cannot."""
+        """Enable every device that accepts it; log the reason for each other one."""
         for name, outlet in self._outlets.items():
             try:
                 outlet.enable(self._basic_ms, self._basic_ms)
@@ -199,7 +199,7 @@ class RosController:
         return self._answer
 
     def _loop_hears(self) -> bool:
-        """Return whether the main loop will see that the count went up; it may be too busy."""
+        """Return whether the main loop will notice that the count increased; it may be too busy."""
         if not self._options.lost_wakeup:
             self.publish()
             return True
@@ -207,7 +207,7 @@ class RosController:
         return not (self._publish_due or busy)
 
     def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
-        """Handle the end of a step: answer now, or after the real time that the step has to take."""
+        """Handle the end of a step: respond now, or after the real time that the step has to take."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
             self.node.later(delay_s, lambda: self._finish(done))
@@ -225,11 +225,11 @@ class RosController:
             self.node.answer(self._call, {"success": done})
 
     def _delay_s(self) -> float:
-        """Return the rest of the real time that the step has to take."""
+        """Return the remaining real time that the step has to take."""
         delay_s = self._options.step_sleep_s
         if self.simulation.mode is Mode.REAL_TIME:
             now_s = self._host_clock()
-            # After a pause of the client, only one basic step is made up, not all that it missed.
+            # After a pause of the client, only one basic step is made up, not the whole pause.
             owed_s = now_s - self._basic_ms / 1000.0
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)

@@ -1,8 +1,8 @@
 """The handles of nodes and fields that clients of a supervisor hold.
 
 Handles are numbers that look like the addresses of Webots. They are valid for one load of a world; a service
-refuses a handle of another load. (In Webots such a handle is a dangling pointer: the controller may crash.
-Never keep one.)
+refuses a handle of another load. In Webots such a handle is a dangling pointer, which may crash the
+controller, so never keep one.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.fields import NodeField
 
-_FIRST_ADDRESS: Final = 0x5580_0000_0000  # where Linux puts the heap of a position-independent program
+_FIRST_ADDRESS: Final = 0x5580_0000_0000  # where Linux places the heap of a position-independent program
 _LOAD_SPACING: Final = 0x0001_0000_0000
 _SPACING: Final = 0x90
 
 
 class NoSuchHandleError(SimError, LookupError):
-    """This load of the world never returned that handle; Webots would crash or worse."""
+    """This load of the world never returned that handle; Webots could crash."""
 
 
 class Handles:
@@ -28,7 +28,7 @@ class Handles:
 
     Args:
         simulation: of that world.
-        load: how many worlds were loaded before: makes handles of different loads different.
+        load: number of earlier loads, so that handles of different loads differ.
     """
 
     def __init__(self, simulation: Backend, load: int = 0) -> None:
@@ -53,7 +53,7 @@ class Handles:
         """Return the node of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a node.
+            NoSuchHandleError: it is 0, from another load, of a removed node, or not a handle of a node.
         """
         held = self._held.get(handle)
         if not isinstance(held, SceneNode) or self._is_gone(held):
@@ -64,7 +64,7 @@ class Handles:
         """Return the field of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a field.
+            NoSuchHandleError: it is 0, from another load, of a removed node, or not a handle of a field.
         """
         held = self._held.get(handle)
         if not isinstance(held, NodeField) or self._is_gone(held.node):
@@ -75,5 +75,5 @@ class Handles:
         return self.tree.of_number(node.number) is not node
 
     def field_of(self, node: SceneNode, name: str) -> NodeField | None:
-        """Return a node's field; None if a node of this type has none of that name."""
+        """Return a node's field; None if this node type does not have it."""
         return self.tree.field_of(node, name, self.simulation)

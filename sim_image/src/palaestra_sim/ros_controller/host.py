@@ -21,7 +21,7 @@ class Host(Protocol):
     Attributes:
         world_path: the world that is loaded now.
         options: see FrontOptions.
-        clock: seconds of real time, from any start.
+        clock: returns seconds of real time, from any origin.
     """
 
     world_path: Path
@@ -33,21 +33,21 @@ class Host(Protocol):
         ...
 
     def set_mode(self, mode: Mode) -> None:
-        """Pause or run; pending steps are made once the simulation runs."""
+        """Pause or run; pending steps run when the simulation does."""
         ...
 
     def quit(self, status: int) -> None:
-        """End with that exit status, after the answer to the current call."""
+        """End with that exit status, after the response to the current call."""
         ...
 
     def reload(self) -> None:
-        """Load the world file again, after the answer of the present call."""
+        """Load the world file again, after the response to the current call."""
         ...
 
     def load(self, path: str) -> bool:
-        """Load another world, after the answer of the present call; False: it cannot be loaded."""
+        """Load another world, after the response to the current call; return False if it cannot be loaded."""
         ...
 
     def restart(self, robot: Robot) -> None:
-        """Restart the controller of one robot, after the answer of the present call."""
+        """Restart the controller of one robot, after the response to the current call."""
         ...

@@ -1,7 +1,7 @@
-"""Battery, keyboard and joystick: what every robot has in its controller and none in the world.
+"""Battery, keyboard and joystick: every robot's controller has them, although the world does not.
 
-Nobody sits at a simulator in a pod, so clients press the keys: the services below `palaestra/` are ours, and
-Webots has none of them. They belong to the front, so they work with every simulator behind it.
+In a pod no person sits at the simulator, so clients press the keys. The services for this, below
+`palaestra/`, are not in Webots. They do not depend on the backend, so they work with every simulator.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from palaestra_sim.ros_interfaces import Fields, Handler, Row
 from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_steps
 from palaestra_sim.scene.robot import Robot
 
-_MOST_KEYS: Final = 7  # that Webots reports at once
-_AXES: Final = 6  # of the joystick that our services plug in, a gamepad with two sticks and two triggers
+_MOST_KEYS: Final = 7  # Webots reports at most this many keys at once
+_AXES: Final = 6  # of the joystick that our services connect: a gamepad with two sticks and two triggers
 _POVS: Final = 1
 _BYTE: Final = (-128, 127)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Input:
-    """A pseudo device, as a row of the table of devices has it.
+    """A pseudo device, with the attributes of a row in the table of devices.
 
     Attributes:
-        rows: services beside `enable` and `get_sampling_period`, below its name.
+        rows: services besides `enable` and `get_sampling_period`, below its name.
         own_rows: services that Webots does not have, below `palaestra/` and its name.
     """
 
@@ -45,13 +45,13 @@ def inputs(robot: Robot) -> tuple[Input, ...]:
 
 @dataclass(slots=True, eq=False)
 class _Pressed:
-    """The keys or buttons that are pressed, in the order in which they went down."""
+    """The keys or buttons that are pressed, in the order in which they were pressed."""
 
     most: int
     value: list[int] = field(default_factory=list)
 
     def press(self, key: int) -> bool:
-        """Press a key; return False if it is none, or too many are pressed."""
+        """Press a key; return False if the number is not a key, or if too many keys are pressed."""
         if key in self.value:
             return True
         if key < 0 or len(self.value) >= self.most:
@@ -60,7 +60,7 @@ class _Pressed:
         return True
 
     def release(self, key: int) -> bool:
-        """Release a key, -1 for all; return False if it is not pressed."""
+        """Release a key, or all for -1; return False if the key is not pressed."""
         if key == -1:
             self.value.clear()
             return True
@@ -85,7 +85,7 @@ def _keyboard() -> Input:
 
 @dataclass(slots=True, eq=False)
 class _Joystick:
-    """A gamepad, connected by the first service of ours that is called."""
+    """A gamepad; the first successful call of one of our services connects it."""
 
     buttons: _Pressed = field(default_factory=lambda: _Pressed(_BYTE[1]))
     axes: list[int] = field(default_factory=lambda: [0] * _AXES)
@@ -93,11 +93,11 @@ class _Joystick:
     connected: bool = False
 
     def count(self, parts: Sequence[int]) -> int:
-        """Return how many it has; -1, as libController, while nothing is connected."""
+        """Return the number of parts; -1, as libController, before it is connected."""
         return len(parts) if self.connected else -1
 
     def turn(self, parts: list[int], values: Sequence[float]) -> bool:
-        """Set axes or points of view, from the first on; return False if that is impossible."""
+        """Set axes or points of view, from the first one; return False if the values are out of range."""
         low, high = _BYTE
         if len(values) > len(parts) or not all(low <= value <= high for value in values):
             return False
@@ -107,7 +107,7 @@ class _Joystick:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One axis or point of view; its value is a list of one, or empty while nothing is connected."""
+    """One axis or point of view; its value is a list of one number, or empty before it is connected."""
 
     joystick: _Joystick
     parts: list[int]
@@ -143,7 +143,7 @@ def _joystick_answers(joystick: _Joystick) -> tuple[Row, ...]:
 
 
 def _force_feedback() -> tuple[Row, ...]:
-    """Return the services for forces, which answer success for any joystick, as the controller does."""
+    """Return the services for forces, which return success for any joystick, as the controller does."""
     types = {
         "set_constant_force": "set_int",
         "set_constant_force_duration": "set_float",
@@ -166,7 +166,7 @@ def _joystick_moves(joystick: _Joystick) -> tuple[Row, ...]:
 
 
 def _connecting(joystick: _Joystick, row: Row) -> Row:
-    """Return a row whose success connects the joystick."""
+    """Return a row that connects the joystick when its handler succeeds."""
     name, type_name, handler = row
 
     def handle(request: Any) -> Fields:

@@ -1,4 +1,4 @@
-"""What a simulator leaves out of its world, as lines for its sidecar; see `palaestra_protocol.control`."""
+"""The nodes that a simulator leaves out, as lines for its sidecar; see `palaestra_protocol.control`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MOST_PLACES: Final = 8  # in one line
 
 
 def write_left_out(left_out: Iterable[WorldError], file: Path) -> None:
-    """Write `file` whole, with one line for each kind of node.
+    """Write the whole `file`, with one line for each kind of node.
 
     Raises:
         OSError: it cannot be written; no partial file is left.

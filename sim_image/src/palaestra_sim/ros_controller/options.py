@@ -1,4 +1,4 @@
-"""The options of the front."""
+"""The options of `ros_controller`."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrontOptions:
-    """The behavior of controllers in matters in which Webots varies.
+    """The behavior of controllers where that of Webots varies.
 
     Attributes:
-        step_sleep_s: least real time of a `time_step`, to imitate a bigger world.
-        lost_wakeup: whether the controller can lose a wake-up, like the real one: if a step is requested
-            before the messages of the step before are sent, or within `publish_delay_s` after, its messages
-            never come.
-        publish_delay_s: from the end of a step to its messages; 0 is right after the answer.
+        step_sleep_s: minimum real time of a `time_step`, to imitate a bigger world.
+        lost_wakeup: whether the controller can lose a wake-up, as the real one does. If a step is requested
+            before the messages of the previous step are sent, or within `publish_delay_s` after that, its
+            messages are lost.
+        publish_delay_s: delay from the end of a step to its messages; 0 means right after the response.
     """
 
     step_sleep_s: float = 0.0

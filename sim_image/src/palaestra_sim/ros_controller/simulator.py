@@ -1,7 +1,7 @@
 """One running simulator: a simulation and the controllers of its robots, from one world to the next.
 
-Controllers come and go with worlds, as Webots kills and starts them; the simulator outlives them. The process
-around it (command line, loop, signals) gives it nodes and a clock, and ends when it calls back.
+Controllers start and end with worlds, as Webots starts and kills them; the simulator outlives them. The
+program around it (command line, loop, signals) gives it nodes and a clock, and ends when it calls back.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ class RunningSimulator:
     """A simulator whose world has been checked.
 
     Args:
-        world_path: the .wbt file, read at once and again at each reload.
-        load: returns the simulation of a world file, which runs in the given mode at first.
-        make_node: returns the ROS node of a name.
+        world_path: the world file, read at once and again at each reload.
+        load: returns the simulation of a world file, which starts in the given mode.
+        make_node: returns the ROS node for a name.
         options: see FrontOptions.
-        mode: how it runs at first.
-        clock: seconds of real time, from any start.
+        mode: the mode at the start.
+        clock: returns seconds of real time, from any origin.
 
     Attributes:
         simulation: of the world that is loaded now.
@@ -44,7 +44,7 @@ class RunningSimulator:
         quit_status: the exit status from `simulation_quit`; None before.
 
     Raises:
-        WorldError: the file is wrong, or holds something that cannot be simulated.
+        WorldError: the file is wrong, or contains an object that cannot be simulated.
         OSError: it cannot be read.
     """
 
@@ -76,7 +76,7 @@ class RunningSimulator:
             self._start_controller(robot)
 
     def on_quit(self, callback: Callable[[int], None]) -> None:
-        """Set the function to call with the exit status after a client has asked for the end."""
+        """Set the function to call with the exit status after a client has requested the end."""
         self._ended = callback
 
     def arguments(self, robot: Robot) -> ControllerArguments:
@@ -84,12 +84,12 @@ class RunningSimulator:
         return self._arguments[robot]
 
     def set_mode(self, mode: Mode) -> None:
-        """Pause or run; steps that waited for the end of a pause are made."""
+        """Pause or run; then run the steps that waited for the end of a pause."""
         self.simulation.mode = mode
         self._stepping.advance()
 
     def quit(self, status: int) -> None:
-        """End, after the answer of the present call: pending steps fail, then the callback is called."""
+        """End, after the response to the current call: pending steps fail, then the callback is called."""
         if self.quit_status is not None:
             return
         self.quit_status = status
@@ -97,14 +97,14 @@ class RunningSimulator:
         self._soon(self._end)
 
     def reload(self) -> None:
-        """Load the world file again, after the answer of the present call."""
+        """Load the world file again, after the response to the current call."""
         self.load(str(self.world_path))
 
     def load(self, path: str) -> bool:
-        """Load another world, after the answer of the present call; False: it cannot be loaded.
+        """Load another world, after the response to the current call; return False if it cannot be loaded.
 
-        All controllers end, and those of the new world start: services vanish and come back,
-        nothing is enabled.
+        All controllers end, and those of the new world start: services disappear and reappear, and all
+        devices are off.
         """
         world_path = Path(path).absolute()
         try:
@@ -115,7 +115,7 @@ class RunningSimulator:
         return True
 
     def restart(self, robot: Robot) -> None:
-        """Restart the controller of one robot, after the answer to the current call."""
+        """Restart the controller of one robot, after the response to the current call."""
         if robot in self._arguments:
             self._soon(lambda: self._restart(robot))
 
@@ -161,9 +161,9 @@ class RunningSimulator:
         self._ended(self.quit_status or 0)
 
     def _soon(self, callback: Callable[[], None]) -> None:
-        """Call back after the answer of the present call was sent."""
+        """Call back after the response to the current call was sent."""
         next(iter(self.controllers.values())).node.later(0.0, callback)
 
 
 def _ignore(_status: int) -> None:
-    """Ignore the end, until `on_quit` sets another function."""
+    """Ignore the end; `on_quit` replaces this function."""

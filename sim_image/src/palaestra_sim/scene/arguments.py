@@ -1,4 +1,4 @@
-"""The controllerArgs of a robot that matter to the stub."""
+"""The controllerArgs of a robot that a simulator uses."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-# They let the controller step by itself or hand the motors to others, which no simulator of ours does.
+# They let the controller step by itself or give the motors to other programs; our simulators do neither.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerArguments:
-    """The arguments that matter here; like Webots' controller, the stub ignores unknown ones.
+    """The arguments that a simulator uses; like Webots' controller, it ignores unknown ones.
 
     Attributes:
         name: the node's name and the prefix of all paths.
@@ -30,7 +30,8 @@ class ControllerArguments:
 def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
-    Refused: without `--name` two robots collide, without `--synchronize` no client controls the steps.
+    Both are required: without `--name` two robots collide, without `--synchronize` no client controls the
+    steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]

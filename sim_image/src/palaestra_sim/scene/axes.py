@@ -1,4 +1,4 @@
-"""Which axis of a world points up.
+"""Determine which axis of a world points up.
 
 Before R2020b the y axis of every world pointed up; since then WorldInfo.coordinateSystem chooses, with y as
 the default until R2022a.
@@ -18,7 +18,7 @@ _SYSTEMS: Final = ("ENU", "NUE", "EUN")
 
 
 def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
-    """Return the frame around a world whose y axis points up, None if it is z; note its system of axes.
+    """Return the frame around a world whose y axis points up, or None if z does; record its axes.
 
     `node` is the WorldInfo of the world, or its first node.
     """

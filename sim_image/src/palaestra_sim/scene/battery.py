@@ -1,7 +1,8 @@
-"""The battery of a robot, which its CPU drains; a robot with an empty one stands still.
+"""The battery of a robot, which its CPU drains; a robot with an empty battery stands still.
 
-`Robot.battery` has the energy in joules, the capacity, and the power of a charger, of which there is none
-here. Motors take nothing: what they take in Webots is torque, which is 0 without dynamics.
+`Robot.battery` has the energy in joules, the capacity, and the power of a charger; chargers are not
+simulated. Motors consume nothing: in Webots their consumption depends on the torque, which is 0 without
+dynamics.
 Source: WbRobot::energyConsumption, WbMotor::energyConsumption.
 """
 
@@ -31,11 +32,11 @@ class Battery:
 
     @property
     def empty(self) -> bool:
-        """Whether there is a battery without energy."""
+        """Whether the robot has a battery without energy."""
         return self._energy_j == 0.0
 
     def drain(self, duration_s: float) -> None:
-        """Take what the robot consumes in that time."""
+        """Subtract the energy that the robot consumes in that time."""
         energy_j = self._energy_j
         if energy_j is not None:
             self._set(max(0.0, energy_j - self._power_w * duration_s))

@@ -1,4 +1,4 @@
-"""A robot as the physics has it: where it is, how it moves, and what it has touched."""
+"""The body of a robot in the physics: its position, its motion, and its contacts."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from palaestra_sim.scene.shapes import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Build:
-    """What a robot's body is made of.
+    """The parts of a robot's body.
 
     Attributes:
         base: its wheels.
-        outline: the shapes with which it runs into things, in its own frame.
+        outline: the shapes with which it collides, in its own frame.
         heights: z of the lower and upper end of the body, in its own frame.
-        links: what moves on its joints by forces; empty in a physics without such joints.
-        matter: the masses of what is on no link.
+        links: the parts that forces move on its joints; empty in a physics without such joints.
+        matter: the masses of the parts that are not on a link.
     """
 
     base: MobileBase
@@ -32,7 +32,7 @@ class Build:
 
 
 class Body(Protocol):
-    """A robot that stands on the floor: a pose, a velocity, and wheels where it has any.
+    """A robot that stands on the floor: a pose, a velocity, and wheels if it has any.
 
     Attributes:
         base: its wheels.
@@ -40,8 +40,8 @@ class Body(Protocol):
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: the parts that were touched since the bumpers were last read, a bit each; their reader clears
-            it.
+        touched: the parts that were touched since the bumpers were last read, one bit each; the bumpers'
+            reader clears it.
     """
 
     base: MobileBase
@@ -54,17 +54,17 @@ class Body(Protocol):
     touched: int
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the parts of the body that these shapes are, as bits of `touched`."""
+        """Return the parts of the body that match these shapes, as bits of `touched`."""
         ...
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Place the robot somewhere; its motion continues."""
+        """Set the position and heading of the robot; its motion continues."""
         ...
 
     def halt(self) -> None:
-        """Stop all motion; the motors begin again from rest."""
+        """Stop all motion; the motors start from rest."""
         ...
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors start from there."""
+        """Give the body a velocity in world axes; its motors continue from there."""
         ...

@@ -1,4 +1,4 @@
-"""What cameras see: the lens through which a physics draws, and the pictures that it returns."""
+"""The interface of cameras: the lens with which a physics renders, and the images that it returns."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Final, Protocol
 
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Left, top, right and bottom in pixels from the top left; the last two are outside.
+# Left, top, right and bottom in pixels from the top left; right and bottom are exclusive.
 Corners = tuple[int, int, int, int]
 
 MOST_PIXELS: Final = 4096  # in a row or column
-_WIDEST_RAD: Final = 3.1  # of a picture that is flat
+_WIDEST_RAD: Final = 3.1  # of a flat image
 
 
 @dataclass(slots=True, kw_only=True)
 class Lens:
-    """The lens of a camera, which looks along the x axis of its place, with z up.
+    """The lens of a camera, which looks along the x axis of its frame, with z up.
 
     Attributes:
         size: width and height in pixels.
         field_of_view_rad: from the left edge to the right one.
         near_m: the nearest visible distance.
-        far_m: the farthest visible distance; 0: there is none.
+        far_m: the farthest visible distance; 0 for no limit.
     """
 
     size: tuple[int, int]
@@ -33,23 +33,23 @@ class Lens:
 
     @property
     def flat(self) -> bool:
-        """Whether a flat picture shows all of it."""
+        """Whether a flat image can show the whole field of view."""
         return 0.0 < self.field_of_view_rad <= _WIDEST_RAD
 
 
 class CameraInterface(Protocol):
-    """A camera of a physics that draws. Every picture shows the world as it is at the call."""
+    """A camera of a physics that renders. Every image shows the world at the moment of the call."""
 
     def open(self) -> None:
-        """Get ready to draw.
+        """Prepare to render.
 
         Raises:
-            UnsimulatedError: this machine cannot draw; the message names what to install.
+            UnsimulatedError: this machine cannot render; the message names the packages to install.
         """
         ...
 
     def colors(self) -> bytes | memoryview:
-        """Return blue, green, red and alpha of each pixel, a byte each, row by row from the top left."""
+        """Return blue, green, red and alpha of each pixel, one byte each, row by row from the top left."""
         ...
 
     def depths(self, nearest_m: float, resolution_m: float) -> bytes | memoryview:
@@ -61,15 +61,15 @@ class CameraInterface(Protocol):
         ...
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> Mapping[SceneNode, Corners]:
-        """Return where each owner is visible: the rectangle around all its shapes.
+        """Return the rectangle in which each owner is visible: the one around all its shapes.
 
-        `owner` returns what a shape is part of, None if it is of no interest.
+        `owner` returns the node to which a shape belongs; None if the shape is not needed.
         """
         ...
 
     def painted(self, color: Callable[[SceneNode], bytes | None]) -> bytes | memoryview:
-        """Return a picture in which each shape has one color, without light, and the rest is black.
+        """Return an image in which each shape has one color, without light, and the background is black.
 
-        `color` returns the blue, green, red and alpha of a shape, a byte each, None for black.
+        `color` returns the blue, green, red and alpha of a shape, one byte each; None for black.
         """
         ...

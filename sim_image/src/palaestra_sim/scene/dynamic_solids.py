@@ -1,4 +1,4 @@
-"""Loose things: Solids with physics, which move when they are pushed."""
+"""Dynamic solids: Solids with physics, which move when they are pushed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_sim.scene.shapes import Shape
 
 
 class BodyState(NamedTuple):
-    """Where a thing is, and how it moves in m/s and rad/s, in the axes of the ground."""
+    """The pose of a dynamic solid, and its velocities in m/s and rad/s, in the axes of the ground."""
 
     pose: Pose
     velocity: Vector = (0.0, 0.0, 0.0)
@@ -21,14 +21,14 @@ class BodyState(NamedTuple):
 
 
 class DynamicFrame(Frame):
-    """The frame of a loose thing: where it was put, until the physics moves it.
+    """The frame of a dynamic solid: it stays as it was set, until the physics moves it.
 
     Attributes:
-        follow: returns where the physics has moved it; None before there is a physics.
-        changed: what the physics looks through; a place with news adds itself.
-        put: whether it was put somewhere since the physics looked; the physics sets it back.
-        speed: the velocity and turning that a client gave it, in the axes of the ground, until the physics
-            takes them; None: no change.
+        follow: returns the state to which the physics has moved it; None before a physics has a model.
+        changed: the frames that the physics has to read; a frame that a client changed adds itself.
+        put: whether a client has set it since the physics last read it; the physics clears it.
+        speed: the linear and angular velocity that a client set, in the axes of the ground; the physics takes
+            them and sets None, which means no change.
     """
 
     moves = True
@@ -68,13 +68,13 @@ class DynamicFrame(Frame):
 
     @property
     def course(self) -> BodyState:
-        """Where it is in the world, and how it moves."""
+        """The current state: its pose in the world, and its motion."""
         if self._stays() or self.follow is None:
             return BodyState(self.ground_pose)
         return self.follow()
 
     def push(self, velocity: Vector, turning: Vector) -> None:
-        """Give it a velocity in m/s and a turning in rad/s, in the axes of the ground."""
+        """Give it a velocity in m/s and an angular velocity in rad/s, in the axes of the ground."""
         self.speed = velocity, turning
         if self.changed is not None:
             self.changed[self] = None
@@ -84,7 +84,7 @@ class DynamicFrame(Frame):
         self.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def return_to_start(self) -> None:
-        """Return to the place in the world file, at rest."""
+        """Return to the pose in the world file, at rest."""
         super().return_to_start()
         self.halt()
 
@@ -97,19 +97,19 @@ class DynamicFrame(Frame):
         return self.put or self.follow is None
 
     def _local(self) -> Pose:
-        """Return where the physics has moved it, in the parent's frame."""
+        """Return the pose to which the physics has moved it, in the parent's frame."""
         pose = self.course.pose
         return pose if self.parent is None else self.parent.ground_pose.inverse.after(pose)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DynamicSolid:
-    """One loose thing.
+    """One dynamic solid.
 
     Attributes:
         node: its Solid.
         place: its frame.
-        shapes: what it and the Solids inside it run into other things with.
+        shapes: the shapes with which it and the Solids inside it collide.
         densities: of the shapes, in kg/m3.
     """
 

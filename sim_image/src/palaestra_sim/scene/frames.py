@@ -1,10 +1,10 @@
-"""The places of a world's nodes, each in the frame of the node around it.
+"""The frames of a world's nodes, each relative to the frame of the node around it.
 
-A place has the `translation` and `rotation` that clients read and write. It stays as written, except the
-place of a robot with a body, and the places behind joints.
+A frame has the `translation` and `rotation` that clients read and write. It stays as written, except for the
+frame of a robot with a body, of a dynamic solid, and of the end of a joint.
 
-Clients see poses in the axes of the world file, of which z or y points up. Shapes and physics are in the axes
-of the *ground*, of which z points up.
+Clients see poses in the axes of the world file, of which z or y points up. Shapes and physics use the axes of
+the *ground*, of which z points up.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Frame:
     """The frame of one node.
 
     Attributes:
-        moves: whether it moves by itself, and not only where a client puts it.
-        parent: the place of the node around it; None at the top of the world.
+        moves: whether it moves by itself, and not only when a client sets it.
+        parent: the frame of the node around it; None at the top of the world.
         translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
-        scale: meters of the world in a meter of this frame.
+        scale: the length of a meter of this frame in the world, in meters.
     """
 
     moves = False
@@ -59,7 +59,7 @@ class Frame:
 
     @property
     def placeable(self) -> bool:
-        """Whether a client may put it somewhere."""
+        """Whether a client may set it."""
         return True
 
     @property
@@ -86,11 +86,11 @@ class Frame:
         return None if self.parent is None else self.parent.axes
 
     def to_ground(self, vector: Vector) -> Vector:
-        """Return a vector in the axes of the world file, in those of the ground."""
+        """Return a vector of the axes of the world file in those of the ground."""
         return vector if self.axes is None else turn(self.axes, vector)
 
     def from_ground(self, vector: Vector) -> Vector:
-        """Return a vector in the axes of the ground, in those of the world file."""
+        """Return a vector of the axes of the ground in those of the world file."""
         return vector if self.axes is None else turn(transposed(self.axes), vector)
 
     @property
@@ -105,24 +105,24 @@ class Frame:
         return self.ground_pose.position[2]
 
     def chain(self) -> Iterator[Frame]:
-        """Yield this place and those around it, up to the top of the world."""
+        """Yield this frame and those around it, up to the top of the world."""
         place: Frame | None = self
         while place is not None:
             yield place
             place = place.parent
 
     def return_to_start(self) -> None:
-        """Return to the place in the world file."""
+        """Return to the pose in the world file."""
         self.translation, self.rotation = self._start
 
 
 class YUp(Frame):
-    """The frame around everything in a world whose y axis points up; no node has it."""
+    """The frame around a whole world whose y axis points up; it does not belong to a node."""
 
     def __init__(self) -> None:
         super().__init__(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 
     @property
     def axes(self) -> Matrix:
-        """The rotation that makes z of y."""
+        """The rotation that turns y into z."""
         return Y_UP

@@ -1,7 +1,6 @@
-"""Poses in space, for the answers to supervisor calls and for the places of shapes.
+"""Poses in space, for responses to supervisor calls and for the frames of shapes.
 
-Rotations are 3 x 3 matrices as nine floats, row after row. The physics is planar and does not use this
-module.
+Rotations are 3 x 3 matrices as nine floats, row after row. The planar motion of the stub does not need them.
 """
 
 from __future__ import annotations
@@ -19,17 +18,17 @@ IDENTITY: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Pose(NamedTuple):
-    """A position in meters and a rotation, in a frame that the holder of the pose knows."""
+    """A position in meters and a rotation, in a frame that the owner of the pose defines."""
 
     position: Vector = (0.0, 0.0, 0.0)
     rotation: Matrix = IDENTITY
 
     def after(self, inner: Pose) -> Pose:
-        """Return the pose `inner` of this pose's frame in the frame around this pose."""
+        """Return the pose `inner`, given in this pose's frame, in the outer frame."""
         return Pose(self.carry(inner.position), multiply(self.rotation, inner.rotation))
 
     def carry(self, point: Vector) -> Vector:
-        """Return `point` of this pose's frame in the frame around this pose."""
+        """Return `point`, given in this pose's frame, in the outer frame."""
         turned = turn(self.rotation, point)
         return (
             self.position[0] + turned[0],
@@ -38,17 +37,17 @@ class Pose(NamedTuple):
         )
 
     def turned(self, vector: Vector) -> Vector:
-        """Return a direction of this pose's frame in the frame around this pose."""
+        """Return a direction, given in this pose's frame, in the outer frame."""
         return turn(self.rotation, vector)
 
     def scaled(self, factor: float) -> Pose:
-        """Return the pose with a position that is `factor` times as far."""
+        """Return the pose with its position multiplied by `factor`."""
         x, y, z = self.position
         return Pose((x * factor, y * factor, z * factor), self.rotation)
 
     @property
     def inverse(self) -> Pose:
-        """The frame around this pose, in this pose's frame."""
+        """The pose of the outer frame in this pose's frame."""
         back = transposed(self.rotation)
         x, y, z = turn(back, self.position)
         return Pose((-x, -y, -z), back)
@@ -60,7 +59,7 @@ class Pose(NamedTuple):
 
     @property
     def upright(self) -> bool:
-        """Whether the z axis points up, to within two degrees: many worlds were saved while they ran."""
+        """Whether the z axis points up within two degrees; many worlds were saved during a simulation."""
         return self.rotation[8] > _UPRIGHT
 
 
@@ -80,7 +79,7 @@ def transposed(m: Matrix) -> Matrix:
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
-    """Return the rotation that does `b` first, then `a`, both about the axes of the outer frame."""
+    """Return the rotation that applies `b` first, then `a`, both about the axes of the outer frame."""
     x = turn(a, (b[0], b[3], b[6]))
     y = turn(a, (b[1], b[4], b[7]))
     z = turn(a, (b[2], b[5], b[8]))
@@ -88,7 +87,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def from_axis_angle(rotation: AxisAngle) -> Matrix:
-    """Return the rotation about an axis of any length; for length 0, the identity."""
+    """Return the rotation about an axis of any length; the identity for length 0."""
     x, y, z, angle_rad = rotation
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:
@@ -115,7 +114,7 @@ def turned(rotation: AxisAngle, by: Matrix) -> AxisAngle:
 
 
 def to_axis_angle(m: Matrix) -> AxisAngle:
-    """Return axis and angle in [0, pi] of a rotation; of no rotation, the z axis."""
+    """Return axis and angle in [0, pi] of a rotation; the z axis for the identity."""
     x, y, z, w = to_quaternion(m)
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:

@@ -1,6 +1,6 @@
-"""A picture of pixels, and how lines, ovals and polygons are drawn on it. Pure.
+"""An image of pixels, and functions that draw lines, ovals and polygons on it. Pure.
 
-Rows go from the top down, pixels from left to right; what is outside of the picture is not drawn.
+Rows go from the top down, pixels from left to right; points outside the image are not drawn.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ BLACK = (0, 0, 0, OPAQUE)
 
 @dataclass(slots=True, kw_only=True)
 class ImageBuffer:
-    """A picture of `width` by `height` pixels, transparent black at first; `pixels` has the colors by row."""
+    """An image of `width` by `height` pixels, transparent black at first; `pixels` has the colors by row."""
 
     width: int
     height: int
     pixels: bytearray = field(default_factory=bytearray)
 
     def __post_init__(self) -> None:
-        """Make the pixels, if there are none."""
+        """Create the pixels, if none are given."""
         if not self.pixels:
             self.pixels = bytearray(_BYTES * self.width * self.height)
 
     def at(self, x: int, y: int) -> Color:
-        """Return the color of a pixel inside."""
+        """Return the color of a pixel inside the image."""
         start = _BYTES * (y * self.width + x)
         blue, green, red, alpha = self.pixels[start : start + _BYTES]
         return blue, green, red, alpha
 
     def draw(self, points: Iterable[Point], color: Color, opacity: int = OPAQUE) -> None:
-        """Give those pixels a color, mixed with what is there by the opacity, from 0 to 255."""
+        """Give those pixels a color, mixed with the existing one by the opacity, from 0 to 255."""
         for x, y in points:
             if 0 <= x < self.width and 0 <= y < self.height:
                 start = _BYTES * (y * self.width + x)
                 self.pixels[start : start + _BYTES] = bytes(_mixed(self.at(x, y), color, opacity))
 
     def exchange(self, old: Color, new: Color) -> None:
-        """Give each pixel of one color another one."""
+        """Replace one color by another in all pixels."""
         for start in range(0, len(self.pixels), _BYTES):
             if tuple(self.pixels[start : start + _BYTES]) == old:
                 self.pixels[start : start + _BYTES] = bytes(new)
 
     def copy(self, x: int, y: int, width: int, height: int) -> ImageBuffer:
-        """Return the part of the picture that is in a rectangle; it may be smaller, or have no pixel."""
+        """Return the part of the image inside a rectangle; it may be smaller, or have no pixels."""
         left, top = max(0, x), max(0, y)
         right, bottom = min(self.width, x + width), min(self.height, y + height)
         rows = (
@@ -62,7 +62,7 @@ class ImageBuffer:
         return ImageBuffer(width=size[0], height=size[1], pixels=bytearray().join(rows))
 
     def paste(self, other: ImageBuffer, x: int, y: int, *, blend: bool = False) -> None:
-        """Put another picture on this one, mixed with what is there by its alpha if they `blend`."""
+        """Paste another image over this one; with `blend`, mix the colors by the alpha of the other."""
         for row in range(other.height):
             for column in range(other.width):
                 color = other.at(column, row)
@@ -75,7 +75,7 @@ class ImageBuffer:
 
 
 def on_background(picture: ImageBuffer, background: bytes | bytearray | memoryview) -> ImageBuffer:
-    """Return an opaque picture: `picture` on a background of its size, mixed by its alpha."""
+    """Return an opaque image: `picture` on a background of the same size, mixed by its alpha."""
     behind = ImageBuffer(width=picture.width, height=picture.height, pixels=bytearray(background))
     for y in range(picture.height):
         for x in range(picture.width):
@@ -86,7 +86,7 @@ def on_background(picture: ImageBuffer, background: bytes | bytearray | memoryvi
 
 
 def _mixed(old: Color, new: Color, opacity: int) -> Color:
-    """Return a color over another one, in whole numbers like Webots."""
+    """Return a color over another one, in integer arithmetic like Webots."""
     rest = OPAQUE - opacity
     blue, green, red, alpha = ((rest * a + opacity * b) // OPAQUE for a, b in zip(old, new, strict=True))
     return blue, green, red, alpha
@@ -101,7 +101,7 @@ def line(x1: int, y1: int, x2: int, y2: int) -> Iterator[Point]:
 
 
 def rectangle(x: int, y: int, width: int, height: int) -> Iterator[Point]:
-    """Yield the pixels of the frame of a rectangle."""
+    """Yield the pixels of the outline of a rectangle."""
     right, bottom = x + width - 1, y + height - 1
     yield from outline([(x, y), (right, y), (right, bottom), (x, bottom)])
 

@@ -1,4 +1,4 @@
-"""Read the joint of a HingeJoint or SliderJoint, and doors: links on joints that are on no robot."""
+"""Read the joint of a HingeJoint or SliderJoint, and doors: links on joints that do not belong to a robot."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from palaestra_sim.scene.validation import NodeReader
 
 
 def parameters_of(node: SceneNode) -> SceneNode:
-    """Return the node with the parameters of a joint; the joint itself, with none of them, if it has none."""
+    """Return the node with the parameters of a joint; if it is missing, the joint node itself."""
     return next(iter(node.nodes("jointParameters")), node)
 
 
 def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint | None:
-    """Return the joint at `node`; None if it is refused. With `forces`, it has stops and what resists it."""
+    """Return the joint at `node`; None if it is refused. With `forces`, it has stops and resistance."""
     slides = node.type_name == "SliderJoint"
     parameters = parameters_of(node)
     along = reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0))
@@ -45,7 +45,7 @@ def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint |
 
 
 def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Link | None:
-    """Return the link on a joint that is on no robot, without shapes; None if its end has no physics."""
+    """Return the link of a door, still without shapes; None if the end of the joint has no physics."""
     for end in node.nodes("endPoint"):
         if end.type_name == "Solid" and end.nodes("physics"):
             if parent is not None and parent.scale != 1.0:
@@ -60,7 +60,7 @@ def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Lin
 
 
 def fill_door(reading: NodeReader, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
-    """Give a link on no robot its shapes and masses; `inner` are the links on it, `shapes` all inside it."""
+    """Give a door its shapes and masses; `inner` are the links on it, `shapes` all shapes inside it."""
     links = [link, *inner]
     link.shapes = tuple(shape for shape in shapes if link_around(shape.place, links) is link)
     nodes = [node for node in (link.node, *link.node.descendants()) if node.nodes("physics")]

@@ -1,7 +1,7 @@
-"""Joints: the place of what is on one, as its motor turns.
+"""Joints, and the frames of their ends, which move as the motors turn.
 
-A hinge turns its end about an axis through the anchor, a slider moves it along the axis. The place in the
-world file holds at the joint's `position` in the file.
+A hinge turns its end about an axis through the anchor, a slider moves its end along the axis. The frame in
+the world file applies at the joint's `position` in the file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from palaestra_sim.scene.motors import Motor
 
 
 class Rubbing(NamedTuple):
-    """What resists the motion of a joint; of a slider in N instead of N m, and in m instead of rad.
+    """The resistance of a joint to motion; a slider has N instead of N m, and m instead of rad.
 
     Attributes:
         damping: in N m s/rad.
@@ -34,17 +34,17 @@ FREE: Final = Rubbing()
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Joint:
-    """A hinge or a slider, in the frame of the node that it is in.
+    """A hinge or a slider, in the frame of the node that contains it.
 
     Attributes:
         axis: unit vector.
         anchor: a point on the axis of a hinge, in meters.
         slides: whether it is a slider.
         start: the position in the file, in rad or m.
-        motor: that moves it; None: it stays where it is put, unless a physics moves it.
-        stops: the positions that it never passes; equal ones: no stops.
-        rubbing: what resists its motion.
-        position: where a joint without a motor is, in rad or m.
+        motor: the motor that moves it; None if it stays where it is set, unless a physics moves it.
+        stops: the positions that it never passes; equal ones mean no stops.
+        rubbing: its resistance to motion.
+        position: of a joint without a motor, in rad or m.
         speed: of a joint without a motor, in rad/s or m/s.
         brake: the damping by the brake of a joint without a motor, in N m s/rad.
     """
@@ -79,7 +79,7 @@ class Joint:
         return self.brake if self.motor is None else self.motor.damping
 
     def follow(self, position: float, speed: float) -> None:
-        """Take position and speed from a physics."""
+        """Set position and speed to those in a physics."""
         if self.motor is None:
             self.position, self.speed = position, speed
         else:
@@ -90,14 +90,14 @@ class Joint:
         self.follow(self.now, 0.0)
 
     def put(self, position: float) -> None:
-        """Put it to a position, at rest there; a motor holds it, as in Webots."""
+        """Set its position, at rest; a motor holds it there, as in Webots."""
         if self.motor is None:
             self.position, self.speed = position, 0.0
         else:
             self.motor.put(position)
 
     def carry(self, pose: Pose) -> Pose:
-        """Return where a frame is now that is at `pose` in the world file."""
+        """Return the current pose of a frame that has `pose` in the world file."""
         moved = self.now - self.start
         if moved == 0.0:
             return pose
@@ -121,12 +121,12 @@ class JointFrame(Frame):
 
     @property
     def start(self) -> Pose:
-        """The frame in the parent's, at the position of the joint in the world file."""
+        """The frame in the parent's, at the joint's position in the world file."""
         return Pose(self._translation, from_axis_angle(self._rotation))
 
     @property
     def placeable(self) -> bool:
-        """The joint alone moves it."""
+        """Always False: only the joint moves it."""
         return False
 
     @property
@@ -153,7 +153,7 @@ class JointFrame(Frame):
         self._rotation = value
 
     def return_to_start(self) -> None:
-        """Put the joint back; its motor returns to its start by itself."""
+        """Return the joint to its start; a motor returns by itself."""
         if self.joint.motor is None:
             self.joint.put(self.joint.start)
             self.joint.brake = 0.0

@@ -1,7 +1,7 @@
-"""Links: what moves on a joint because of forces, or is measured for the force on it.
+"""Links: parts that forces move on joints, and parts whose force on the robot is measured.
 
-A link is everything on the end of one joint, without what is on further joints. It is mounted on another
-link, on a robot, on a loose thing, or on what stands.
+A link is everything on the end of one joint, without the parts on further joints. It is mounted on another
+link, on a robot, on a dynamic solid, or on a fixed object.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ class Link:
     """One link.
 
     Attributes:
-        node: of its Solid.
+        node: its Solid.
         place: its frame; that of the end of its joint, if it has one.
-        joint: that moves it; None: it is fixed, and the force on it is measured.
-        shapes: what it touches other things with.
+        joint: the joint that moves it; None if it is fixed and the force on it is measured.
+        shapes: the shapes with which it touches other objects.
         matter: the masses of its Solids.
-        force: with which it acts on what it is mounted on, in N, in its own axes; set by the physics.
+        force: its force on the object on which it is mounted, in N, in its own axes; set by the physics.
     """
 
     node: SceneNode
@@ -39,12 +39,12 @@ class Link:
 
     @property
     def start(self) -> Pose:
-        """Its frame in the frame around it, at the position of the joint in the world file."""
+        """Its frame in the outer frame, at the joint's position in the world file."""
         return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 
 def frames_between(outer: Frame | None, inner: Frame | None) -> Pose:
-    """Return the frame `inner` in the frame `outer` around it, with all joints between as they are now."""
+    """Return the frame `inner` in the frame `outer` around it, with the current positions of all joints."""
     pose = Pose()
     while inner is not None and inner is not outer:
         pose = _scaled(inner).after(pose)
@@ -53,7 +53,7 @@ def frames_between(outer: Frame | None, inner: Frame | None) -> Pose:
 
 
 def link_around(place: Frame | None, links: Sequence[Link]) -> Link | None:
-    """Return the innermost link that a place is on; None if it is on none."""
+    """Return the innermost link around a frame; None if no link contains it."""
     by_place = {link.place: link for link in links}
     around: Iterator[Frame] = iter(()) if place is None else place.chain()
     return next((by_place[it] for it in around if it in by_place), None)

@@ -1,4 +1,4 @@
-"""A simulation from the files of a world: the world itself, the PROTOs of its project, the stand-ins."""
+"""Load a simulation from the files of a world: the world itself, the PROTOs of its project, the stand-ins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Loader:
     Attributes:
         physics: returns the physics of a world that is about to be read.
         stand_ins: the user's own simple solids in place of PROTOs, by name.
-        leave_out: what the user leaves out, if it cannot be simulated.
+        leave_out: the nodes that the user leaves out, if they cannot be simulated.
     """
 
     physics: Callable[[], Physics]
@@ -33,15 +33,15 @@ class Loader:
     def __call__(self, world_path: Path, mode: Mode) -> Simulation:
         """Return the simulation of a world and of the PROTOs in its project.
 
-        It runs in that mode at first.
+        It starts in that mode.
 
         Raises:
-            WorldError: the file is wrong, or holds something that cannot be simulated.
+            WorldError: the file is wrong, or contains an object that cannot be simulated.
             OSError: it cannot be read.
         """
         world = parse(read_bounded(world_path), world_path.name)
         found = local_protos(world_path, world, name=world_path.name, without=self.stand_ins)
-        # A PROTO of the project is what its author means; a stand-in of the user's comes before it.
+        # A PROTO of the project overrides a built-in stand-in, and a stand-in of the user overrides both.
         solids = {name: entry for name, entry in shipped().items() if name not in found.local}
         descriptions = Descriptions(
             protos={**builtin_protos(), **found.local},

@@ -1,4 +1,4 @@
-"""Lookup tables: from what a sensor meets to what it measures.
+"""Lookup tables: from the distance that a sensor detects to the value that it reports.
 
 As in Webots, the response is linear between the rows and constant beyond both ends, with Gaussian noise as a
 fraction of the response.
@@ -18,7 +18,7 @@ class LookupTable:
     """The response of a sensor to a distance.
 
     Args:
-        rows: by growing distance; none: the response is the distance itself.
+        rows: by increasing distance; without rows, the response is the distance itself.
     """
 
     __slots__ = ("_bases", "_distances", "_noisy", "_slopes", "rows")
@@ -41,7 +41,7 @@ class LookupTable:
 
     @property
     def reach_m(self) -> float:
-        """The distance beyond which the response stays the same."""
+        """The distance beyond which the response is constant."""
         return self._distances[-1]
 
     @property
@@ -63,5 +63,5 @@ class LookupTable:
 
 @cache
 def lookup_table(*rows: Row) -> LookupTable:
-    """Return the table of these rows, one for all sensors that have the same."""
+    """Return the table of these rows; sensors with equal rows share one table."""
     return LookupTable(rows)

@@ -1,4 +1,4 @@
-"""Surfaces of triangles: what is written in a world as points and faces, and what is made of them. Pure."""
+"""Triangle meshes, from the points and faces in a world, or from a shape. Pure."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _SIDES: Final = 20  # of a cone
 _CORNERS: Final = 3  # of a triangle
-_FEW: Final = 4  # a face with so many corners is taken as convex; most have three or four
+_FEW: Final = 4  # a face with at most so many corners is treated as convex; most have three or four
 _LARGEST_M: Final = 1e5
 
 Triangle = tuple[int, int, int]
@@ -38,7 +38,7 @@ def cone(radius_m: float, height_m: float) -> Mesh:
 
 
 def face_set(node: SceneNode) -> Mesh | None:
-    """Return the mesh of an IndexedFaceSet; None if it has no face. Faces with wrong indices are left out."""
+    """Return the mesh of an IndexedFaceSet; None if it has no face. Faces with wrong indices are skipped."""
     flat = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
     if len(flat) % _CORNERS or not _finite(flat):
         return None
@@ -69,14 +69,14 @@ def elevation_grid(node: SceneNode) -> Mesh | None:
 
 
 def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
-    """Return the triangles of a flat face, whose outline may have corners that point inward."""
+    """Return the triangles of a flat face, whose outline may be concave."""
     if len(face) <= _FEW:
         return list(_fan(face))
     flat = _flattened([points[index] for index in face])
     left, found = list(range(len(face))), []
     while len(left) > _CORNERS:
         ear = next((at for at in range(len(left)) if _is_ear(flat, left, at)), None)
-        if ear is None:  # an outline that crosses itself
+        if ear is None:  # the outline crosses itself
             break
         found.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
         del left[ear]
@@ -85,7 +85,7 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
 
 
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
-    """Return an outline without the axis along which it is thinnest, counterclockwise."""
+    """Return an outline in the plane without its thinnest axis, counterclockwise."""
     normal = [
         sum(
             a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]
@@ -99,7 +99,7 @@ def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
 
 
 def _is_ear(flat: Sequence[tuple[float, float]], left: Sequence[int], at: int) -> bool:
-    """Return whether the corner `at` of those that are left can be cut off: no other is in its triangle."""
+    """Return whether the remaining corner `at` can be cut off, because no other is inside its triangle."""
     a, b, c = flat[left[at - 1]], flat[left[at]], flat[left[(at + 1) % len(left)]]
     if _turn(a, b, c) <= 0.0:
         return False

@@ -1,12 +1,13 @@
-"""The base of a robot: its wheels at work, from the demands of their motors to the speed of the robot.
+"""The base of a robot: the speed of the robot, from the demands of its wheels' motors.
 
-The law of the wheels is in `drive`. In Webots torque and friction limit the acceleration of a robot. Here
-three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z. They are those of the Robotino
-3's own controller (Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). All three axes are
-slowed by the same factor, as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
+`wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
+acceleration of a robot. Here three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z.
+They are those of the Robotino 3's own controller
+(Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes,
+as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
 In a robot without physics, Webots itself limits the accelerations of the wheels: see `Motor.kinematic`.
 
-Every simulator takes the speed from here, so a robot answers its commands alike in all of them.
+Every simulator takes the speed from here, so a robot responds to its commands alike in all of them.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ class MobileBase:
 
     Args:
         wheels: the motors of the wheels.
-        drive: the law of these wheels; None: they do not move the robot.
+        drive: the kinematics of these wheels; None if they do not move the robot.
 
     Attributes:
-        drive: as given.
+        drive: the argument.
         vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
     """
 
@@ -50,13 +51,13 @@ class MobileBase:
         return motor in self._wheels
 
     def halt(self) -> None:
-        """Stop all motion; the motors begin again from rest."""
+        """Stop all motion; the motors start from rest."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
             wheel.halt()
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the robot a speed in its own axes; its motors start from there."""
+        """Give the robot a speed in its own axes; its motors continue from there."""
         self.vx, self.vy, self.omega = vx, vy, omega
         if self.drive is not None:
             speeds = self.drive.wheel_speeds(vx, vy, omega)
@@ -85,7 +86,7 @@ class MobileBase:
         speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
-        # In steps of the largest acceleration, which all three axes share.
+        # The number of steps at the largest acceleration; all three axes share it.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
         if steps > 1.0 and not self._kinematic:
             demands = [

@@ -1,4 +1,4 @@
-"""Whether the simulation runs, and how fast."""
+"""The simulation mode: whether the simulation runs, and how fast."""
 
 from __future__ import annotations
 

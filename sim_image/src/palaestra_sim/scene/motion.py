@@ -1,7 +1,7 @@
-"""How a place moves in the world: with its robot, and with the joints that carry it.
+"""The motion of a frame in the world: with its robot, and with the joints that carry it.
 
 Velocities are in the axes of the world file, over the last basic step. They come from the speeds of body and
-motors, as those of Webots come from its physics, so a robot that is placed somewhere else has no velocity.
+motors, as those of Webots come from its physics. So a robot that a client moves elsewhere has no velocity.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ _REST: Vector = (0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
-    """The velocity of a place's origin in m/s, and its turning in rad/s, in the axes of the world file."""
+    """The velocity of a frame's origin in m/s and its angular velocity in rad/s, in the file's axes."""
 
     velocity: Vector = _REST
     turning: Vector = _REST
 
 
 def motion_of(place: Frame, body: Body | None) -> Motion:
-    """Return the motion of a place on a robot; `body` is the robot's."""
+    """Return the motion of a frame on a robot; `body` is the robot's."""
     point = place.ground_pose.position
     velocity, turning = _REST, _REST
     if body is not None:
@@ -39,7 +39,7 @@ def motion_of(place: Frame, body: Body | None) -> Motion:
 
 
 class Trail:
-    """The acceleration of a place in world axes: the change of its velocity over the last basic step."""
+    """The acceleration of a frame in world axes: the change of its velocity over the last basic step."""
 
     __slots__ = ("_before", "_body", "_place", "_step_s")
 
@@ -49,12 +49,12 @@ class Trail:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the velocity: the place is at rest, and was."""
+        """Reset the velocities: the frame is at rest, and was before."""
         self._before = _REST
         self._step_s = 0.0
 
     def begin(self, step_s: float) -> None:
-        """Note the velocity before a basic step."""
+        """Record the velocity before a basic step."""
         self._before = motion_of(self._place, self._body).velocity
         self._step_s = step_s
 
@@ -68,7 +68,7 @@ class Trail:
 
 
 def _of_joint(end: JointFrame, speed: float, point: Vector) -> Motion:
-    """Return what a motor adds to the motion of a point on the end of its joint, in axes of the ground."""
+    """Return the motion that a motor adds to a point on the end of its joint, in the axes of the ground."""
     around = end.parent.ground_pose if end.parent is not None else None
     axis, anchor = end.joint.axis, end.joint.anchor
     if around is not None:

@@ -1,8 +1,8 @@
-"""Motors, and the positions of their shafts: angles of rotational ones, lengths of linear ones.
+"""Motors, and the positions of their shafts: angles of rotational motors, lengths of linear ones.
 
 A motor has the commands of Webots: a target position and a velocity. With a target of infinity it turns at
-that velocity; with a finite one it turns to the target, at most at that velocity. An invalid command is
-ignored without an error, because the ROS interface always answers success.
+that velocity; with a finite target it turns to the target, at most at that velocity. An invalid command is
+ignored without an error, because the ROS interface always returns success.
 
 Where the end of a joint has physics, a PID controller demands the speed. Without physics, Webots moves the
 joint itself, without that controller: see `Motor.kinematic`. Source: Webots reference, Motor.
@@ -14,17 +14,18 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-_REACHED: Final = 1e-6  # in rad or m: so near its target a joint without physics rests, as in Webots
+_REACHED: Final = 1e-6  # in rad or m: this close to its target, a joint without physics rests, as in Webots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorSpec:
     """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
 
-    Of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean
-    no limits of commands, equal `stops` no stops of the joint, which the shaft never passes. `start_rad` is
-    the position in the world file. `gains` are P, I and D of its controller. `multiplier` scales the
-    positions, velocities and torques that a client sets. `forces` is whether the physics has them.
+    Units of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited. Equal `min_rad` and
+    `max_rad` mean that commands have no limits. Equal `stops` mean that the joint has no stops, which the
+    shaft never passes. `start_rad` is the position in the world file. `gains` are P, I and D of its
+    controller. `multiplier` scales the positions, velocities and torques that a client sets. `forces`:
+    whether the physics has forces.
     """
 
     name: str
@@ -53,11 +54,11 @@ class Motor:
         gains: P, I and D of its controller.
         kinematic: whether its joint has no physics. Then the available torque limits its acceleration, as in
             Webots, and it keeps the commanded velocity up to its target.
-        changed: whether a command came since the physics looked; the physics sets it back.
-        damping: of the joint, in N m s/rad, set by its brake; 0 without one.
+        changed: whether a command came since the physics last read it; the physics clears it.
+        damping: of the joint, in N m s/rad, set by its brake; 0 without a brake.
         forceful: whether the physics moves it by forces.
-        effort_nm: the torque that a client set in place of a position; None: none.
-        feedback_nm: the torque with which it acted in the last basic step.
+        effort_nm: the torque that a client set instead of a position; None if there is no such command.
+        feedback_nm: the torque that it applied in the last basic step.
     """
 
     __slots__ = (
@@ -99,12 +100,12 @@ class Motor:
         return self.spec.model
 
     def join(self, start_rad: float, stops: tuple[float, float]) -> None:
-        """Put the motor on a joint: its position in the world file, and the stops that it never passes."""
+        """Set the joint of the motor: its position in the world file, and the stops that it never passes."""
         self.spec = replace(self.spec, start_rad=start_rad, stops=stops)
         self.reset()
 
     def reset(self) -> None:
-        """Return to the state of a new world: position control, at the start, as fast as allowed."""
+        """Return to the initial state: position control, at the start, as fast as allowed."""
         self.target_rad = self.asked_rad = self.spec.start_rad
         self.velocity_rad_s = self.asked_velocity_rad_s = self.spec.max_velocity_rad_s
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
@@ -118,16 +119,16 @@ class Motor:
         self.changed = True
 
     def put(self, angle_rad: float) -> None:
-        """Put the shaft to an angle within the stops, which becomes the target."""
+        """Set the shaft to an angle within the stops, which becomes the target."""
         low, high = self.spec.stops
         self.angle_rad = angle_rad if low == high else max(low, min(high, angle_rad))
         self.target_rad = self.asked_rad = self.angle_rad
         self.halt()
 
     def halt(self) -> None:
-        """Stop the shaft; the motor begins again from rest."""
+        """Stop the shaft; the motor starts from rest."""
         self.speed_rad_s = 0.0
-        self._rate = 0.0  # of a kinematic motor: the velocity that it has reached
+        self._rate = 0.0  # of a kinematic motor: its current velocity
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:
@@ -147,7 +148,7 @@ class Motor:
     def set_velocity(self, velocity_rad_s: float) -> None:
         """Set the velocity, times the multiplier, clamped to the motor's limit.
 
-        Ignored: NaN, and a negative velocity while the target is finite.
+        NaN is ignored, and so is a negative velocity while the target is finite.
         """
         if math.isnan(velocity_rad_s):
             return
@@ -167,24 +168,22 @@ class Motor:
             self.changed = True
 
     def set_available_torque(self, torque_nm: float) -> None:
-        """Set the greatest torque, clamped to the motor's limit. NaN and negative values are ignored."""
+        """Set the maximum torque, clamped to the motor's limit. NaN and negative values are ignored."""
         if torque_nm >= 0.0:
             self.available_torque_nm = min(torque_nm, self.spec.max_torque_nm)
             self.changed = True
 
     def set_control_pid(self, p: float, i: float, d: float) -> None:
-        """Set P, I and D of the controller, which forgets the past. Invalid values are ignored, all three."""
+        """Set P, I and D of the controller, and reset it. If one value is invalid, all three are ignored."""
         if (p > 0.0 and i >= 0.0 and d >= 0.0) or (p, i, d) == self.spec.gains:
             self.gains = p, i, d
             self._integral = self._last_error = 0.0
             self.changed = True
 
     def set_effort(self, torque_nm: float) -> None:
-        """Act with a torque, times the multiplier, until the next position. NaN is ignored.
+        """Apply a torque, times the multiplier, until the next position command. NaN is ignored.
 
-        It is clamped to the available torque.
-
-        Only a motor that is `forceful` does.
+        It is clamped to the available torque. It has an effect only if the motor is `forceful`.
         """
         if math.isnan(torque_nm):
             return
@@ -214,7 +213,7 @@ class Motor:
         return max(self.speed_rad_s - change, min(self.speed_rad_s + change, wanted))
 
     def _toward_target(self, step_s: float) -> float:
-        """Return the speed that the PID controller asks for, at most the commanded velocity."""
+        """Return the speed that the PID controller demands, at most the commanded velocity."""
         p, i, d = self.gains
         error = self.target_rad - self.angle_rad
         wanted = p * error
@@ -226,7 +225,7 @@ class Motor:
         return max(-limit, min(limit, wanted))
 
     def _kinematic_speed(self, step_s: float) -> float:
-        """Return the speed in the next step of a joint without physics, which ends at the target."""
+        """Return the speed in the next step for a joint without physics; it ends at the target."""
         gap = self.target_rad - self.angle_rad
         endless = math.isinf(gap)
         if abs(gap) < _REACHED or (endless and self._at_limit()):
@@ -243,7 +242,7 @@ class Motor:
         return math.copysign(min(abs(gap) / step_s, self._rate), gap)
 
     def _at_limit(self) -> bool:
-        """Return whether a limit of the positions ends an endless motion of a joint without physics."""
+        """Return whether a position limit ends the endless motion of a joint without physics."""
         low, high, velocity = self.spec.min_rad, self.spec.max_rad, self.velocity_rad_s
         if low == high:
             return False

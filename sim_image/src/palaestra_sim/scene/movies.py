@@ -1,6 +1,6 @@
-"""Movies of what the Viewpoint shows, in the time of the simulation.
+"""Movies of the Viewpoint's view, in simulated time.
 
-A frame is drawn after each basic step that is due: 25 times in a second of the movie, as far as whole steps
+A frame is rendered after each basic step that is due: 25 times per second of the movie, as far as whole steps
 allow, and at most once a step. A movie that fails leaves no file, and the reason is logged.
 Source: WbVideoRecorder.cpp of Webots.
 """
@@ -24,13 +24,13 @@ _BEST: Final = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Movie:
-    """A movie that a client asks for.
+    """A movie that a client requests.
 
     Attributes:
-        path: of its file, absolute or below the working directory of the simulator.
+        path: of its file, absolute or relative to the working directory of the simulator.
         size: width and height in pixels.
         quality: from 1 to 100.
-        acceleration: seconds of the simulation in a second of the movie.
+        acceleration: simulated seconds per second of the movie.
         frames_s: frames in a second of the movie; set when the recording starts.
     """
 
@@ -42,7 +42,7 @@ class Movie:
 
 
 class VideoWriter(Protocol):
-    """The file of a movie. Until it is finished, nothing is at its path; it is abandoned by dropping it."""
+    """The file of a movie. It appears at its path when it is finished; to abandon it, drop the object."""
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame: blue, green, red and alpha of each pixel.
@@ -53,7 +53,7 @@ class VideoWriter(Protocol):
         ...
 
     def finish(self) -> None:
-        """Put the file where it belongs.
+        """Complete the file and move it to its path.
 
         Raises:
             OSError: it cannot be written.
@@ -65,8 +65,8 @@ class Movies:
     """The movies of one world, one at a time.
 
     Args:
-        view: returns a camera of that size where the Viewpoint is now; None if nothing is drawn.
-        film: returns a film for a movie; None if nothing is drawn.
+        view: returns a camera of that size at the current Viewpoint; None if the simulator does not render.
+        film: returns a writer for a movie; None if the simulator does not render.
         basic_step_ms: of the simulation.
 
     Attributes:
@@ -94,10 +94,10 @@ class Movies:
         return self._film is None
 
     def start(self, movie: Movie) -> bool:
-        """Begin to record; return whether that is possible.
+        """Start to record; return whether that is possible.
 
         Raises:
-            UnsimulatedError: the movie cannot be made, or this machine cannot draw.
+            UnsimulatedError: the movie cannot be recorded, or this machine cannot render.
         """
         if self._film is not None:
             raise UnsimulatedError("a movie is being recorded; stop it first")
@@ -126,13 +126,13 @@ class Movies:
         self._elapsed_ms += self._basic_step_ms
         if self._elapsed_ms % self._every_ms:
             return
-        eye = self._view(self._size)  # a client may have moved the Viewpoint
+        eye = self._view(self._size)  # again for each frame, because a client may have moved the Viewpoint
         if eye is not None:
             pixels = eye.colors()
             self._try(lambda: film.add(pixels))
 
     def stop(self) -> None:
-        """End the recording; without one, do nothing."""
+        """End the recording; without a recording, do nothing."""
         film = self._film
         if film is None:
             return
@@ -153,7 +153,7 @@ class Movies:
 
 
 def frame_step_ms(acceleration: int, basic_step_ms: int) -> int:
-    """Return the time of the simulation from one frame to the next, in whole basic steps."""
+    """Return the simulated time from one frame to the next, in whole basic steps."""
     steps = Fraction(acceleration * _FRAME_MS, basic_step_ms)
     shorter, longer = math.floor(steps) * basic_step_ms, math.ceil(steps) * basic_step_ms
     if shorter == 0 or abs(shorter - _FRAME_MS) > abs(longer - _FRAME_MS):
@@ -162,10 +162,10 @@ def frame_step_ms(acceleration: int, basic_step_ms: int) -> int:
 
 
 def _require_possible(movie: Movie) -> None:
-    """Check what a client asks for.
+    """Check the parameters of a requested movie.
 
     Raises:
-        UnsimulatedError: that cannot be recorded.
+        UnsimulatedError: it cannot be recorded with these parameters.
     """
     if not movie.path.lower().endswith(".mp4"):
         raise UnsimulatedError(

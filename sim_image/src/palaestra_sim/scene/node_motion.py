@@ -1,6 +1,6 @@
-"""How nodes move, and what pushes them: velocities, forces and torques, as a supervisor has them.
+"""The motion of nodes, and the forces on them: velocities, forces and torques, for a supervisor.
 
-Robots and loose things move. All other nodes are at rest, and nothing happens to them.
+Robots and dynamic solids move. All other nodes are at rest, and forces and velocities do not affect them.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class NodeMotion:
         self._robot_of = robot_of
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
-        """Return the velocity of a node in m/s and its turning in rad/s.
+        """Return the velocity of a node in m/s and its angular velocity in rad/s.
 
         Raises:
-            UnsimulatedError: the node has no place.
+            UnsimulatedError: the node has no frame.
         """
         place = _place(node)
         robot, thing = self._robot_of(node), self._loose_of(node)
@@ -69,16 +69,16 @@ class NodeMotion:
     def add_force(
         self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
     ) -> None:
-        """Let a force in N act in the next basic step.
+        """Apply a force in N in the next basic step.
 
         Args:
-            node: see above.
+            node: the node on which it acts.
             force: in the axes of the node if `relative`.
-            relative: see above.
-            offset: where it acts, in the frame of the node, in meters; None: at the center of mass.
+            relative: whether the force is in the axes of the node.
+            offset: where it acts, in the frame of the node, in meters; None for the center of mass.
 
         Raises:
-            UnsimulatedError: no force moves anything here, or the node has no place.
+            UnsimulatedError: this physics has no forces, or the node has no frame.
         """
         place = self._require_forces(node, "forces")
         pose = place.ground_pose
@@ -86,7 +86,7 @@ class NodeMotion:
         self._push(node, Push(force=_turned(place, force, relative=relative), point=point))
 
     def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
-        """Let a torque in N m act in the next basic step; see `add_force`."""
+        """Apply a torque in N m in the next basic step; see `add_force`."""
         place = self._require_forces(node, "torques")
         self._push(node, Push(torque=_turned(place, torque, relative=relative)))
 
@@ -107,9 +107,9 @@ class NodeMotion:
 
 
 def _place(node: SceneNode) -> Frame:
-    """Return the place of a node; in Webots a node without one crashes the controller."""
+    """Return the frame of a node; in Webots a node without a frame crashes the controller."""
     if node.place is None:
-        raise UnsimulatedError(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
+        raise UnsimulatedError(f"a {node.type_name} has no position; use a Pose, Solid or Robot")
     return node.place
 
 

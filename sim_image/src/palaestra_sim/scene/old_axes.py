@@ -1,8 +1,8 @@
-"""Nodes of files from before R2022a, whose axes Webots turns when it loads them.
+"""Nodes of files from before R2022a, whose axes Webots converts when it loads them.
 
-There robots looked along -z, cylinders stood along y, and many devices looked along other axes. Webots turns
-these nodes, and the instances of its own PROTOs, whose files are of today. A RangeFinder is turned here too,
-so that it looks where its author pointed it.
+In these files robots looked along -z, cylinders stood along y, and many devices looked along other axes.
+Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. Here a
+RangeFinder is rotated too, so that it looks in the direction that its author intended.
 Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
 """
 
@@ -14,7 +14,7 @@ from palaestra_sim.scene.frames import Y_UP, Frame
 from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, to_axis_angle, transposed, turned
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Each has the axes of today as columns, in those of the file.
+# Each has the current axes as columns, in those of the file.
 _LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
 _POINTING: Final[Matrix] = (0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _STANDING: Final = Pose(rotation=transposed(Y_UP))
@@ -26,24 +26,24 @@ def of_old_axes(node: SceneNode) -> bool:
 
 
 def standing(node: SceneNode, frame: Pose) -> Pose:
-    """Return the frame of a shape or a Track that is along z, although it was along y in its file."""
+    """Return the frame, along z, of a shape or a Track that is along y in an old file."""
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_STANDING)
 
 
 def looking(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that looks along x with z up; in an old file it is -z with y up."""
+    """Return the frame of a device that looks along x with z up; in an old file, along -z with y up."""
     return _in_axes(node, place, _LOOKING)
 
 
 def pointing(node: SceneNode, place: Frame) -> Frame:
-    """Return the frame of a device that points along x with z up; in an old file it is z with y up."""
+    """Return the frame of a device that points along x with z up; in an old file, along z with y up."""
     return _in_axes(node, place, _POINTING)
 
 
 def of_instance(node: SceneNode, rotation: AxisAngle) -> AxisAngle:
-    """Return the rotation of a node; Webots turns an instance of a PROTO of its own that an old file has."""
+    """Return the rotation of a node; Webots rotates instances of its own PROTOs in old files."""
     if not (node.shipped and of_old_axes(node)):
         return rotation
     return turned(rotation, _LOOKING)

@@ -1,7 +1,7 @@
-"""The physics as the scene needs it: bodies that move, rays, contacts, and pictures.
+"""The interface of a physics for the scene: bodies that move, rays, contacts, and images.
 
 The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's is kinematic;
-another one takes its place by implementing this Protocol. It has the axes of the ground, of which z points
+another one can replace it by implementing this Protocol. It uses the axes of the ground, of which z points
 up; the world file may have others.
 """
 
@@ -32,7 +32,7 @@ class Figure(Protocol):
 
     Attributes:
         place: its frame.
-        body: None if nothing moves it and nothing can run into it.
+        body: None if nothing moves it and nothing can collide with it.
         powered: whether its motors turn.
     """
 
@@ -42,20 +42,20 @@ class Figure(Protocol):
 
     @property
     def links(self) -> Sequence[Link]:
-        """What moves on its joints by forces, outer ones first."""
+        """The parts that forces move on its joints, outer ones first."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abilities:
-    """What a physics simulates of a world; the rest is refused when the world is read.
+    """The contents of a world that a physics simulates; other contents are refused when the world is read.
 
     Attributes:
         name: of the simulator, in messages.
         loose: whether Solids with physics move when they are pushed.
         leaning: whether shapes may have any rotation.
-        forces: whether a force moves anything.
-        joints: whether forces move what is on joints.
+        forces: whether forces have an effect.
+        joints: whether forces move parts on joints.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Physics(Protocol):
     """The motion of one loaded world.
 
     Attributes:
-        abilities: what it simulates.
+        abilities: the contents that it simulates.
     """
 
     abilities: Abilities
@@ -97,7 +97,7 @@ class Physics(Protocol):
         ...
 
     def begin(self, surroundings: PhysicsSettings) -> None:
-        """Take what holds everywhere in the world, before anything is arranged in it."""
+        """Set the options of the whole world, before its contents are arranged."""
         ...
 
     def arrange(
@@ -107,49 +107,49 @@ class Physics(Protocol):
         loose: Sequence[DynamicSolid],
         doors: Sequence[Link] = (),
     ) -> None:
-        """Take these robots, obstacles and loose things as the contents of the world, where they are now.
+        """Set these robots, obstacles and dynamic solids as the world's contents, at their current poses.
 
-        `doors` are the links that are on no robot.
+        `doors` are the links that do not belong to a robot.
         """
         ...
 
     def advance(self, step_s: float) -> None:
-        """Move the bodies on by one basic step; one without power comes to rest."""
+        """Move the bodies by one basic step; a body without power comes to rest."""
         ...
 
     def reset(self) -> None:
-        """Forget the past: what follows depends on nothing but the state and the commands."""
+        """Discard the past: the motion then depends only on the state and the commands."""
         ...
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        """Return the same function for beams that meet visible objects and pass through the robot itself."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
-        """Let a force act on a robot or a loose thing in the next basic step."""
+        """Apply a force to a robot or a dynamic solid in the next basic step."""
         ...
 
     def show(self, view: View) -> None:
-        """Take what cameras see of the world; a physics that draws nothing ignores it."""
+        """Set the visible part of the world; a physics that does not render ignores it."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
-        """Return a camera; None if this physics draws nothing."""
+        """Return a camera; None if this physics does not render."""
         ...
 
     def film(self, movie: Movie) -> VideoWriter | None:
-        """Return a film to record a movie on; None if this physics draws nothing.
+        """Return a writer for a movie; None if this physics does not render.
 
         Raises:
             OSError: its file cannot be written.
-            UnsimulatedError: what encodes it is not installed.
+            UnsimulatedError: the encoder is not installed.
         """
         ...
 
     def contacts(self) -> Iterable[ContactPoint]:
-        """Return where robots touch obstacles and each other now."""
+        """Return the contact points of robots with obstacles and with each other now."""
         ...

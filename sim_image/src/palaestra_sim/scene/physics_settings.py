@@ -1,4 +1,4 @@
-"""What holds everywhere in a world: its floors, and for a physics with forces gravity and frictions."""
+"""The settings of a whole world: its floors and, for a physics with forces, gravity and frictions."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-DEFAULT: Final = "default"  # the material of a Solid that names none
+DEFAULT: Final = "default"  # the material of a Solid that does not name one
 _COULOMB: Final = 1.0  # of two materials without ContactProperties
 _ENDLESS: Final = 100.0  # for -1, which is infinite in Webots
 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A level Plane of a boundingObject, which has no end in Webots.
+    """A level Plane of a boundingObject; in Webots it is infinite.
 
     Attributes:
-        place: of its Solid.
-        local: its frame in that place.
+        place: the frame of its Solid.
+        local: its pose in that frame.
     """
 
     place: Frame
@@ -30,19 +30,19 @@ class Floor:
 
     @property
     def height_m(self) -> float:
-        """Where it is now, in the axes of the ground."""
+        """Its current height, in the axes of the ground."""
         return self.place.ground_pose.after(self.local).position[2]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhysicsSettings:
-    """What holds everywhere in a world.
+    """The settings of a whole world.
 
     Attributes:
         gravity_m_s2: downward.
         frictions: the coefficients of pairs of materials, for those that have ContactProperties.
         floor: the material of the floors.
-        floors: of the world; without any, there is one at height 0.
+        floors: of the world; without any, the world has one at height 0.
     """
 
     gravity_m_s2: float = 9.81
@@ -51,7 +51,7 @@ class PhysicsSettings:
     floors: tuple[Floor, ...] = ()
 
     def heights_m(self) -> tuple[float, ...]:
-        """Return where the floors are now."""
+        """Return the current heights of the floors."""
         return tuple(floor.height_m for floor in self.floors) or (0.0,)
 
     def friction(self, one: str, other: str) -> float:
@@ -62,7 +62,7 @@ class PhysicsSettings:
 def read_surroundings(
     reading: NodeReader, world_info: SceneNode | None, floor: SceneNode | None
 ) -> PhysicsSettings:
-    """Return what a WorldInfo describes; `floor` is a Plane of a boundingObject."""
+    """Return the settings in a WorldInfo; `floor` is a Plane of a boundingObject."""
     material = DEFAULT if floor is None else material_of(floor)
     if world_info is None:
         return PhysicsSettings(floor=material)
@@ -74,12 +74,12 @@ def read_surroundings(
 
 
 def material_of(node: SceneNode) -> str:
-    """Return the material of the Solid, robot or device around a part of a boundingObject."""
+    """Return the material of the Solid, robot or device that contains a part of a boundingObject."""
     owner = next((it for it in node.ancestors() if not it.outline), None)
     return DEFAULT if owner is None else owner.text("contactMaterial") or DEFAULT
 
 
 def _coefficient(properties: SceneNode) -> float:
-    """Return one coefficient; of those that differ by direction, the mean."""
+    """Return one coefficient; if it differs by direction, the mean."""
     numbers = properties.numbers("coulombFriction") or (_COULOMB,)
     return sum(_ENDLESS if number < 0.0 else number for number in numbers) / len(numbers)

@@ -1,6 +1,6 @@
-"""Pictures as files: PNG is written without a library, the rest takes Pillow, loaded when it is needed.
+"""Images as files: PNG is written without a library, all else needs Pillow, which is loaded on demand.
 
-Paths are absolute, or below the working directory of the simulator.
+Paths are absolute, or relative to the working directory of the simulator.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ Pixels = bytes | bytearray | memoryview
 def save(
     path: str, size: tuple[int, int], pixels: Pixels, *, quality: int = 100, alpha: bool = False
 ) -> bool:
-    """Write a picture to a PNG or JPEG file; return whether it could be written.
+    """Write an image to a PNG or JPEG file; return whether it could be written.
 
     Args:
         path: of the file.
         size: width and height.
         pixels: blue, green, red and alpha of each, row by row from the top left.
         quality: of a JPEG file, from 1 to 100.
-        alpha: whether a PNG file has it.
+        alpha: whether a PNG file stores it.
 
     Raises:
-        UnsimulatedError: the file would be none of both, or Pillow is missing.
+        UnsimulatedError: the name is not that of a PNG or JPEG file, or Pillow is missing.
     """
     if not all(size):
         return False
@@ -42,7 +42,7 @@ def save(
     elif ending in _JPEG:
         data = _jpeg(size, pixels, quality)
     else:
-        raise UnsimulatedError(f"{path}: no PNG or JPEG file; use a name that ends in .png or .jpg")
+        raise UnsimulatedError(f"{path}: is not a PNG or JPEG file; use a name that ends in .png or .jpg")
     try:
         Path(path).write_bytes(data)
     except OSError:
@@ -51,7 +51,7 @@ def save(
 
 
 def load(path: str) -> ImageBuffer | None:
-    """Return the picture of a PNG or JPEG file; None if it cannot be read.
+    """Return the image of a PNG or JPEG file; None if it cannot be read.
 
     Raises:
         UnsimulatedError: Pillow is missing.

@@ -1,4 +1,4 @@
-"""Pictures as bytes of PNG, of 8 bits a channel, without a library.
+"""Images as bytes of PNG, with 8 bits per channel, without a library.
 
 Source: https://www.w3.org/TR/png/
 """
@@ -13,7 +13,7 @@ from typing import Final
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _RGB, _RGBA = 2, 6
 _CHANNELS: Final = 4  # blue, green, red, alpha
-_FAST: Final = 1  # of zlib: a picture of 640 x 480 takes 10 ms
+_FAST: Final = 1  # of zlib: an image of 640 x 480 takes 10 ms
 
 
 def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alpha: bool = False) -> bytes:
@@ -22,7 +22,7 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
     Args:
         size: width and height.
         pixels: blue, green, red and alpha of each, row by row from the top left.
-        alpha: whether it is written too.
+        alpha: whether the file stores it.
     """
     width, height = size
     order = (2, 1, 0, 3) if alpha else (2, 1, 0)
@@ -36,7 +36,7 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
 
 
 def _rows(colors: bytearray, length: int) -> Iterator[bytes]:
-    """Yield each row behind the number of its filter; 0 is none."""
+    """Yield each row after the number of its filter, which is 0 for no filter."""
     for at in range(0, len(colors), length):
         yield b"\0"
         yield bytes(colors[at : at + length])

@@ -1,7 +1,7 @@
-"""What a radar can see: Solids with a `radarCrossSection`, and what hides them. Pure geometry.
+"""The targets of radars: Solids with a `radarCrossSection`, and the shapes that hide them. Pure geometry.
 
-A Solid is as large as the boxes around its shapes, along the axes of the radar; without shapes it is a point.
-A part outside of the field of view does not count. Floors hide nothing, and neither does the robot itself.
+The size of a Solid is that of the boxes around its shapes, along the axes of the radar; without shapes it is
+a point. Parts outside the field of view do not count. Floors hide nothing, and neither does the robot itself.
 Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
 """
 
@@ -36,7 +36,7 @@ class RadarTarget:
         place: its frame.
         cross_section_m2: its `radarCrossSection`.
         shapes: its own and those of the Solids inside it.
-        nodes: itself and all inside it.
+        nodes: itself and all nodes inside it.
     """
 
     place: Frame
@@ -45,7 +45,7 @@ class RadarTarget:
     nodes: frozenset[SceneNode]
 
     def seen_from(self, radar: Pose, field_of_view_rad: tuple[float, float]) -> Bounds | None:
-        """Return what of it is in a field of view, horizontal and vertical; None if nothing is.
+        """Return the part of it in a field of view, horizontal and vertical; None if no part is in it.
 
         `radar` is in the axes of the ground.
         """
@@ -59,20 +59,21 @@ class RadarTarget:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RadarTargets:
-    """What the radars of a world can see.
+    """The targets of the radars of a world.
 
     Attributes:
         targets: in the order of the world file.
-        shapes: everything that may hide them.
+        shapes: all shapes that may hide them.
     """
 
     targets: tuple[RadarTarget, ...] = ()
     shapes: tuple[Shape, ...] = ()
 
     def free_path(self, target: RadarTarget, start: Vector, robot: frozenset[SceneNode]) -> float:
-        """Return how far a ray from `start` to the origin of a target travels before something is in its way.
+        """Return the distance from `start`, toward the origin of a target, to the first obstacle.
 
-        In meters, infinite if nothing is. `robot` has the nodes of the robot that looks.
+        In meters, infinite if there is no obstacle. `robot` has the nodes of the robot that carries the
+        radar.
         """
         end = target.place.ground_pose.position
         way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
@@ -86,7 +87,7 @@ class RadarTargets:
 
 
 def echoes_of(nodes: Collection[SceneNode]) -> RadarTargets:
-    """Return what radars can see of these nodes, as they are now."""
+    """Return the current radar targets among these nodes."""
     shapes: dict[SceneNode, tuple[Shape, ...]] = {}
     targets = []
     for node in nodes:
@@ -116,7 +117,7 @@ def _box(pose: Pose, shape: Shape) -> Bounds:
 
 
 def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
-    """Return what of a box is in the field of view; None if nothing is."""
+    """Return the part of a box in the field of view; None if no part is in it."""
     (x, y, z), (depth, width, height) = box
     cuts = [
         *_beyond(x, y, width, across_rad / 2.0),
@@ -126,13 +127,13 @@ def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
         return None
     left, right, top, bottom = (cut or 0.0 for cut in cuts)
     if across_rad > math.pi / 2.0:
-        return box  # Webots does not cut there
+        return box  # Webots does not cut such wide fields of view
     middle = (x, y + (right - left) / 2.0, z + (bottom - top) / 2.0)
     return Bounds(middle, (depth, max(0.0, width - left - right), max(0.0, height - top - bottom)))
 
 
 def _beyond(ahead: float, aside: float, size: float, half_rad: float) -> Iterator[float | None]:
-    """Yield how much is beyond each edge, of the positive side first; None if all of it is."""
+    """Yield the length beyond each edge, of the positive side first; None if the whole box is beyond it."""
     for side in (-aside, aside):
         inside = math.sin(half_rad) * ahead + math.cos(half_rad) * side
         yield None if inside < -size / 2.0 else max(0.0, size / 2.0 - inside)
@@ -153,7 +154,7 @@ def _around(boxes: Sequence[Bounds]) -> Bounds | None:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return how far a ray travels until it is in a shape; infinite if it never is."""
+    """Return the distance at which a ray enters a shape; infinite if it never does."""
     frame = shape.pose.inverse
     origin, way = frame.carry(start), frame.turned(direction)
     half = [length / 2.0 for length in shape.size]
@@ -168,7 +169,7 @@ def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
 
 
 def _in_slab(origin: float, way: float, half: float) -> tuple[float, float]:
-    """Return from where to where along a ray it is between two planes."""
+    """Return the distances along a ray at which it enters and leaves the space between two planes."""
     if way == 0.0:
         return (-math.inf, math.inf) if abs(origin) <= half else _NEVER
     ends = (-half - origin) / way, (half - origin) / way
@@ -176,7 +177,7 @@ def _in_slab(origin: float, way: float, half: float) -> tuple[float, float]:
 
 
 def _in_ball(origin: Sequence[float], way: Sequence[float], radius: float) -> tuple[float, float]:
-    """Return from where to where along a ray it is in a ball, or in a circle of the plane."""
+    """Return the distances along a ray at which it enters and leaves a ball, or a circle of the plane."""
     a = sum(it * it for it in way)
     b = sum(it * at for it, at in zip(way, origin, strict=True))
     c = sum(at * at for at in origin) - radius * radius

@@ -1,4 +1,4 @@
-"""The air between emitters and receivers: who hears what was sent."""
+"""The radio between emitters and receivers: it decides which receivers get a packet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Radio:
         self._receivers = tuple((number, it) for number, it in devices if isinstance(it, Receiver))
 
     def deliver(self) -> None:
-        """Deliver what was sent since the last call."""
+        """Deliver the packets that were sent since the last call."""
         for robot, emitter in self._emitters:
             if emitter.outbox:
                 for other, receiver in self._receivers:
@@ -32,7 +32,7 @@ class Radio:
                 emitter.outbox.clear()
 
     def clear(self) -> None:
-        """Forget what is on its way or has not been read."""
+        """Drop all packets that are on their way or have not been read."""
         for _, emitter in self._emitters:
             emitter.outbox.clear()
         for _, receiver in self._receivers:

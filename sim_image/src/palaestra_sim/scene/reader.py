@@ -1,7 +1,7 @@
 """Read the simulated contents of a world file.
 
-Nodes that are only drawn are skipped, upright ones with a boundingObject are obstacles, and robots drive. Any
-other node that would act in Webots, such as a PROTO or a loose crate, is refused with its place in the file.
+Nodes that are only visible are skipped. Upright nodes with a boundingObject are obstacles, and robots drive.
+Any other node with an effect in Webots, such as an unknown PROTO, is refused with its place in the file.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.validation import ELSEWHERE, LeaveOut, NodeReader
 
-# Visible to people and cameras only, or read elsewhere (WorldInfo).
+# Only visible to people and cameras, or read elsewhere (WorldInfo).
 DRAWN_ONLY: Final = frozenset(
     (
         "Background",
@@ -44,7 +44,7 @@ DRAWN_ONLY: Final = frozenset(
         "WorldInfo",
     )
 )
-# A device without a robot is a thing like others.
+# A device without a robot is a Solid like others.
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 _ONE_AXIS: Final = frozenset(("HingeJoint", "SliderJoint"))
@@ -61,14 +61,14 @@ class SceneContents:
         basic_step_ms: WorldInfo.basicTimeStep.
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
-        loose: what moves when it is pushed.
+        loose: the dynamic solids, which move when they are pushed.
         heavy: Solids with physics that are fixed to another Solid, with their own shapes.
-        doors: what swings on joints that are on no robot.
+        doors: links that swing on joints without a robot.
         robots: in the order of the world file.
-        top: the frame around everything; None if z of the world points up.
-        surroundings: what holds everywhere.
-        left_out: what the simulator lacks and the user left out, each with its place.
-        leave_out: what the user leaves out.
+        top: the frame around the whole world; None if z of the world points up.
+        surroundings: the settings of the whole world.
+        left_out: the unsupported nodes that the user left out, each with its place.
+        leave_out: the nodes that the user leaves out.
     """
 
     physics: Physics
@@ -86,14 +86,14 @@ class SceneContents:
 
 
 def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> SceneContents:
-    """Return the contents of a world, and give its nodes their places; its robots have bodies of `physics`.
+    """Return the contents of a world, and give its nodes their frames; its robots have bodies of `physics`.
 
     Raises:
-        WorldError: it has things that cannot be simulated; the error has all of them.
+        WorldError: it has objects that cannot be simulated; the error lists all of them.
     """
     reading = NodeReader(tree.refused, leave_out, physics.abilities.name)
     scene = SceneContents(physics=physics)
-    # First, because devices read it too, wherever it is in the file.
+    # First, because devices read WorldInfo too, wherever it is in the file.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
             reading.world_info = node
@@ -116,12 +116,12 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
 
 
 def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -> SceneContents:
-    """Return what nodes add to a world, all inside one parent, and give them their places.
+    """Return the contents that nodes inside one parent add to a world, and give them their frames.
 
     `to` has the contents of the world so far.
 
     Raises:
-        WorldError: they have things that cannot be simulated.
+        WorldError: they have objects that cannot be simulated.
     """
     reading = NodeReader((), to.leave_out, to.physics.abilities.name)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
@@ -137,7 +137,7 @@ def _read_world_info(reading: NodeReader, node: SceneNode, scene: SceneContents)
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
         fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
-        reading.refuse(node, fact, "the controller counts whole ones; write one")
+        reading.refuse(node, fact, "write a whole number, because the controller counts whole milliseconds")
     scene.basic_step_ms = int(step_ms)
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
 
@@ -163,7 +163,7 @@ def _read(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: Sce
 
 
 def _read_joint(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
-    """Read a joint that is on no robot: without physics nothing moves its end."""
+    """Read a joint that does not belong to a robot: without physics nothing moves its end."""
     if scene.physics.abilities.joints and node.type_name in _ONE_AXIS:
         link = read_door(reading, node, parent)
         if link is not None:
@@ -177,7 +177,7 @@ def _read_joint(reading: NodeReader, node: SceneNode, parent: Frame | None, scen
 
 
 def _read_door_end(reading: NodeReader, link: Link, scene: SceneContents) -> None:
-    """Read what is on a joint that swings; Solids without physics are fixed to it."""
+    """Read the nodes on a joint that swings; Solids without physics are fixed to its end."""
     inside = SceneContents(physics=scene.physics)
     _read_children(reading, link.node, link.place, inside)
     shapes = [*bounding_shapes(reading, link.node, link.place), *inside.solids]
@@ -226,7 +226,7 @@ def _is_fixed(node: SceneNode) -> bool:
 
 def _densities(reading: NodeReader, node: SceneNode, shapes: Sequence[Shape]) -> dict[Shape, float]:
     """Return the densities of the shapes of a Solid in kg/m3, from its mass or its density."""
-    # A stand-in has no physics of its own, but the mass of its PROTO.
+    # A stand-in has no Physics node, but it has the mass of its PROTO.
     described = next(iter(node.nodes("physics")), node)
     mass_kg = reading.number(described, "mass", -1.0)
     density = reading.number(described, "density", DENSITY)
@@ -236,7 +236,7 @@ def _densities(reading: NodeReader, node: SceneNode, shapes: Sequence[Shape]) ->
 
 
 def _read_loose(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
-    """Read a Solid that moves when it is pushed, with the Solids that are fixed to it."""
+    """Read a dynamic solid, with the Solids that are fixed to it."""
     place = DynamicFrame(parent, reading.translation(node), reading.rotation(node), reading.size(node))
     node.place = place
     fixed = SceneContents(physics=scene.physics)
@@ -276,7 +276,7 @@ def _read_solid(reading: NodeReader, node: SceneNode, place: Frame, scene: Scene
 
 
 def _stand(reading: NodeReader, shapes: Iterable[Shape], scene: SceneContents) -> None:
-    """Make obstacles of shapes that stand or lie."""
+    """Add shapes that are upright or lie flat to the obstacles."""
     for shape in shapes:
         if not (shape.upright or scene.physics.abilities.leaning):
             reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")

@@ -1,10 +1,10 @@
 """One simulated robot: its motors, its sensors, and its noise.
 
-The seed of the noise comes in the robot's `customData`, either as a whole number (`"7"`) or as JSON
-(`'{"seed": 7}'`), and is taken when the world is loaded and at each `simulation_reset`. Anything
-else leaves the seed as it was; the first one is WorldInfo.randomSeed. From a reset on, the noise is a
-function of the seed and of the number of steps alone. Every sensor with noise draws at every step, also
-while it is not enabled: types in the order of the table of devices, sensors in that of the world file.
+The seed of the noise is in the robot's `customData`, either as a whole number (`"7"`) or as JSON
+(`'{"seed": 7}'`). It is read when the world is loaded and at each `simulation_reset`. Any other text leaves
+the seed unchanged; the first one is WorldInfo.randomSeed. After a reset, the noise depends only on the seed
+and on the number of steps. Every sensor with noise draws at every step, even while it is not enabled: types
+in the order of the table of devices, sensors in that of the world file.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from palaestra_sim.scene.visuals import View
 
 
 class Robot:
-    """A robot of the world, whether it drives or only watches.
+    """A robot of the world, with or without a body.
 
     Attributes:
         name: Robot.name in the world file.
         motors: by device name.
         sensors: by device name; each has a `value` after a step.
-        samplers: give all sensors their values of this moment, in this order.
+        samplers: functions that set the values of all sensors, in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
-        body: None for a robot that only watches.
+        body: None if nothing moves it and nothing can collide with it.
         powered: whether its motors turn; without energy they do not.
-        links: what moves on its joints by forces.
-        battery: without energy if the robot has none.
+        links: the parts that forces move on its joints.
+        battery: its battery; its value is -1 if the robot has no battery.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int, physics: Physics, view: View) -> None:
@@ -88,19 +88,19 @@ class Robot:
         self.parts.node.fields["customData"] = FieldContent([text])
 
     def look(self, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam travels now, in meters; see `Carrier`."""
+        """Return a function for the distance that each beam travels now, in meters; see `Carrier`."""
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return the same for beams that meet what is visible; see `Carrier`."""
+        """Return the same function for beams that meet visible objects; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
+        """Return a function for the object that each infra-red beam meets now; see `Carrier`."""
         return VisualRays(self._view, self.place, beams).cast
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
-        """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""
+        """Return a camera at a frame; None if this simulator does not render; see `Carrier`."""
         return self._physics.eye(place, lens)
 
     def device(self, name: str) -> object | None:
@@ -109,17 +109,17 @@ class Robot:
         return device
 
     def motion(self, place: Frame) -> Motion:
-        """Return how a place on the robot moves in the world; see `Carrier`."""
+        """Return the motion in the world of a frame on the robot; see `Carrier`."""
         return motion_of(place, self.body)
 
     def follow(self, place: Frame) -> Callable[[], Vector]:
-        """Return a function that returns the acceleration of a place; see `Carrier`."""
+        """Return a function for the acceleration of a frame; see `Carrier`."""
         trail = Trail(place, self.body)
         self._trails.append(trail)
         return trail.acceleration
 
     def begin(self, step_s: float) -> None:
-        """Begin a basic step; with an empty battery, stand still."""
+        """Begin a basic step; if the battery is empty, stand still."""
         if self._has_battery:
             self.powered = not self._exhausted(step_s)
             if not self.powered:
@@ -129,7 +129,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn the motors that neither drive nor move by forces for one basic step."""
+        """Turn the motors that are neither wheels nor moved by forces, for one basic step."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)
@@ -139,7 +139,7 @@ class Robot:
         return self.battery.empty
 
     def reset(self) -> None:
-        """Return to the start of the world file: pose, rest, motors, battery, noise. customData stays."""
+        """Return to the start in the world file: pose, rest, motors, battery, noise; customData is kept."""
         self.battery.reset()
         self.powered = True
         self.place.return_to_start()
@@ -161,7 +161,7 @@ class Robot:
             motor.halt()
 
     def sow(self) -> None:
-        """Restart the noise with the seed that is now in customData."""
+        """Restart the noise with the current seed in customData."""
         self.seed = seed_of(self.custom_data, self.seed)
         self._random.seed(self.seed)
 

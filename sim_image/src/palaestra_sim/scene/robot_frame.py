@@ -1,4 +1,4 @@
-"""The place of a robot with a body: the current pose of this body."""
+"""The frame of a robot with a body: the current pose of this body."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from palaestra_sim.scene.geometry import (
 
 
 class RobotFrame(Frame):
-    """The frame of a robot with a body, which drives upright, at the height at which it was placed.
+    """The frame of a robot with a body, which drives upright at a constant height.
 
-    It is at the top of the world, which never moves or turns, so the body's pose is the place's. The body is
-    in the axes of the ground.
+    It is at the top of the world, which never moves or turns, so the pose of the body is also that of the
+    frame. The body uses the axes of the ground.
     """
 
     moves = True
@@ -35,7 +35,7 @@ class RobotFrame(Frame):
 
     @property
     def translation(self) -> Vector:
-        """X and y of the body, and the height of the world file or of the last write; in the file's axes."""
+        """X and y of the body, and the height of the world file or the last write; in the file's axes."""
         return self.from_ground((self._body.x, self._body.y, self._height_m))
 
     @translation.setter
@@ -45,7 +45,7 @@ class RobotFrame(Frame):
 
     @property
     def rotation(self) -> AxisAngle:
-        """The heading of the body; in a world whose z axis points up, about this axis."""
+        """The heading of the body, about the z axis if that of the world points up."""
         heading = (0.0, 0.0, 1.0, self._body.heading_rad)
         if self.axes is None:
             return heading
@@ -65,13 +65,13 @@ class RobotFrame(Frame):
 
 
 class TurnedFrame(Frame):
-    """The frame that the file gives a robot, turned in the one that has z up.
+    """The frame of a robot in the world file, relative to its frame with z up.
 
-    Clients read and write the frame of the file, and move the other one with it.
+    Clients read and write the frame of the file; the upright frame follows.
 
     Args:
         upright: the frame with z up.
-        turn: of the frame of the file in it.
+        turn: the rotation of the file's frame in it.
     """
 
     def __init__(self, upright: Frame, turn: Matrix) -> None:
@@ -81,12 +81,12 @@ class TurnedFrame(Frame):
 
     @property
     def pose(self) -> Pose:
-        """The frame, in the one with z up."""
+        """The frame, in the parent of the upright frame."""
         return Pose(rotation=self._turn)
 
     @property
     def translation(self) -> Vector:
-        """Both frames have one origin."""
+        """The origin, which both frames share."""
         return self._upright.translation
 
     @translation.setter
@@ -95,7 +95,7 @@ class TurnedFrame(Frame):
 
     @property
     def rotation(self) -> AxisAngle:
-        """The rotation of the frame of the file, in the frame around the robot."""
+        """The rotation of the file's frame, in the frame around the robot."""
         return turned(self._upright.rotation, self._turn)
 
     @rotation.setter
@@ -103,5 +103,5 @@ class TurnedFrame(Frame):
         self._upright.rotation = turned(value, transposed(self._turn))
 
     def return_to_start(self) -> None:
-        """Return with the frame that has z up."""
+        """Return together with the upright frame."""
         self._upright.return_to_start()

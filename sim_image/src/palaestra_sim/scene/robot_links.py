@@ -1,7 +1,7 @@
-"""Which joints of a robot move by forces, in a physics that has them.
+"""Find the joints of a robot that forces move, in a physics with forces.
 
-Those with a motor that is no wheel's, and those without a motor whose end has physics. A joint on a wheel is
-part of the wheel. A caster on the floor of a robot that drives follows it without forces.
+These are joints with a motor that is not a wheel's, and joints without a motor whose end has physics. A joint
+on a wheel is part of the wheel. A caster on the floor follows a driving robot without forces.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheels import Driven
 
-_CLEARANCE_M: Final = 0.01  # an end that is lower above the floor rolls on it
+_CLEARANCE_M: Final = 0.01  # an end that is nearer to the floor rolls on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,9 +28,9 @@ class Parts:
 
     Attributes:
         nodes: each node with its frame, outer ones first.
-        shapes: all that may touch something.
-        wheels: what drives the robot.
-        measured: parts whose force on the robot is measured, so far without shapes and masses.
+        shapes: all shapes that may touch something.
+        wheels: the wheels that drive the robot.
+        measured: parts whose force on the robot is measured, still without shapes and masses.
     """
 
     nodes: Sequence[tuple[SceneNode, Frame]]
@@ -45,7 +45,7 @@ class Parts:
 
 
 def links_among(reading: NodeReader, parts: Parts) -> tuple[tuple[Link, ...], tuple[MassProperties, ...]]:
-    """Return the links of a robot, outer ones first, and the masses of what is on none of them."""
+    """Return the links of a robot, outer ones first, and the masses of the parts that are not on a link."""
     links = [
         Link(node=node, place=place, joint=place.joint)
         for node, place in parts.nodes
@@ -63,7 +63,7 @@ def links_among(reading: NodeReader, parts: Parts) -> tuple[tuple[Link, ...], tu
 
 
 def shapes_on(link: Link | None, links: Sequence[Link], shapes: Sequence[Shape]) -> tuple[Shape, ...]:
-    """Return the shapes that are on a link, or on none of the links; each once."""
+    """Return the shapes on a link, each once; for None, those that are not on any link."""
     found = {
         (shape.node.number, shape.place): shape
         for shape in shapes
@@ -95,7 +95,7 @@ def _moves(end: JointFrame, parts: Parts) -> bool:
 
 
 def _rolls(end: JointFrame, parts: Parts) -> bool:
-    """Return whether something on a joint reaches the floor on which the robot drives."""
+    """Return whether a shape on a joint reaches the floor on which the robot drives."""
     if not parts.wheels:
         return False
     floor = min(found.bottom for found in parts.wheels)

@@ -1,8 +1,8 @@
 """Read a Robot node: its outline, its joints, its wheels, and its devices.
 
-Hinges and tracks with motors may be wheels (`wheels`). The wheels together are the drive (`drive`).
-Everything else on a joint moves with it, but touches nothing, unless the physics moves joints by forces
-(`robot_links`). A robot without an outline and without wheels only watches.
+Hinges and tracks with motors may be wheels (`wheels`). All wheels together form the drive
+(`wheel_kinematics`). Other parts on joints move with them, but touch nothing, unless the physics moves joints
+by forces (`robot_links`). A robot without an outline and without wheels has no body.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheel_kinematics import find_drive
 from palaestra_sim.scene.wheels import Driven, wheels_among
 
-# A SolidReference closes a loop of joints; the solid is read where it is written.
+# A SolidReference closes a loop of joints; the solid is read at its own place.
 _INERT: Final = frozenset(
     (
         "Shape",
@@ -64,7 +64,7 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
-_STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
+_STEP_M: Final = 0.005  # robots drive over lower steps; in real worlds, they begin slightly inside the floor
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -74,8 +74,8 @@ class RobotParts:
     Attributes:
         body: None if nothing can collide with it.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
-        arguments: its controllerArgs; None when its controller is not "ros".
-        links: what moves on its joints by forces.
+        arguments: its controllerArgs; None if its controller is not "ros".
+        links: the parts that forces move on its joints.
     """
 
     node: SceneNode
@@ -89,7 +89,7 @@ class RobotParts:
 
 
 def read_robot(reading: NodeReader, node: SceneNode, parent: Frame | None, physics: Physics) -> RobotParts:
-    """Return the robot at `node`, and give it and its parts their places."""
+    """Return the robot at `node`, and give it and its parts their frames."""
     return _RobotReader(reading, node, parent, physics).read()
 
 
@@ -101,12 +101,12 @@ class _RobotReader:
         self._parent = parent
         self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
-        # Where the robot stands does not matter to its parts: they are read in its own frame, with z up.
+        # The robot's pose does not affect its parts, so they are read in its own frame, with z up.
         self._y_points_up = self._has_y_up()
         self._frame = Frame(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
-        self._outline: list[Shape] = []  # of what is fixed to the robot
-        self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
-        self._carried: list[Shape] = []  # of what motors move, if forces matter
+        self._outline: list[Shape] = []  # of parts that are fixed to the robot
+        self._on_joints: list[Shape] = []  # of parts that turn in place: wheels, casters
+        self._carried: list[Shape] = []  # of parts that motors move, in a physics with forces
         self._measured: list[Link] = []
         self._driven: list[Driven] = []
         self._parts: list[tuple[SceneNode, Frame]] = []
@@ -121,7 +121,7 @@ class _RobotReader:
         wheels = wheels_among(self._driven)
         drive = find_drive([found.wheel() for found in wheels])
         if node.nodes("physics"):
-            for found in wheels:  # they carry the robot, whose masses are one body
+            for found in wheels:  # the robot with its wheels is one body, so they count as having physics
                 found.motor.kinematic = False
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
         links: tuple[Link, ...] = ()
@@ -164,18 +164,18 @@ class _RobotReader:
         )
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
-        """Return whether a robot without a drive has a body: upright, at the top of the world."""
+        """Return whether a robot without a drive has a body: it is upright, at the top of the world."""
         return bool(shapes) and self._at_top and Frame(self._parent, *self._start).ground_pose.upright
 
     def _has_y_up(self) -> bool:
-        """Return whether y of the robot points up, as in worlds whose y axis does."""
+        """Return whether y of the robot points up, as in worlds whose y axis points up."""
         frame = Frame(self._parent, *_where(self._reading, self._node))
         z_up = Pose(rotation=transposed(Y_UP))
         return not self._node.shipped and frame.axes is not None and frame.ground_pose.after(z_up).upright
 
     @property
     def _start(self) -> tuple[Vector, AxisAngle]:
-        """Where the frame of the robot with z up is at first, in the frame around it."""
+        """The initial position and rotation of the robot's frame with z up, in the frame around it."""
         translation, rotation = _where(self._reading, self._node)
         if self._y_points_up:
             rotation = turned(rotation, transposed(Y_UP))
@@ -204,11 +204,11 @@ class _RobotReader:
         return RobotFrame(self._parent, translation, rotation, body)
 
     def _on(self, place: Frame, shape: Shape) -> Shape:
-        """Return a shape that was read in the robot's own frame, on the robot."""
+        """Return a shape that was read in the robot's own frame, with the robot's final frame."""
         return replace(shape, place=place) if shape.place is self._frame else shape
 
     def _settle(self, place: Frame) -> None:
-        """Put the parts, read in a frame of their own, on the robot."""
+        """Attach the parts, which were read in their own frame, to the robot's final frame."""
         self._node.place = place
         for part, part_place in self._parts:
             if part_place.parent is self._frame:
@@ -216,7 +216,7 @@ class _RobotReader:
             part.place = part_place
 
     def _lacks(self, node: SceneNode, fact: str) -> None:
-        """Note what cannot be simulated; on a robot that no client can reach, it does not matter."""
+        """Record an object that cannot be simulated; on a robot without clients, just leave it out."""
         if self._by_ros:
             self._reading.lacks(node, fact)
         else:
@@ -251,7 +251,7 @@ class _RobotReader:
         self._read_children(node, place)
 
     def _read_track(self, node: SceneNode, place: Frame) -> None:
-        """Take a track as fixed, with a belt that may drive the robot."""
+        """Read a track as a fixed part, with a belt that may drive the robot."""
         shapes = list(bounding_shapes(self._reading, node, place))
         motor = self._read_devices_of(node, node, place, Joint(axis=(1.0, 0.0, 0.0), slides=True))
         if _moves(place):
@@ -266,7 +266,7 @@ class _RobotReader:
             )
 
     def _read_joint(self, node: SceneNode, place: Frame) -> None:
-        """Take the motor and the sensor of a joint, and what is on it."""
+        """Read the motor and the sensor of a joint, and the parts on it."""
         reading = self._reading
         if place.scale != 1.0:
             self._lacks(node, f"a {node.type_name} in a Transform with a scale")
@@ -312,7 +312,7 @@ class _RobotReader:
         )
 
     def _lowest_roller(self, wheel: SceneNode, place: Frame) -> Vector | None:
-        """Return the axis of the roller of a wheel that is on the floor; None if it has none."""
+        """Return the axis of the wheel's roller that touches the floor; None if the wheel has no rollers."""
         lowest: tuple[float, Vector] | None = None
         for node in wheel.nodes():
             parameters = next(iter(node.nodes("jointParameters")), None)
@@ -326,7 +326,7 @@ class _RobotReader:
         return None if lowest is None else lowest[1]
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
-        """Take a joint without motors, such as a caster, as fixed, with all that is on it."""
+        """Read a joint without motors, such as a caster, as fixed, with all parts on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
@@ -357,7 +357,7 @@ class _RobotReader:
     def _read_device(
         self, kind: DeviceType[Any], node: SceneNode, place: Frame, shaft: Shaft | None = None
     ) -> object:
-        """Return the device at `node`, now one of the robot's."""
+        """Return the device at `node`, after adding it to the robot."""
         name = node.text("name") or kind.name
         part = DevicePart(
             reading=self._reading,
@@ -385,7 +385,7 @@ class _RobotReader:
 
 
 def _moves(place: Frame) -> bool:
-    """Return whether a motor can move a place on its robot."""
+    """Return whether a motor can move a frame relative to its robot."""
     return any(isinstance(it, JointFrame) and it.joint.motor is not None for it in place.chain())
 
 

@@ -1,6 +1,7 @@
-"""States of nodes, saved and loaded by name: places, and the positions of joints.
+"""States of nodes, saved and loaded by name: frames, and the positions of joints.
 
-A state holds a node and all inside it. What it loads is at rest. Motors of wheels keep their angles and stop.
+A state covers a node and all nodes inside it. Loaded nodes are at rest. Motors of wheels keep their angles
+and stop.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 
 
 class NodeState:
-    """The places of a node and of all inside it, at one moment."""
+    """The frames and joint positions of a node and of all nodes inside it, at one moment."""
 
     def __init__(self, node: SceneNode) -> None:
         places = [it.place for it in (node, *node.descendants()) if it.place is not None]
@@ -29,7 +30,7 @@ class NodeState:
         ]
 
     def load(self) -> None:
-        """Return to this moment."""
+        """Return the nodes to this moment."""
         for place, translation, rotation in self._places:
             place.translation, place.rotation = translation, rotation
         for joint, position in self._joints:
@@ -44,7 +45,7 @@ class States:
         self.begin(nodes)
 
     def begin(self, nodes: Iterable[SceneNode]) -> None:
-        """Save the state in which nodes come to the world."""
+        """Save the state of nodes that are new in the world."""
         for node in nodes:
             if node.place is not None:
                 self._saved[node.number, INITIAL] = NodeState(node)
@@ -57,7 +58,7 @@ class States:
         """Load a state of a node.
 
         Raises:
-            UnsimulatedError: none of that name was saved.
+            UnsimulatedError: no state of that name was saved.
         """
         state = self._saved.get((node.number, name))
         if state is None:
@@ -71,7 +72,7 @@ def require_joint(node: SceneNode, index: int) -> JointFrame:
     """Return the end of the joint at `node`; `index` counts its axes from 1.
 
     Raises:
-        UnsimulatedError: it is no joint with that axis.
+        UnsimulatedError: the node is not a joint with that axis.
     """
     if node.type_name not in JOINTS:
         fact = f"a {node.type_name} has no joint position"

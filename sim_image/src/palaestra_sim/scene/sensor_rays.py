@@ -10,18 +10,18 @@ from palaestra_sim.scene.geometry import Pose, Vector, turn
 # A ray in a robot's frame: x and y of its origin in meters, x and y of its unit direction.
 Ray = tuple[float, float, float, float]
 
-_LEVEL: Final = 1e-3  # a smaller slope counts as none
-_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
+_LEVEL: Final = 1e-3  # a smaller slope counts as level
+_STEEPEST: Final = 1e-6  # of a vertical ray: its distance along the floor for each meter
 
 
 class Beam(NamedTuple):
-    """A ray that may look up or down: its trace on the floor, its height, and its slope.
+    """A ray that may point up or down: its trace on the floor, its height, and its slope.
 
     Attributes:
         ray: in the robot's frame, seen from above.
         height_m: of its origin, in the robot's frame.
-        slope: how far it climbs for each meter along the floor.
-        reach_m: the longest distance that matters.
+        slope: the height that it gains for each meter along the floor.
+        reach_m: the distance beyond which the sensor's value is constant.
     """
 
     ray: Ray
@@ -31,21 +31,21 @@ class Beam(NamedTuple):
 
     @property
     def level(self) -> bool:
-        """Whether it stays at its height."""
+        """Whether its height is constant."""
         return self.slope == 0.0
 
     def seen_from(self, pose: Pose) -> Beam:
-        """Return the same beam in the frame around that of the robot, which has `pose` there."""
+        """Return the same beam in the outer frame, in which the robot's frame has `pose`."""
         x, y, along_x, along_y = self.ray
         origin = pose.carry((x, y, self.height_m))
         return beam_along(Pose(origin, pose.rotation), (along_x, along_y, self.slope), self.reach_m)
 
 
 def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
-    """Return the beam that leaves a frame in a direction of this frame."""
+    """Return the beam that starts at the origin of a frame, in a direction of this frame."""
     dx, dy, dz = turn(pose.rotation, direction)
     along = math.hypot(dx, dy)
-    if along < _STEEPEST:  # any direction is right; that of rounding errors would be none of length 1
+    if along < _STEEPEST:  # any direction will do; one from rounding errors would not have length 1
         dx, dy, along = _STEEPEST, 0.0, _STEEPEST
     slope = dz / along
     ray = pose.position[0], pose.position[1], dx / along, dy / along

@@ -1,4 +1,4 @@
-"""From a boundingObject to shapes on the floor.
+"""Convert a boundingObject to shapes.
 
 A capsule counts as a cylinder of its length, a mesh as the box around its points.
 """
@@ -23,7 +23,7 @@ _ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to w
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """A box, cylinder or ball in the frame of its place. Meters: `size` is x, y, z or 2 r, 2 r, height."""
+    """A box, cylinder or ball in its frame. Meters: `size` is x, y, z or 2 r, 2 r, height."""
 
     kind: Literal["box", "cylinder", "ball"]
     size: Vector
@@ -38,10 +38,10 @@ class Shape:
 
     @property
     def upright(self) -> bool:
-        """Whether one of its axes is vertical, so that it has one outline from below to above.
+        """Whether one of its axes is vertical, so that it has one outline from its lower to its upper end.
 
-        A stand-in always has one: its shapes are simple anyway, so one that leans has the outline of one that
-        does not.
+        A stand-in always counts as upright: its shapes are approximations anyway, so a tilted one has the
+        outline of an upright one.
         """
         rotation = self.pose.rotation
         return (
@@ -74,24 +74,24 @@ def bounding_shapes(reading: NodeReader, owner: SceneNode, place: Frame) -> Iter
 
 
 class _Grown(NamedTuple):
-    """A frame inside a boundingObject, and by how much it makes what is in it larger, along its axes."""
+    """A frame inside a boundingObject, and the factors by which it scales its contents along its axes."""
 
     frame: Pose
     scale: Vector
 
     def at(self, position: Vector) -> Pose:
-        """Return the frame around a position in this one."""
+        """Return the frame at a position in this one."""
         x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
         return self.frame.after(Pose((x, y, z)))
 
     def inside(self, pose: Pose, scale: Vector) -> _Grown:
-        """Return the frame of a node in this one; turned in a distorted frame, it would be none."""
+        """Return the frame of a node in this one; it must not be rotated if this one is distorted."""
         x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
         return _Grown(self.at(pose.position).after(Pose(rotation=pose.rotation)), (x, y, z))
 
     @property
     def even(self) -> bool:
-        """Whether it keeps angles."""
+        """Whether all factors are equal, so that angles are kept."""
         return self.scale[0] == self.scale[1] == self.scale[2]
 
 
@@ -108,7 +108,7 @@ def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -
             for inner in node.nodes():
                 yield from _shapes(reading, inner, place, grown.inside(pose, scale))
         case "Plane":
-            # A ceiling is out of the way of everything that stands on the floor.
+            # A ceiling is ignored, because it is above all objects on the floor.
             local = standing(node, grown.frame)
             normal = place.ground_pose.after(local).rotation[8]
             if abs(normal) < _FLAT:

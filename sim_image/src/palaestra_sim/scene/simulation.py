@@ -43,16 +43,16 @@ from palaestra_sim.world import World, parse
 
 
 class Simulation:
-    """One loaded world. A reload makes another Simulation.
+    """One loaded world. A reload creates another Simulation.
 
     Attributes:
         tree: the nodes of the world.
         robots: in the order of the world file.
-        time_ms: simulated so far, back to 0 at a reset.
+        time_ms: simulated time; a reset sets it to 0.
         mode: for the program that paces the steps; `step` itself works in all three.
-        quit_status: the exit status that `quit` asked for; None before.
-        motion: of robots and loose things, for a supervisor.
-        movies: of what the Viewpoint shows.
+        quit_status: the exit status that `quit` requested; None before.
+        motion: of robots and dynamic solids, for a supervisor.
+        movies: recordings of the Viewpoint's view.
     """
 
     def __init__(self, tree: SceneTree, scene: SceneContents, mode: Mode) -> None:
@@ -87,7 +87,7 @@ class Simulation:
         """Return the simulation of a world file that needs no other file.
 
         Raises:
-            WorldError: the file is wrong, or holds something that cannot be simulated.
+            WorldError: the file is wrong, or contains an object that cannot be simulated.
         """
         return cls.of(parse(source, name), physics, name, mode)
 
@@ -104,27 +104,27 @@ class Simulation:
         """Return the simulation of a world.
 
         Args:
-            world: as read.
+            world: the parsed world.
             physics: moves its robots.
             name: of its file, in errors.
-            mode: how it runs at first.
-            descriptions: of the types that are no base types.
-            leave_out: what may be left out, if it cannot be simulated.
+            mode: the mode at the start.
+            descriptions: of the types that are not base types.
+            leave_out: the nodes that may be left out, if they cannot be simulated.
 
         Raises:
-            WorldError: the world holds something that cannot be simulated.
+            WorldError: the world contains an object that cannot be simulated.
         """
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, physics, leave_out), mode)
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:
-        """What the simulator lacks and the user left out, each with its place."""
+        """The unsupported nodes that the user left out, each with its place."""
         return (*self.scene.left_out, *self.tree.ignored)
 
     @property
     def forces(self) -> bool:
-        """Whether the nodes of the world have masses and frictions that matter."""
+        """Whether the masses and frictions of the world's nodes affect the motion."""
         return self.scene.physics.abilities.forces
 
     @property
@@ -133,10 +133,10 @@ class Simulation:
         return self.scene.basic_step_ms
 
     def step(self, duration_ms: int) -> None:
-        """Simulate for `duration_ms`, then give the sensors their values.
+        """Simulate for `duration_ms`, then set the values of the sensors.
 
         Raises:
-            ValueError: the duration is no positive multiple of the basic step.
+            ValueError: the duration is not a positive multiple of the basic step.
         """
         self.advance(duration_ms)
         self.sample()
@@ -145,7 +145,7 @@ class Simulation:
         """Simulate for `duration_ms`; the sensors keep their values.
 
         Raises:
-            ValueError: the duration is no positive multiple of the basic step.
+            ValueError: the duration is not a positive multiple of the basic step.
         """
         count, rest = divmod(duration_ms, self.scene.basic_step_ms)
         if rest or count < 1:
@@ -157,7 +157,7 @@ class Simulation:
             self._basic_step()
 
     def sample(self) -> None:
-        """Give every sensor its value of this moment."""
+        """Set the value of every sensor to that of this moment."""
         for sample in self._samplers:
             sample()
 
@@ -168,8 +168,8 @@ class Simulation:
     def reset(self) -> None:
         """Request a reset of the world within the next basic step.
 
-        Restored: time, poses of all solids and robots, motors, noise (with the seed that is then in
-        customData). Not restored: other fields that were written.
+        Restored: time, poses of all solids and robots, motors, noise (with the current seed in customData).
+        Not restored: other fields that were written.
         """
         self._reset_asked = True
 
@@ -184,7 +184,7 @@ class Simulation:
                 door.joint.halt()
 
     def quit(self, status: int) -> None:
-        """Ask for the end of the simulator."""
+        """Request the end of the simulator."""
         self.quit_status = status
 
     def robot_of(self, node: SceneNode) -> Robot | None:
@@ -192,7 +192,7 @@ class Simulation:
         return next((robot for robot in self.robots if robot.parts.node is node), None)
 
     def changed(self, node: SceneNode, field: str) -> None:
-        """Take the effect of a field that has a new value."""
+        """Apply the effect of a field that has a new value."""
         if node.outline:
             self._resize(node)
         self._view.written(node, field)
@@ -207,13 +207,13 @@ class Simulation:
         self._moved(node.place)
 
     def add(self, text: str, field: NodeField, index: int) -> bool:
-        """Insert the nodes of `text` into a field, at once; False if the field has no place at `index`.
+        """Insert the nodes of `text` into a field, at once; return False if the index is not valid.
 
         A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
 
         Raises:
-            WorldError: the text is wrong, or has something that cannot be simulated.
-            UnsimulatedError: the field takes no such nodes while the simulation runs.
+            WorldError: the text is wrong, or contains an object that cannot be simulated.
+            UnsimulatedError: the field does not accept such nodes while the simulation runs.
         """
         at = field.room(index)
         if at is None:
@@ -221,7 +221,7 @@ class Simulation:
         added = self.tree.grow(text, field.node)
         try:
             require_room(field.node, field.name, added)
-            read = field.name == "children"  # other fields hold what is drawn
+            read = field.name == "children"  # other fields hold visible nodes
             fresh = (
                 read_added(self.tree, added, self.scene)
                 if read
@@ -246,10 +246,10 @@ class Simulation:
         return True
 
     def remove(self, node: SceneNode) -> None:
-        """Remove a node and all inside it, at once; a reset does not bring it back.
+        """Remove a node and all nodes inside it, at once; a reset does not restore it.
 
         Raises:
-            UnsimulatedError: the simulation cannot go on without it.
+            UnsimulatedError: the simulation cannot continue without it.
         """
         require_removable(node)
         gone = {node, *node.descendants()}
@@ -264,15 +264,15 @@ class Simulation:
         self._arrange()
 
     def export_image(self, path: str, quality: int) -> bool:
-        """Save what the Viewpoint shows as a PNG or JPEG file; return whether that was possible.
+        """Save the Viewpoint's view as a PNG or JPEG file; return whether that was possible.
 
         Raises:
-            UnsimulatedError: the file would be none, or this machine cannot draw.
+            UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
         """
         return save_view(self.tree.root, self.scene.physics, path, quality)
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
-        """Return where a node touches others: points in meters, each with the number of the touching node."""
+        """Return a node's contact points: positions in meters, each with the number of the touching node."""
         asked = {node, *node.descendants()} if descendants else {node}
         return [
             (point if self.scene.top is None else self.scene.top.from_ground(point), touching.number)
@@ -282,11 +282,11 @@ class Simulation:
         ]
 
     def save_state(self, node: SceneNode, name: str) -> None:
-        """Save the places and joints of a node, and of all inside it, under a name."""
+        """Save the frames and joints of a node, and of all nodes inside it, under a name."""
         self._states.save(node, name)
 
     def load_state(self, node: SceneNode, name: str) -> None:
-        """Return a node to a saved state, at rest; "__init__" is that of the world file.
+        """Return a node to a saved state, at rest; "__init__" is the state in the world file.
 
         Raises:
             UnsimulatedError: no state of that name was saved.
@@ -300,10 +300,10 @@ class Simulation:
         self._arrange()
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Put a joint to a position, in rad or m; its motor holds it there.
+        """Set the position of a joint, in rad or m; its motor holds it there.
 
         Raises:
-            UnsimulatedError: the node is no joint with an axis `index`, counted from 1.
+            UnsimulatedError: the node is not a joint with an axis `index`, counted from 1.
         """
         if math.isfinite(position):
             require_joint(node, index).joint.put(position)
@@ -326,7 +326,7 @@ class Simulation:
                 radar.show(echoes, lambda: self.time_ms)
 
     def _resize(self, node: SceneNode) -> None:
-        """Read the outline of an obstacle anew, of which a part has another size."""
+        """Read the outline of an obstacle again, because a part of it has a new size."""
         owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
         if owner is not None and owner.place is not None:
             fresh = bounding_shapes(NodeReader(), owner, owner.place)
@@ -338,7 +338,7 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Update the places of the solids, if `place` is part of one of them."""
+        """Update the poses of the obstacles, if `place` is part of one of them."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
         if any(place in moving.chain() for moving in places):

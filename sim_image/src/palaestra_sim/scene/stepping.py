@@ -1,8 +1,8 @@
-"""The steps that robots asked for; the world moves once all robots that it waits for have asked.
+"""The steps that robots requested; the world moves after all robots that it waits for have requested one.
 
-A robot whose `synchronization` is TRUE holds the world until it asks. Steps of different lengths are
-served piece by piece: the world advances by the shortest that is left. While the simulation is
-paused all of them wait.
+A robot whose `synchronization` is TRUE holds the world until it requests a step. Steps of different lengths
+are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all of
+them wait.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Done = Callable[[bool], None]
 
 
 class Simulated(Protocol):
-    """A simulation as its steps need it; another simulator can take the place of the stub's own.
+    """The interface of a simulation for its steps; another simulator can implement it too.
 
     Attributes:
         mode: in PAUSE nothing moves.
-        quit_status: None until a client asked for the end; from then on nothing moves.
+        quit_status: None until a client has requested the end; after that nothing moves.
     """
 
     mode: Mode
@@ -33,7 +33,7 @@ class Simulated(Protocol):
         ...
 
     def sample(self) -> None:
-        """Give every sensor its value of this moment."""
+        """Set the value of every sensor to that of this moment."""
         ...
 
 
@@ -62,9 +62,9 @@ class Stepping:
         self.advance()
 
     def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
-        """Request a step; `done(True)` is called when the world has advanced by `duration_ms`, maybe at once.
+        """Request a step; `done(True)` is called, maybe at once, after the world advanced by `duration_ms`.
 
-        If the simulator ends before, `done(False)` is called.
+        If the simulator ends before that, `done(False)` is called.
         """
         self._wishes[robot] = _Wish(duration_ms, done)
         self.advance()
@@ -78,7 +78,7 @@ class Stepping:
             self._grant(duration_ms)
 
     def end(self) -> None:
-        """Call back for every pending step: the simulator ends."""
+        """Call `done(False)` for every pending step, because the simulator ends."""
         wishes, self._wishes = self._wishes, {}
         for wish in wishes.values():
             wish.done(False)

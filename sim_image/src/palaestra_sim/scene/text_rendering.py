@@ -1,4 +1,4 @@
-"""Texts as pixels, in the one font that Pillow comes with."""
+"""Text as pixels, in Pillow's built-in font."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from palaestra_sim.scene.picture_files import pillow
 
 
 class Font(NamedTuple):
-    """How a text is drawn: the height of its letters in pixels, and whether their edges are smooth."""
+    """The style of a text: the height of its letters in pixels, and whether their edges are smooth."""
 
     size: int = 8
     smooth: bool = True
 
 
 def letters(text: str, corner: Point, font: Font, size: tuple[int, int]) -> Iterator[tuple[Point, int]]:
-    """Yield the pixels of a text, each with the share of it that is covered, from 1 to 255.
+    """Yield the pixels of a text, each with its coverage, from 1 to 255.
 
     Args:
         text: one line or more.
-        corner: of its upper left letter.
+        corner: the upper left corner of the first letter.
         font: of all letters.
-        size: of the picture; nothing is yielded outside of it.
+        size: of the image; pixels outside it are not yielded.
 
     Raises:
         UnsimulatedError: Pillow is missing.

@@ -1,9 +1,9 @@
-"""Reading a scene: numbers checked, and what cannot be simulated, with its place.
+"""Validate a scene while it is read: check numbers, and record unsupported objects with their places.
 
-Two things can be wrong. A *mistake* of the author, such as a number that is a string, is always refused.
-What the simulator *lacks*, Webots would simulate: it is refused too, by line and column, unless the user
-leaves out nodes of that type. Either way the reading goes on: `conclude` raises one error for everything that
-was refused.
+Two kinds of errors exist. A *mistake* of the author, such as a string in place of a number, is always
+refused. An *unsupported* object, which Webots would simulate, is refused too, unless the user leaves out
+nodes of that type. In both cases reading continues: `conclude` raises one error for everything that was
+refused, with lines and columns.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ ELSEWHERE: Final = "leave it out (--leave-out), or run this world with driver we
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveOut:
-    """Which nodes the user leaves out, if they cannot be simulated.
+    """The nodes that the user leaves out, if they cannot be simulated.
 
     Attributes:
         types: of the nodes, as written in the world.
-        everything: whether the type does not matter.
-        names: whether a robot may lack --name and --synchronize, which a sidecar puts in.
+        everything: whether nodes of any type are left out.
+        names: whether a robot may lack --name and --synchronize, which a sidecar adds.
     """
 
     types: frozenset[str] = frozenset()
@@ -44,21 +44,21 @@ class LeaveOut:
 
 
 class NodeReader:
-    """The nodes of a world while they are read: their numbers, and the errors in them.
+    """The state of reading a world's nodes: it checks their numbers, and collects the errors.
 
     Args:
-        refused: mistakes that are known already.
-        leave_out: what the user leaves out.
+        refused: mistakes that are already known.
+        leave_out: the nodes that the user leaves out.
         simulator: its name.
 
     Attributes:
-        leave_out: what the user leaves out.
+        leave_out: the nodes that the user leaves out.
         simulator: its name, for messages.
         left_out: the nodes that were left out, each with its place and the reason.
-        world_info: the WorldInfo of the world; None if it has none.
-        system: the letters of what its axes point to: east, north, up.
-        top: the frame around everything; None if z of the world points up.
-        floors: the place and the local frame of each level Plane that looks up.
+        world_info: the WorldInfo of the world; None if it is missing.
+        system: one letter for the direction of each axis: east, north, up.
+        top: the frame around the whole world; None if z of the world points up.
+        floors: the frame, and the pose in it, of each level Plane that faces up.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class NodeReader:
             self._refused.append(node.origin.error(fact, remedy))
 
     def lacks(self, node: SceneNode, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Record that `node` cannot be simulated; if the user leaves out its type, it is marked so."""
+        """Record that `node` is not supported; if the user leaves out its type, mark it as left out."""
         if not self.leave_out.covers(node):
             self.refuse(node, fact, remedy)
             return
@@ -91,10 +91,10 @@ class NodeReader:
             self.left_out.append(node.origin.error(fact, "left out"))
 
     def conclude(self) -> None:
-        """Return if nothing was refused.
+        """Do nothing if nothing was refused.
 
         Raises:
-            WorldError: everything that was refused.
+            WorldError: it lists everything that was refused.
         """
         if error := refusal(self._refused):
             raise error
@@ -140,14 +140,14 @@ class NodeReader:
         return of_instance(node, (x, y, z, angle_rad))
 
     def scale(self, node: SceneNode) -> Vector:
-        """Return `scale`, which only a Transform has, and before R2023a a Solid; 1 1 1 if it has none."""
-        if node.stand_in:  # a field of its PROTO, whose shapes have taken it
+        """Return `scale`, which a Transform has, and before R2023a a Solid; 1 1 1 if it is absent."""
+        if node.stand_in:  # the shapes of the stand-in already include its PROTO's scale
             return 1.0, 1.0, 1.0
         x, y, z = self.vector(node, "scale", (1.0, 1.0, 1.0))
         return x, y, z
 
     def size(self, node: SceneNode) -> float:
-        """Return by how much a frame makes everything in it larger; note a scale that distorts solids."""
+        """Return the factor by which a frame scales its contents; refuse a scale that distorts solids."""
         x, y, z = self.scale(node)
         if x == y == z > 0.0:
             return x

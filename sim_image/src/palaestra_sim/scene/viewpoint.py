@@ -1,4 +1,4 @@
-"""The picture of a whole world, as its Viewpoint shows it to people."""
+"""The image of a whole world, as its Viewpoint shows it to people."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import NodeReader
 
-SIZE: Final = (800, 600)  # Webots has that of its window
+SIZE: Final = (800, 600)  # in Webots it is the size of the window
 
 
 def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> bool:
     """Save the view of a world as a PNG or JPEG file; return whether that was possible.
 
     Raises:
-        UnsimulatedError: the file would be none, or this machine cannot draw.
+        UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
     """
     eye = view(root, physics, SIZE)
     return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)
 
 
 def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInterface | None:
-    """Return a camera where the Viewpoint is now; None if the simulator draws nothing."""
+    """Return a camera at the current Viewpoint; None if the simulator does not render."""
     reading = NodeReader()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
     fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # of the longer side, as in Webots

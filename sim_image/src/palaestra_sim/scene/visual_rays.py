@@ -1,7 +1,8 @@
-"""Rays of sensors that see shapes: infra-red DistanceSensors everywhere, lidars where nothing draws. Pure.
+"""Rays that meet visible shapes: infra-red DistanceSensors, and lidars if the physics does not render. Pure.
 
-A ray stops at the first surface that faces it. It passes the robot that carries the sensor, and what contains
-its origin. Source of the reflection: reference/distancesensor.md of Webots, "Infra-Red Sensors".
+A ray stops at the first surface that faces it. It passes through the robot that carries the sensor, and
+through shapes that contain its origin. Source of the reflection: reference/distancesensor.md of Webots,
+"Infra-Red Sensors".
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ _PARALLEL: Final = 1e-12
 
 
 class Glance(NamedTuple):
-    """How far a ray travels.
+    """The result of casting a ray.
 
     Attributes:
         distance_m: to the shape, or the reach of the ray if it meets none.
-        reflection: the share of infra-red light that the shape returns; 1 for none.
+        reflection: the share of infra-red light that the shape returns; 1 if the ray meets none.
     """
 
     distance_m: float
@@ -34,11 +35,11 @@ class Glance(NamedTuple):
 
 
 class VisualRays:
-    """The rays of one sensor-carrying robot, against all that is visible.
+    """The rays of one robot with sensors, against all visible shapes.
 
     Args:
-        view: what of the world is visible.
-        carrier: the place of the robot.
+        view: the visible part of the world.
+        carrier: the frame of the robot.
         beams: in the frame of the robot.
     """
 
@@ -54,7 +55,7 @@ class VisualRays:
         self._moving: list[_Target] = []
 
     def cast(self) -> list[Glance]:
-        """Return what each ray meets now."""
+        """Return the result for each ray now."""
         self._refresh()
         for target in self._moving:
             target.place()
@@ -63,7 +64,7 @@ class VisualRays:
         return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
 
     def _refresh(self) -> None:
-        """Place what does not move by itself, if anything was changed or put elsewhere."""
+        """Update the shapes that do not move by themselves, if one was changed or moved."""
         seen = (self._view.changes, self._view.moves)
         if seen == self._seen:
             return
@@ -78,7 +79,7 @@ class VisualRays:
 
 
 class _Target:
-    """A visible shape, where it was when it was placed last."""
+    """A visible shape, at the pose of its last update."""
 
     __slots__ = ("_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
 
@@ -90,7 +91,7 @@ class _Target:
         self.place()
 
     def place(self) -> None:
-        """Take the pose of this moment."""
+        """Update the pose to that of this moment."""
         thing = self._thing
         frame = Pose() if thing.place is None else thing.place.world_pose
         pose = frame.after(thing.local)
@@ -118,16 +119,16 @@ def _ray(beam: Beam) -> tuple[Vector, Vector, float]:
 def _bundle(
     targets: Sequence[_Target], pose: Pose, origin: Vector, rays: Sequence[tuple[Vector, float]]
 ) -> Iterator[Glance]:
-    """Yield what rays of one origin meet; origin and directions are in the frame of `pose`."""
+    """Yield the results of rays with one origin; origin and directions are in the frame of `pose`."""
     start = pose.carry(origin)
     farthest = max(reach_m for _, reach_m in rays)
     near = []
     for target in targets:
         offset = _minus(target.center, start)
-        beyond = _dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
+        beyond = _dot(offset, offset) - target.radius_m**2  # negative if the origin is inside its ball
         if beyond < 0.0 or math.hypot(*offset) - target.radius_m < farthest:
             near.append((target, *offset, target.radius_m, beyond, target.inward.carry(start)))
-    near.sort(key=itemgetter(5))  # the nearest hides most
+    near.sort(key=itemgetter(5))  # the nearest first, because it hides most
     level = [row for row in near if abs(row[3]) <= row[0].half_height_m]
     for direction, reach_m in rays:
         dx, dy, dz = towards = turn(pose.rotation, direction)
@@ -153,7 +154,7 @@ Surface = Callable[[Vector, Vector], float]
 
 
 def _surface(thing: Drawn) -> Surface:
-    """Return a function of origin and direction in its frame, which returns the meters to its surface."""
+    """Return a function from origin and direction, in the shape's frame, to the distance in meters."""
     half = thing.size[0] / 2.0, thing.size[1] / 2.0, thing.size[2] / 2.0
     if thing.mesh is not None:
         return _of_mesh(_scaled(thing.mesh, thing.size), thing.mesh)
@@ -188,14 +189,14 @@ def _box(origin: Vector, direction: Vector, half: Vector) -> float:
 
 
 def _ball(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the meters to an ellipsoid, which is a ball of radius 1 in a frame of its sizes."""
+    """Return the distance to an ellipsoid in meters; scaled by its sizes it is a ball of radius 1."""
     ox, oy, oz = (at / size for at, size in zip(origin, half, strict=True))
     dx, dy, dz = (towards / size for towards, size in zip(direction, half, strict=True))
     return _root(dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0)
 
 
 def _root(square: float, half_linear: float, constant: float) -> float:
-    """Return the first root of a ray's equation; infinite behind the origin, inside, or without one."""
+    """Return the first root of a ray's equation; infinite if it is behind or inside, or does not exist."""
     under = half_linear * half_linear - square * constant
     if constant < 0.0 or under < 0.0 or square < _PARALLEL:
         return math.inf
@@ -204,7 +205,7 @@ def _root(square: float, half_linear: float, constant: float) -> float:
 
 
 def _cylinder(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the meters to a cylinder around z, whose outline is an ellipse where its sizes differ."""
+    """Return the distance to a cylinder around z in meters; its outline may be an ellipse."""
     ox, oy, dx, dy = origin[0] / half[0], origin[1] / half[1], direction[0] / half[0], direction[1] / half[1]
     apart = ox * ox + oy * oy - 1.0
     if apart < 0.0 and abs(origin[2]) < half[2]:
@@ -219,7 +220,7 @@ def _cylinder(origin: Vector, direction: Vector, half: Vector) -> float:
 
 
 def _capsule(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the meters to a capsule around z; `half` counts its caps."""
+    """Return the distance to a capsule around z in meters; `half` includes its caps."""
     radius = half[0]
     straight = max(half[2] - radius, 0.0)
     ox, oy, oz = origin
@@ -239,7 +240,7 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
-    """Return the surface of triangles, of which both sides are seen."""
+    """Return the surface of triangles, which are visible from both sides."""
     corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
 
     def nearest(origin: Vector, direction: Vector) -> float:
@@ -249,7 +250,7 @@ def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
 
 
 def _triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997)."""
+    """Return the distance to a triangle in meters, as in Möller and Trumbore (1997)."""
     first, second, apart = _minus(b, a), _minus(c, a), _minus(origin, a)
     across = _cross(direction, second)
     volume = _dot(first, across)

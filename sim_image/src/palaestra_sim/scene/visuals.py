@@ -1,7 +1,7 @@
-"""From the nodes of a world to what cameras see: shapes, each with a color and the place that carries it.
+"""Convert the nodes of a world to visible shapes, each with a color and the frame that carries it.
 
 Pure. Textures, lights and mesh files are not read: a shape has one color. A stand-in has the shapes of its
-outline, in the color of its first appearance. What a scale distorts keeps its angles.
+outline, in the color of its first appearance. A shape that a scale distorts keeps its angles.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ Color = tuple[float, float, float, float]  # red, green, blue, alpha, from 0 to 
 
 _WHITE: Final = (1.0, 1.0, 1.0)
 _STAND_IN: Final = (0.72, 0.70, 0.66)
-_FLOOR: Final = (0.45, 0.46, 0.47)  # of a stand-in; its walls have another color
-_PATTERN: Final = (0.7, 0.7, 0.7)  # of a texture or a PROTO's appearance that is not read
+_FLOOR: Final = (0.45, 0.46, 0.47)  # of a stand-in's floor; its walls have another color
+_PATTERN: Final = (0.7, 0.7, 0.7)  # for textures and appearance PROTOs, which are not read
 _MATERIAL: Final = (0.8, 0.8, 0.8)  # Source: Material.diffuseColor of Webots
 _NIGHT: Final = (0.0, 0.0, 0.0)  # Source: Background.skyColor of Webots
-_DAY: Final = (0.62, 0.76, 0.92)  # of a sky that is a texture
+_DAY: Final = (0.62, 0.76, 0.92)  # of a textured sky
 _SHEET_M: Final = 0.002  # a plane is a box of this height; its upper side is the plane
 _LARGEST_M: Final = 1e5
 _PLACING: Final = frozenset(("translation", "rotation"))
 _LOOKING: Final = _PLACING | {"scale"}
-# What the look of a shape, or of the sky, is written in.
+# The types of nodes that describe the look of a shape, or of the sky.
 _LOOKS: Final = frozenset(
     (
         "Appearance",
@@ -59,12 +59,12 @@ class Drawn:
 
     Attributes:
         kind: "ball" is an ellipsoid if its sizes differ.
-        size: x, y, z in meters; of what is round 2 r, 2 r, height. A mesh is scaled by it.
-        color: of all of it.
-        local: its frame in that of `place`, in meters of the world.
-        place: that carries it; None: the world.
+        size: x, y, z in meters; for round shapes 2 r, 2 r, height. A mesh is scaled by it.
+        color: of the whole shape.
+        local: its pose in the frame `place`, in meters of the world.
+        place: the frame that carries it; None for the world.
         node: the Shape, or the stand-in.
-        mesh: of kind "mesh".
+        mesh: for the kind "mesh".
         roughness: of a PBRAppearance, 0 to 1.
     """
 
@@ -79,17 +79,17 @@ class Drawn:
 
 
 def drawn(root: SceneNode) -> Iterator[Drawn]:
-    """Yield what is visible of a node and all inside it, with the fields and places of this moment."""
+    """Yield the visible shapes of a node and of all nodes inside it, with their current fields and frames."""
     yield from _inside(root, _Frame())
 
 
 class View:
-    """What of a world is visible, and how often it has changed.
+    """The visible part of a world, with counts of its changes.
 
     Attributes:
         root: of the world.
-        changes: how often something has come, gone, or got another look.
-        moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
+        changes: number of times that a shape was added, removed, or got another look.
+        moves: number of times that a client moved a shape; motion of robots and joints does not count.
     """
 
     def __init__(self, root: SceneNode) -> None:
@@ -98,14 +98,14 @@ class View:
         self.moves = 0
 
     def written(self, node: SceneNode, field: str) -> None:
-        """Count the write of a field, if it is visible."""
+        """Count the write of a field, if its effect is visible."""
         if field in _PLACING and node.place is not None:
             self.moves += 1
         elif node.stand_in or node.type_name in _LOOKS or field in _LOOKING:
             self.changes += 1
 
     def things(self) -> tuple[Drawn, ...]:
-        """Return what is visible now."""
+        """Return the current visible shapes."""
         return tuple(drawn(self.root))
 
     def sky(self) -> Vector:
@@ -119,14 +119,14 @@ class View:
 
 
 class _Frame(NamedTuple):
-    """A frame in that of a place, and by how much it makes what is in it larger, along its axes."""
+    """A frame relative to `place`, and the factors by which it scales its contents along its axes."""
 
     place: Frame | None = None
     pose: Pose = Pose()
     scale: Vector = (1.0, 1.0, 1.0)
 
     def at(self, position: Vector) -> Pose:
-        """Return the frame around a position in this one."""
+        """Return the frame at a position in this one."""
         x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
         return self.pose.after(Pose((x, y, z)))
 
@@ -135,7 +135,7 @@ class _Frame(NamedTuple):
         scale = (1.0, 1.0, 1.0) if node.stand_in else _numbers(node, "scale", (1.0, 1.0, 1.0))
         place = node.place
         if place is not None:
-            # An even scale is the place's own.
+            # If all factors are equal, the scale is already that of the frame.
             x, y, z = scale if len(set(scale)) > 1 else (1.0, 1.0, 1.0)
             return _Frame(place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
         turned = _numbers(node, "rotation", (0.0, 0.0, 1.0, 0.0))
@@ -177,7 +177,7 @@ class _Look(NamedTuple):
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
-    """Yield the shape of a geometry; nothing for one whose numbers are none, or that is in another file."""
+    """Yield the shape of a geometry; nothing if its numbers are invalid or it is in another file."""
     solid = _solid(node, frame.pose)
     if solid is None or look.color[3] <= 0.0:
         return
@@ -205,7 +205,7 @@ class _Solid(NamedTuple):
 
 
 def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
-    """Return the solid of a geometry in a frame; None if it has none."""
+    """Return the solid of a geometry in a frame; None if it has no solid."""
     diameter = 2.0 * _number(node, "radius", 1.0)
     match node.type_name:
         case "Box":
@@ -246,7 +246,7 @@ def _of_shape(shape: SceneNode) -> _Look:
 
 
 def _look(look: SceneNode) -> _Look:
-    """Return the look of an Appearance, of a PBRAppearance, or of a PROTO for one."""
+    """Return the look of an Appearance, of a PBRAppearance, or of an appearance PROTO."""
     if look.type_name == "Appearance":
         material = next(iter(look.nodes("material")), None)
         if material is None:
@@ -264,7 +264,7 @@ def _mixed(node: SceneNode, field: str, default: tuple[float, float, float]) -> 
 
 
 def _numbers(node: SceneNode, field: str, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Return as many finite numbers as `default` has; `default` if the field has others."""
+    """Return as many finite numbers as `default` has; `default` if the field has other values."""
     numbers = node.numbers(field)
     if numbers is None or len(numbers) != len(default):
         return default

@@ -1,18 +1,19 @@
-"""Which wheels drive a robot, and how: from the places of its wheels to its motion, and back.
+"""Find the wheels that drive a robot, and relate their speeds to its motion, from their positions.
 
-A wheel holds the floor along one direction, its grip. A plain tire grips along the way that it rolls, a
-wheel with rollers along the axis of the roller that stands on the floor. Each grip is one linear equation
+The floor holds a wheel along one direction, its grip. A plain tire grips in the direction in which it rolls,
+a wheel with rollers along the axis of the roller that touches the floor. Each grip gives one linear equation
 between the robot's motion and the speed of the wheel; `find_drive` solves all of them, exactly or by least
-squares. So no wheel needs a name, and a pair, a row or a ring of wheels needs no case of its own.
+squares. So wheels need no names, and pairs, rows and rings of wheels need no special cases.
 
 - Grips in different directions leave no freedom: the robot moves in any direction (omni, mecanum).
-- Parallel grips leave it free across them, where only plain tires resist. They would slide least if the robot
-  turned about their middle, so there it has no speed across (differential, skid-steer).
+- Parallel grips leave it free across them, where only plain tires resist. These slide least if the robot
+turns
+  about their middle, so this point has no speed across (differential, skid-steer).
 
-Two plain tires with different axles would block each other. Worlds write them nevertheless, for
-omnidirectional wheels whose rollers are a friction that is low along the axle; so they slide here too.
+Two plain tires with different axles would block each other. Worlds contain them nevertheless: they model
+omnidirectional wheels, whose rollers are replaced by a low friction along the axle. So they slide here too.
 
-A skid-steer robot turns as its geometry says. On a real floor its tires slip, and it turns more slowly.
+A skid-steer robot turns according to its geometry. On a real floor its tires slip, and it turns more slowly.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ Twist = tuple[float, float, float]  # vx, vy in m/s and omega in rad/s; or the c
 Rows = tuple[Twist, Twist, Twist]
 
 _PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
-_LEAST_GAIN: Final = 0.05  # of a wheel's rim speed that its rollers must leave along their axis
-_LEAST_VOLUME: Final = 1e-3  # of 1: three ideal equations have 1, dependent ones 0
-_LEAST_ARM_M: Final = 1e-3  # of at least one wheel; shorter arms do not turn a robot
+_LEAST_GAIN: Final = 0.05  # minimum speed along the grip, as a fraction of the wheel's rim speed
+_LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for three ideal equations, 0 for dependent ones
+_LEAST_ARM_M: Final = 1e-3  # minimum of the longest arm; shorter arms do not turn a robot
 _THREE: Final = 3
-_ROUNDED: Final = 1e-3  # in m and in rad: by so much a file may round a ring of wheels
+_ROUNDED: Final = 1e-3  # in m and in rad: maximum error by which a file may round a ring of wheels
 _K: Final = math.sqrt(0.75)
 _COSINES: Final = (1.0, -0.5, -0.5)
 _SINES: Final = (0.0, _K, -_K)
@@ -46,7 +47,7 @@ class Wheel:
         x_m, y_m: of its hub.
         axle: the axis about which a positive speed turns the wheel.
         radius_m: from the hub to the floor.
-        roller: the axis of the roller that stands on the floor; None for a plain tire.
+        roller: the axis of the roller that touches the floor; None for a plain tire.
     """
 
     x_m: float
@@ -67,7 +68,7 @@ class Wheel:
 
     @property
     def plausible(self) -> bool:
-        """Whether every number is finite and of a size that occurs."""
+        """Whether every number is finite and of a realistic size."""
         numbers = (self.x_m, self.y_m, *self.axle, *self.grip)
         small = all(abs(number) <= _FARTHEST_M for number in numbers)
         return small and 1.0 / _FARTHEST_M <= self.radius_m <= _FARTHEST_M
@@ -78,8 +79,8 @@ class Drive:
     """The motion of a robot as a linear function of its wheels' speeds, and the reverse.
 
     Attributes:
-        to_twist: a wheel a row: what 1 rad/s of this wheel adds to vx, vy and omega of the robot's origin.
-        to_speeds: a wheel a row: what vx, vy and omega, each 1, add to its speed in rad/s.
+        to_twist: one row per wheel: the vx, vy and omega of the robot's origin for 1 rad/s of this wheel.
+        to_speeds: one row per wheel: its speed in rad/s for a vx, a vy and an omega of 1.
         freedoms: 3 if the robot can move in any direction, 2 if it rolls ahead and turns.
     """
 
@@ -101,7 +102,7 @@ class Drive:
         return vx, vy, omega
 
     def wheel_speeds(self, vx: float, vy: float, omega: float) -> tuple[float, ...]:
-        """Return the speeds in rad/s with which the wheels roll along; what they cannot follow is ignored."""
+        """Return the speeds in rad/s at which the wheels roll; motion that they cannot follow is ignored."""
         return tuple(x * vx + y * vy + turning * omega for x, y, turning in self.to_speeds)
 
 
@@ -131,10 +132,11 @@ STANDING: Final = Drive((), ())  # of a robot without wheels
 
 
 def _ring(wheels: Sequence[Wheel]) -> Ring | None:
-    """Return the drive of three wheels on radial axles, 120 degrees apart counter-clockwise; None: no ring.
+    """Return the drive of three wheels on radial axles, 120 degrees apart counterclockwise, else None.
 
-    The first one counts: the others may differ by the rounding of a file. Otherwise a robot would turn a
-    little as it drives straight on. The arena's Robotino would not repeat what it did in earlier releases.
+    The first wheel defines the ring: the others may differ by the rounding of a file. Otherwise a robot would
+    turn slightly as it drives straight on, and the arena's Robotino would not repeat its motion of earlier
+    releases.
     """
     if len(wheels) != _THREE or any(wheel.roller for wheel in wheels):
         return None
@@ -162,7 +164,7 @@ def _difference(one: Wheel, other: Wheel) -> float:
 
 
 def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
-    """Return how these wheels drive a robot; None if they cannot steer it."""
+    """Return the drive of a robot with these wheels; None if they cannot steer it."""
     if not wheels or not all(wheel.plausible for wheel in wheels):
         return None
     if ring := _ring(wheels):
@@ -192,7 +194,7 @@ def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
 
 
 class _Hold(NamedTuple):
-    """Where and in which direction the floor holds a wheel, and the meters there that are 1 rad of it."""
+    """The point and direction in which the floor holds a wheel, and its distance in meters for 1 rad."""
 
     x: float
     y: float
@@ -200,7 +202,7 @@ class _Hold(NamedTuple):
     gain_m: float
 
     def arm(self, center: Direction) -> float:
-        """Return the lever of the hold about a point, in meters, positive to the left."""
+        """Return the lever arm of the hold about a point, in meters, positive to the left."""
         return _cross((self.x - center[0], self.y - center[1]), self.direction)
 
     @property
@@ -227,16 +229,16 @@ def _common(grips: Sequence[Direction]) -> Direction | None:
 
 
 def _two_directions(forward: Direction, arms: Sequence[float]) -> list[Twist]:
-    """Return what 1 m/s of each hold adds to the motion of wheels that roll forward and turn."""
+    """Return the motion for 1 m/s of each hold, for wheels that roll forward and turn."""
     count = len(arms)
     squares = math.fsum(arm * arm for arm in arms)
     return [(forward[0] / count, forward[1] / count, arm / squares) for arm in arms]
 
 
 def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]:
-    """Return what 1 m/s of each hold adds to the motion; nothing if the holds leave a freedom.
+    """Return the motion for 1 m/s of each hold; an empty list if the holds leave a freedom.
 
-    The turning is scaled by the longest arm, so that all three unknowns are speeds of the same size.
+    The rotation is scaled by the longest arm, so that all three unknowns are speeds of similar size.
     """
     longest = max(map(abs, arms))
     rows = [(*hold.direction, arm / longest) for hold, arm in zip(holds, arms, strict=True)]
@@ -245,7 +247,7 @@ def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]
     size = (squares[0][0] + squares[1][1] + squares[2][2]) / 3.0
     if _determinant(squares) < _LEAST_VOLUME * size**3:
         return []
-    if len(rows) == len(columns):  # keeps the symmetry of mirrored wheels to the last bit
+    if len(rows) == len(columns):  # this keeps the symmetry of mirrored wheels to the last bit
         solved = list(zip(*_inverse(_rows(rows)), strict=True))
     else:
         inverse = _inverse(squares)
@@ -260,7 +262,7 @@ def _middle(wheels: Sequence[Wheel]) -> Direction:
 
 
 def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Direction:
-    """Return the point without speed across: beside the middle of all wheels, amid those that resist."""
+    """Return the point without lateral speed: the middle of all wheels, moved level with the plain tires."""
     plain = [wheel for wheel in wheels if wheel.roller is None]
     if not plain:
         return middle
@@ -270,7 +272,7 @@ def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Di
 
 
 def _at_origin(row: Twist, center: Direction, gain_m: float) -> Twist:
-    """Return what 1 rad/s of a wheel adds to the motion of the origin, from 1 m/s of its hold at `center`."""
+    """Return the motion of the origin for 1 rad/s of a wheel, from that for 1 m/s of its hold at `center`."""
     vx, vy, omega = row
     return (vx + omega * center[1]) * gain_m, (vy - omega * center[0]) * gain_m, omega * gain_m
 

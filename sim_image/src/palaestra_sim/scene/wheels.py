@@ -1,7 +1,7 @@
-"""What may drive a robot: hinges with motors and a round end, and the belts of tracks.
+"""Find the parts that may drive a robot: hinges with motors and a round end, and the belts of tracks.
 
-A wheel is found by its geometry: a level axle, a round end with its center on the axle, down to the floor. A
-belt counts as a wheel whose rim runs as many meters as its motor, in the middle of the track.
+A wheel is found by its geometry: a level axle, and a round end that has its center on the axle and reaches
+the floor. A belt counts as a wheel in the middle of the track, whose rim moves as many meters as its motor.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.wheel_kinematics import Wheel
 
 _LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
-_OFF_CENTER: Final = 0.2  # of a wheel's radius: how far its center may be off the axle, its rim off the floor
+_OFF_CENTER: Final = 0.2  # of a wheel's radius: tolerance from center to axle, and from rim to floor
 
 
 @dataclass(slots=True, kw_only=True)
 class Driven:
-    """A hinge or a track with a motor, which may be a wheel: what touches the floor, in the robot's frame.
+    """A hinge or a track with a motor, which may be a wheel, in the robot's frame.
 
     Attributes:
         anchor: a point on the axle; of a track, its origin.
         shape: the round end; of a track, the lowest of its shapes.
-        roller: the axis of the roller that stands on the floor; None for a plain tire or a belt.
+        roller: the axis of the roller that touches the floor; None for a plain tire or a belt.
         belt: whether it is a track.
     """
 
@@ -50,12 +50,12 @@ class Driven:
 
     @property
     def radius(self) -> float:
-        """Half the height of what touches the floor."""
+        """Half the height of the part that touches the floor."""
         low, high = self.shape.heights()
         return (high - low) / 2.0 if self.belt else self.shape.size[0] / 2.0
 
     def may_drive(self) -> bool:
-        """Return whether it turns without stops about a level axle, and about its own center."""
+        """Return whether it turns without stops about a level axle through its center."""
         stops = self.motor.spec.stops
         fits = abs(self.axle[2]) < _LEVEL and self.radius > 0.0 and stops[0] == stops[1]
         return fits and (self.belt or self._turns_about_its_center())
@@ -80,7 +80,7 @@ class Driven:
 
 
 def wheels_among(driven: Sequence[Driven]) -> list[Driven]:
-    """Return those that drive: they may, and they reach down to the floor."""
+    """Return the parts that drive: they may drive, and they reach down to the floor."""
     possible = [found for found in driven if found.may_drive()]
     floor = min((found.bottom for found in possible), default=0.0)
     return [found for found in possible if found.bottom <= floor + _OFF_CENTER * found.radius]

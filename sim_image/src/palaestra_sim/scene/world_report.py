@@ -1,4 +1,4 @@
-"""What the stub makes of a world, for its author: `palaestra-stub --check`."""
+"""A report on a world for its author: `palaestra-stub --check`, and the same for other simulators."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Described(Protocol):
 
     @property
     def forces(self) -> bool:
-        """Whether the nodes of the world have masses and frictions that matter."""
+        """Whether the masses and frictions of the world's nodes affect the motion."""
         ...
 
     @property
@@ -43,10 +43,10 @@ class Described(Protocol):
 
 
 def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
-    """Yield lines about robots, stand-ins, and all that was left out.
+    """Yield lines about robots, stand-ins, and all nodes that were left out.
 
-    The world is read with everything left out that the simulator lacks, so that the rest can be described; or
-    with what the user has `chosen` to leave out.
+    All unsupported nodes are left out when the world is read, so that the others can be described; or only
+    those that the user has `chosen` to leave out.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
@@ -68,7 +68,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
 
 
 def _old_release(simulation: Described) -> str:
-    """Return the release of a world whose nodes have other axes than today; "" for another one."""
+    """Return the release of a world whose nodes have older axes; "" for a world with current axes."""
     first = next(iter(simulation.tree.root.nodes()), None)
     if first is None or first.origin is None or not of_old_axes(first):
         return ""
@@ -76,12 +76,12 @@ def _old_release(simulation: Described) -> str:
 
 
 def lacks(simulation: Described) -> list[WorldError]:
-    """Return what was left out because the simulator lacks it."""
+    """Return the nodes that were left out because the simulator does not support them."""
     return [each for each in simulation.left_out if each not in simulation.tree.ignored]
 
 
 def silent_devices(robots: Iterable[Robot]) -> str:
-    """Return how many devices have no readings here, by type; "" if all have."""
+    """Return the number of devices without readings here, by type; "" if all have readings."""
     return _counted(
         Counter(
             kind.node
@@ -94,7 +94,7 @@ def silent_devices(robots: Iterable[Robot]) -> str:
 
 
 def differences(simulation: Described) -> Iterator[str]:
-    """Yield what devices and obstacles of this world have other values for than in Webots."""
+    """Yield the differences of this world's devices and obstacles from Webots."""
     robots = [robot.parts for robot in simulation.robots if robot.parts.arguments is not None]
     devices = [row for robot in robots for row in robot.devices.rows.values()]
     types = Counter(it.type for _, it in devices if isinstance(it, DistanceSensor))
@@ -133,7 +133,7 @@ def _not_in_webots(devices: Iterable[tuple[DeviceType[Any], Any]]) -> Iterator[s
 
 
 def _without_effect(simulation: Described) -> Iterator[str]:
-    """Yield a line for each type of node with fields that have an effect in Webots alone."""
+    """Yield a line for each type of node with fields that have an effect only in Webots."""
     by_ros = [robot.parts.node for robot in simulation.robots if robot.parts.arguments is not None]
     fields: dict[str, Counter[str]] = {}
     for node in simulation.tree.nodes.values():

@@ -7,5 +7,5 @@ TAKEN = ENDS | {signal.SIGCHLD}
 
 
 def hold_back() -> None:
-    """Block the signals until they are received; call it before a second thread starts."""
+    """Block the signals, so that they stay pending until received; call this before another thread starts."""
     signal.pthread_sigmask(signal.SIG_BLOCK, TAKEN)

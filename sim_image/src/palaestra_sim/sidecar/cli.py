@@ -36,9 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
-    """Let `given.work` be a temporary folder inside, where --suffix needs one and --work names none.
+    """Set `given.work` to a temporary folder for the block, if --suffix needs a folder and --work names none.
 
-    The folder is the sidecar's own, since its owner may be killed, and the sidecar then ends in order.
+    The sidecar owns the folder: its parent may be killed, but the sidecar then still shuts down in order.
     """
     if not given.suffix or given.job is not None or given.work is not None:
         yield
@@ -49,7 +49,7 @@ def work_folder(given: argparse.Namespace) -> Iterator[None]:
 
 
 def look_after(given: argparse.Namespace) -> int:
-    """Run the simulators of these options until a signal asks for the end; return the exit code."""
+    """Run the simulators of these options until a signal requests the end; return the exit code."""
     try:
         simulators = prepare(given)
         missing = _missing_controllers(given)
@@ -71,7 +71,7 @@ def look_after(given: argparse.Namespace) -> int:
 
 
 def shut_down(simulators: Sequence[SupervisedSimulator]) -> None:
-    """End all simulators at once and make `run` return; from any thread."""
+    """End all simulators at once and make `run` return; safe from any thread."""
     for simulator in simulators:
         simulator.shut_down()
 
@@ -88,7 +88,7 @@ def run(simulators: Sequence[SupervisedSimulator]) -> None:
 
 
 def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
-    """Return the simulator, and with --standby a second one, not started yet.
+    """Return the simulators, not started yet: one, or two with --standby.
 
     Raises:
         SimError: an option, the world or the program is wrong.
@@ -122,7 +122,7 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
 
 
 def end_with_stdin() -> None:
-    """End, as by SIGTERM, when standard input closes, because its owner is gone."""
+    """When standard input closes, send SIGTERM to this process, because its parent is gone."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
@@ -156,7 +156,10 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
 
 
 def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
-    """Return the file for what the simulator leaves out; None if its world is not in the work folder."""
+    """Return the file for the simulator's report on nodes that it leaves out.
+
+    None if its world is not in the work folder.
+    """
     if given.work is None or world == Path(given.world).absolute():
         return None
     return Path(given.work).absolute() / f"{world.stem}.left-out"

@@ -15,13 +15,13 @@ WORLD = "{world}"  # in a command: the path of the world
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
 
-# Source: Webots' guide, "Command Line Arguments". --batch: no dialog waits for a click.
-# --minimize without --mode would start in fast mode.
+# Source: Webots' guide, "Command Line Arguments". --batch prevents dialogs that wait for a click.
+# With --minimize but without --mode, Webots would start in fast mode.
 _WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr", "--minimize", "--no-rendering")
 
 
 class Driver(StrEnum):
-    """The program that simulates."""
+    """The kinds of simulator programs."""
 
     STUB = "stub"
     MUJOCO = "mujoco"
@@ -31,9 +31,9 @@ class Driver(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """The parts of a start: a world, options of the simulator, and its program for `command`.
+    """The inputs of a start: a world, options of the simulator, and its program for `command`.
 
-    `root` is the folder that the world's files are in; None: the simulator looks for it.
+    `root` is the folder that holds the world's files; None if the simulator has to find it.
     """
 
     world: Path
@@ -46,7 +46,7 @@ def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> C
     """Return the command line that starts the simulator, with the full path of its program.
 
     Raises:
-        SidecarError: there is no such program, or none is given where one is needed.
+        SidecarError: the program does not exist, or none is given where one is needed.
     """
     arguments = _ARGUMENTS[driver](launch)
     own = {**environment, **_ENVIRONMENT[driver](environment)}
@@ -74,21 +74,21 @@ def _command(launch: Launch) -> list[str]:
 
 
 def _nothing(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return no variables: the program inherits those of the container."""
+    """Return no variables: the program inherits the container's environment unchanged."""
     del environment
     return {}
 
 
 def _for_mujoco(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return a variable by which Mesa draws on the simulator's own thread: other simulators share the cores.
+    """Return a variable that makes Mesa render on the simulator's thread: other simulators share the cores.
 
-    MUJOCO_GL stays unset: with it, MuJoCo loads OpenGL at the import, and fails on a machine without.
+    MUJOCO_GL stays unset. If it is set, MuJoCo loads OpenGL at its import, and fails on a machine without it.
     """
     return {_MESA_THREADS: environment.get(_MESA_THREADS, "0")}
 
 
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return Webots' variables: a user, which a container often lacks, and no files beside the world."""
+    """Return Webots' variables: a user, which containers often lack, and one that prevents extra files."""
     return {
         "USER": environment.get("USER", _NOT_ROOT),
         "WEBOTS_DISABLE_SAVE_SCREEN_PERSPECTIVE_ON_CLOSE": "true",
@@ -96,7 +96,7 @@ def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
-    """Return the full path of a program: on the PATH, or beside the running Python."""
+    """Return the full path of a program: on the PATH, or in the folder of the running Python."""
     beside = os.fspath(Path(sys.executable).parent)
     for path in (environment.get("PATH", os.defpath), beside):
         if (found := shutil.which(program, path=path)) is not None:

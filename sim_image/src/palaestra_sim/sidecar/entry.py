@@ -1,7 +1,7 @@
-"""The start of the sidecar's program: it holds back signals, and imports everything else only then.
+"""The start of the sidecar's program: it blocks signals before it imports anything else.
 
-Process 1 of a container loses a signal that comes before it asks for signals. A pod whose trainer ends while
-its sidecars import would stay for its whole grace period.
+Process 1 of a container loses a signal that arrives before the process blocks or handles it. If the trainer
+ended during the imports of the sidecar, the pod would stay for its whole grace period.
 """
 
 import sys

@@ -1,7 +1,7 @@
-"""The file in which a simulator reports what it leaves out of its world.
+"""The file in which a simulator reports the nodes that it leaves out of its world.
 
-The simulator may be any program, so the file is read with bounds. A log would be the wrong place: its lines
-are for people, and no two simulators write them alike.
+The simulator may be any program, so the file is read with limits. A log would not do: its lines are for
+people, and each simulator has its own format.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ _MOST_BYTES = 2**16
 
 
 def read_left_out(file: Path) -> tuple[str, ...]:
-    """Return the lines of the file without empty ones; () if there is no file that can be read."""
+    """Return the lines of the file without empty ones; () if the file cannot be read."""
     try:
         if not file.is_file():  # a pipe would block
             return ()

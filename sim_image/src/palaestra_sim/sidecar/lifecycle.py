@@ -1,4 +1,4 @@
-"""The life of a simulator, as a table.
+"""The lifecycle of a simulator, as a table.
 
     idle     --start-->    starting   spawn
     idle     --shutdown--> idle       nothing
@@ -20,14 +20,14 @@ Rules:
 
 1. A simulator is started only when none runs: in `idle` and `failed`.
 2. The sidecar cannot see whether the simulator is ready; the trainer reports it, after a real round trip.
-3. After an announced stop, an exit is expected, with any code. Before that it is a fault, even with
-   code 0, because a simulator does not end by itself.
-4. A stop waits for the trainer's supervisor to end the simulator; at its deadline the sidecar kills it.
-   A second stop can only bring the deadline forward.
-5. A shutdown of the sidecar is a stop without a trainer: it sends SIGTERM, then kills.
+3. After an announced stop, an exit is expected, with any exit code. Before that it is a fault, even with
+   code 0, because a simulator does not exit by itself.
+4. After a stop request, the trainer's supervisor ends the simulator; at the deadline, the sidecar kills it.
+   A second stop request can only bring the deadline forward.
+5. A shutdown of the sidecar stops the simulator without a trainer: it sends SIGTERM, then kills.
 6. An event that is not in the table is refused and changes nothing.
 
-All decisions about states are in this file; the actions are carried out in `simulator`.
+All decisions about states are in this file; `simulator` runs the actions.
 """
 
 from enum import StrEnum
@@ -37,7 +37,7 @@ from palaestra_protocol.control import SidecarState
 
 
 class LifecycleEvent(StrEnum):
-    """An event: a request of the trainer, of the process, of the clock, or of the container's end."""
+    """An event: a trainer's request, an exit of the process, a deadline, or the shutdown of the container."""
 
     START = "start"
     READY = "ready"
@@ -52,7 +52,7 @@ class Action(StrEnum):
 
     spawn: start the process. wait: let it end by itself, until the deadline of the request.
     terminate: send SIGTERM to its process group, with a deadline. kill: kill all of its processes.
-    note: read what it left out of its world. blame: count a fault. accept: record an expected exit.
+    note: read its report on left-out nodes. blame: count a fault. accept: record an expected exit.
     """
 
     NOTHING = "nothing"

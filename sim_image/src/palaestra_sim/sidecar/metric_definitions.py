@@ -1,4 +1,4 @@
-"""Every metric of a sidecar, by name; `palaestra_sim.sidecar.metrics` reads their values.
+"""Every metric of a sidecar, by name; `palaestra_sim.sidecar.metrics` supplies their values.
 
 They describe the simulator's process. The trainer exports the metrics of the episodes, and Prometheus adds
 the labels of job and simulator.

@@ -25,10 +25,10 @@ With --standby there is a second simulator, slot b, with its own world, ROS name
 (GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
 with "a: " or "b: ". A simulator finds its slot in PALAESTRA_SIMULATOR_SLOT.
 
-With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file in which the simulator may report, before it answers,
-what it leaves out of the world: one line for each kind of node. /state has these lines.
+With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file. Before the simulator is ready, it may write to this
+file which nodes it leaves out of the world: one line for each kind of node. /state has these lines.
 
-exit codes: 0 after SIGTERM or SIGINT, everything ended; 1 the same, but a process hung and was left;
+exit codes: 0 after SIGTERM or SIGINT, if all processes ended; 1 if one of them hung and was left behind;
             2 wrong options or world, a port in use, a missing program: nothing was started
 """
 
@@ -41,7 +41,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options; if they are wrong, end the program with code 2."""
+    """Return the options; if they are wrong, exit with code 2."""
     parser = _Parser(
         prog="palaestra-sidecar",
         description="Start, watch and stop one simulator at its trainer's command.",
@@ -65,7 +65,7 @@ def _add_simulator(parser: argparse.ArgumentParser) -> None:
         "--root",
         type=Path,
         metavar="DIR",
-        help="a folder above the world, with all that it names; default: the nearest, or its Webots project",
+        help="a folder above the world that holds all its files; default: the nearest, or its Webots project",
     )
     group.add_argument(
         "--option", action="append", default=[], metavar="X", help="option for the simulator; repeatable"
@@ -79,7 +79,7 @@ def _add_listeners(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("listeners (port 0: any free port)")
     group.add_argument("--control", type=_address, default="127.0.0.1:7100", metavar="HOST:PORT")
     group.add_argument("--health", type=_address, default="0.0.0.0:7200", metavar="HOST:PORT")
-    group.add_argument("--until-stdin-closes", action="store_true", help="end too when standard input closes")
+    group.add_argument("--until-stdin-closes", action="store_true", help="exit also when stdin closes")
 
 
 def _add_identity(parser: argparse.ArgumentParser) -> None:
@@ -98,9 +98,9 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
         "--suffix",
         default="",
         metavar="TEXT",
-        help="without --job: appended to the names in the world; without --work its copy is temporary",
+        help="without --job: text to append to the world's names; without --work the copy is temporary",
     )
-    group.add_argument("--standby", action="store_true", help="have a second simulator as a standby")
+    group.add_argument("--standby", action="store_true", help="add a second simulator as a standby")
 
 
 def _address(text: str) -> Address:

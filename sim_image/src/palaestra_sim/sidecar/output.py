@@ -1,8 +1,8 @@
 """Write whole lines to standard output, the simulator's and the sidecar's own.
 
-A line is written at once and is never longer than a pipe takes in one piece. So lines of several writers
-do not mix, and no writer holds a lock while it waits for a full pipe. A simulator that prints faster than
-the container's log reads has to wait too: only one line is kept here.
+A line is written at once and is never longer than one atomic write to a pipe. So lines of several writers do
+not mix, and no writer holds a lock while it waits for a full pipe. If a simulator prints faster than the
+container's log reads, it has to wait: the sidecar buffers only one line.
 """
 
 import logging
@@ -12,7 +12,7 @@ import select
 from palaestra_protocol.masking import masked
 
 STDOUT = 1
-MOST_LINE = select.PIPE_BUF  # 4096: the most that POSIX writes into a pipe in one piece
+MOST_LINE = select.PIPE_BUF  # 4096: the most that Linux writes to a pipe atomically
 _CHUNK = 65536
 
 
@@ -52,7 +52,7 @@ class Passage:
         self._most = MOST_LINE - 1 - len(self._mark)
 
     def run(self) -> None:
-        """Forward everything; return when all writers have closed the pipe. Closes the pipe."""
+        """Forward everything; after all writers have closed the pipe, close it too and return."""
         rest = b""
         while chunk := os.read(self._source, _CHUNK):
             *lines, rest = (rest + chunk).split(b"\n")
@@ -66,7 +66,7 @@ class Passage:
         os.close(self._source)
 
     def _pass_on(self, line: bytes) -> None:
-        """Write one line, in pieces if it is too long."""
+        """Write one line, in several parts if it is too long."""
         if line.strip():
             self.last_line = line[:MOST_LINE].decode("utf-8", "replace").strip()
         for start in range(0, max(1, len(line)), self._most):

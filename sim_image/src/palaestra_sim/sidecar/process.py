@@ -1,8 +1,8 @@
-"""The one module that starts processes: a simulator, under a reaper that ends everything it started.
+"""The one module that starts processes: a simulator, under a reaper that ends all of its descendants.
 
-The sidecar talks to the reaper through two pipes and learns of its end through threads, so nothing here
-blocks. The whole sidecar reaps children, because it may be process 1 of its container: `reap` takes every
-child that ended, both reapers and the orphans that only process 1 gets.
+The sidecar talks to the reaper through two pipes, and threads wait for its end, so nothing here blocks. The
+sidecar reaps children for the whole container, because it may be process 1: `reap` collects every child that
+ended, both reapers and the orphans that only process 1 inherits.
 """
 
 import contextlib
@@ -21,10 +21,10 @@ from palaestra_sim.sidecar.output import Passage
 _REAPER = Path(reaper.__file__)
 # In /proc/PID/stat after the name: time of the process, and of its children that have ended, in ticks.
 _OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
-_LAST_OUTPUT_S = 0.2  # for lines that are still in the pipe after the simulator has ended
+_LAST_OUTPUT_S = 0.2  # time for lines that are still in the pipe after the simulator has ended
 
 _reapers: set[int] = set()  # running reapers: the only children that are not orphans
-_reapers_lock = threading.Lock()  # a reaper is not in the set until its start returns
+_reapers_lock = threading.Lock()  # held from the start of a reaper until it is in the set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,17 +38,17 @@ class CommandLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Started:
-    """The simulator's first process runs."""
+    """A report: the simulator's first process runs."""
 
     pid: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """The simulator and everything that it had started have ended.
+    """A report: the simulator and all of its descendants have ended.
 
     `code` or `signal` (as "SIGBUS") is set; if both are unknown, `problem` is the reason.
-    `last_line` is the last line that it printed.
+    `last_line` is the last line that the simulator printed.
     """
 
     code: int | None = None
@@ -82,7 +82,7 @@ class SimulatorProcess:
 
     @classmethod
     def start(cls, command: CommandLine, report: Report) -> Self:
-        """Start a simulator; `report` is called from a thread: with Started, and at the end once with Ended.
+        """Start a simulator; a thread calls `report`: with Started, and at the end once with Ended.
 
         Raises:
             OSError: the system cannot start another process.
@@ -114,40 +114,40 @@ class SimulatorProcess:
         self._say(reaper.KILL)
 
     def close(self) -> None:
-        """Close the pipe to the reaper, which then kills all that is left."""
+        """Close the pipe to the reaper, which then kills all remaining processes."""
         _close(self._commands)
 
     def usage(self) -> Usage:
-        """Return the usage of all processes of the simulator; shared pages count twice. From any thread."""
+        """Return the usage of all processes of the simulator; shared pages count twice. Thread-safe."""
         below = found = reaper.children({self.reaper})
         while found := reaper.children(found):
             below |= found
         ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
         cpu_s = (ticks + _ticks(self.reaper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
-        self._cpu_s = max(self._cpu_s, cpu_s)  # a process that ends meanwhile may be missing in both
+        self._cpu_s = max(self._cpu_s, cpu_s)  # a process that ends during the count may be missing in both
         pages = sum(_resident_pages(pid) for pid in below)
         return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)
 
     def _say(self, command: bytes) -> None:
-        with contextlib.suppress(BrokenPipeError):  # it has ended, and Ended will be reported
+        with contextlib.suppress(BrokenPipeError):  # the reaper has ended, so Ended will be reported
             os.write(self._commands, command)
 
 
 def reap() -> None:
-    """Take the exit status of every child that has ended, so that none stays a zombie."""
+    """Collect the exit status of every child that has ended, so that none stays a zombie."""
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
 
 
 def _resident_pages(pid: int) -> int:
-    with contextlib.suppress(OSError, IndexError):  # the process ended meanwhile
+    with contextlib.suppress(OSError, IndexError):  # the process may have ended
         return int(Path(f"/proc/{pid}/statm").read_bytes().split()[1])
     return 0
 
 
 def _ticks(pid: int, fields: slice) -> int:
-    with contextlib.suppress(OSError, ValueError):  # the process ended meanwhile
+    with contextlib.suppress(OSError, ValueError):  # the process may have ended
         behind_name = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2]
         return sum(int(field) for field in behind_name.split()[fields])
     return 0
@@ -189,7 +189,7 @@ def _end_orphans() -> None:
     """Kill the descendants of a reaper that was killed itself; they are now children of this process."""
     while orphans := _kill_orphans():
         for pid in orphans:
-            with contextlib.suppress(ChildProcessError):  # reaped by the signals' thread
+            with contextlib.suppress(ChildProcessError):  # the signal thread has reaped it
                 os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         reap()
 

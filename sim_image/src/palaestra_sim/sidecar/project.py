@@ -1,11 +1,11 @@
-"""Lay a generated world out as a Webots project, around which Webots finds what the source world has.
+"""Lay a generated world out as a Webots project, in which Webots finds the files of the source world.
 
 Webots takes the parent of a world's folder as its project, and looks there for `controllers/<name>/`, PROTOs
-and plugins. If a controller is missing, it starts `<generic>`, with a warning only. So the generated world
-gets a folder like that of its source, with links to everything beside the source and beside its folder. A
-world that names files above its project gets the folders up to them, with such links in each.
+and plugins. If a controller is missing, Webots only prints a warning and starts `<generic>`. So the generated
+world gets a folder like that of its source, with links to everything next to the source and next to its
+folder. If a world names files above its project, the folders up to them are made too, each with such links.
 
-A world from a ConfigMap has no project: the files beside its folder belong to others and are not linked.
+A world from a ConfigMap has no project: the files next to its folder belong to others and are not linked.
 """
 
 import os
@@ -17,7 +17,7 @@ from palaestra_sim.world import own_controllers, placed
 
 # Source: Webots' guide, "The Standard File Hierarchy of a Project". One of them makes a folder a project.
 FOLDERS = ("controllers", "libraries", "plugins", "protos")
-# Source: Filesystem Hierarchy Standard 3.0, with /proc and /sys. A world in /worlds needs none of them.
+# Source: Filesystem Hierarchy Standard 3.0, with /proc and /sys. A world in /worlds does not need these.
 _OF_THE_SYSTEM = frozenset(
     {
         *("bin", "boot", "dev", "etc", "lib", "lib32", "lib64", "libx32", "lost+found"),
@@ -25,7 +25,7 @@ _OF_THE_SYSTEM = frozenset(
     }
 )
 _EXTRA_PROJECTS = "WEBOTS_EXTRA_PROJECT_PATH"  # a list, as PATH
-_MOST_NAMED = 20  # robots in a warning, which is one line of the log
+_MOST_NAMED = 20  # robots named in a warning, which is one line of the log
 
 
 def has_project(world: Path) -> bool:
@@ -35,13 +35,13 @@ def has_project(world: Path) -> bool:
 
 
 def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
-    """Return the folder for a world that is made from `world`, in the folder `project`.
+    """Return the folder for a world that is generated from `world`, in the folder `project`.
 
-    With `linked`, everything that is beside `world`, and beside each folder from it up to `root`, is linked
-    at the same relative place. Links of an earlier start are renewed. All paths are absolute.
+    With `linked`, everything next to `world`, and next to each folder from it up to `root`, is linked at the
+    same relative path. Links of an earlier start are renewed. All paths are absolute.
 
     Raises:
-        SidecarError: `project` is the project of `world` itself, or that cannot be read.
+        SidecarError: `project` is the project of `world` itself, or a folder cannot be read.
         OSError: the folder cannot be written.
     """
     folders = dict(_folders(world, project, root))
@@ -54,7 +54,7 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
         raise SidecarError(f"--world: {error.filename}: {error.strerror}; make it readable") from error
     for made in folders:
         if made.is_symlink():
-            made.unlink()  # it was beside the folder of another world of this project
+            made.unlink()  # a link from an earlier start, for another world of this project
         made.mkdir(parents=True, exist_ok=True)
     for link in [link for made in folders for link in made.iterdir()]:
         if link not in wanted and _is_ours(link, folders.values()):
@@ -65,12 +65,12 @@ def lay_out(world: Path, project: Path, root: Path, *, linked: bool) -> Path:
 
 
 def missing_controllers(world: Path, source: bytes, environment: Mapping[str, str]) -> str | None:
-    """Return a warning about the robots of a world without a project whose controllers Webots cannot find.
+    """Return a warning about robots whose controllers Webots cannot find, for a world without a project.
 
     None if every controller can be found. `environment` is that of Webots: it may name more projects.
 
     Raises:
-        WorldError: `source` is no world file.
+        WorldError: `source` is not a world file.
     """
     if has_project(placed(world)):
         return None
@@ -94,9 +94,9 @@ def missing_controllers(world: Path, source: bytes, environment: Mapping[str, st
 
 
 def _folders(world: Path, project: Path, root: Path) -> Iterator[tuple[Path, Path]]:
-    """Yield the folders to make for a world, from `project` to its own, each with the one it stands for."""
+    """Yield each folder to make for a world, from `project` to the world's own, with its source folder."""
     names = world.parent.relative_to(root).parts
-    if not names:  # no project is around it
+    if not names:  # the world has no project
         yield project / "worlds", world.parent
         return
     for count in range(len(names) + 1):
@@ -113,7 +113,7 @@ def _links(folders: Mapping[Path, Path]) -> Iterator[tuple[Path, Path]]:
 
 
 def _inside(source: Path, folder: Path) -> Iterator[Path]:
-    """Yield what is in `source`, except what the system owns and what contains `folder`, which would loop."""
+    """Yield the entries of `source` except system folders and the one with `folder`, which would loop."""
     for path in source.iterdir():
         of_the_system = source == source.parent and path.name in _OF_THE_SYSTEM
         if not of_the_system and not folder.is_relative_to(path):
@@ -121,7 +121,7 @@ def _inside(source: Path, folder: Path) -> Iterator[Path]:
 
 
 def _is_ours(link: Path, sources: Collection[Path]) -> bool:
-    """Return whether an earlier start of this container made this link to what is in one of `sources`."""
+    """Return whether an earlier start of this container made this link, to an entry of one of `sources`."""
     if not link.is_symlink():
         return False
     target = link.readlink()
@@ -129,7 +129,7 @@ def _is_ours(link: Path, sources: Collection[Path]) -> bool:
 
 
 def _link(link: Path, target: Path) -> None:
-    """Make a link; keep an equal one, which the other simulator may be using, and a world written there."""
+    """Make a link; keep an equal link, which the other simulator may be using, and keep a written world."""
     if link.is_symlink():
         if link.readlink() == target:
             return
@@ -141,7 +141,7 @@ def _link(link: Path, target: Path) -> None:
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
-    except OSError:  # it may not be read, by Webots neither
+    except OSError:  # Webots may not read it either
         return False
 
 

@@ -1,20 +1,21 @@
-"""Stand between the sidecar and its simulator, so that nothing the simulator starts can outlive them.
+"""The reaper: a program between the sidecar and its simulator; no process of the simulator can outlive them.
 
-It is a program of its own, one for each start of the simulator: `python -I -S reaper.py PROGRAM ...`
-with a pipe from the sidecar as standard input, and a pipe to it as descriptor 3:
+It runs once for each start of the simulator, as `python -I -S reaper.py PROGRAM ...`. A pipe from the
+sidecar is its standard input, and a pipe to the sidecar is its descriptor 3:
 
     in   T             send SIGTERM to the simulator's process group
          K, or EOF     kill everything; EOF also arrives when the sidecar was killed with SIGKILL
     out  started PID   the simulator's first process
          error ERRNO   its program could not be run
-         exit STATUS   it ended, with this wait status, and so did everything that it had started
+         exit STATUS   it ended, with this wait status, and so did all of its descendants
 
 It is a subreaper: a descendant that loses its parent becomes its child, even after `setsid`, a double
-fork or a change of environment. A process group, a parent-death signal or a mark would lose such a
-process. So it kills its children until there are none. Each killed parent hands over its own children
-before its end is visible (Linux: exit_notify). That needs no timer: SIGCHLD triggers the next search.
+fork or a change of environment. A process group, a parent-death signal or a marker in the environment would
+lose such a process. So the reaper kills its children until none is left. Each killed parent hands over its
+own children before its end is visible (Linux: exit_notify). That needs no timer: SIGCHLD triggers the next
+search.
 
-Linux and the standard library only, and no import from this package: it is started as a file.
+It uses Linux and the standard library only, and imports nothing from this package: it is started as a file.
 """
 
 import contextlib
@@ -32,7 +33,7 @@ KILL = b"K"
 _PR_SET_CHILD_SUBREAPER = 36  # Source: linux/prctl.h
 _GIVE_UP_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
 _NOT_RUN = 127  # as in a shell
-_PARENT = 1  # among the fields behind the name in /proc/PID/stat: state, parent, ...
+_PARENT = 1  # index among the fields after the name in /proc/PID/stat: state, parent, ...
 
 
 def adopt_orphans() -> None:
@@ -51,7 +52,7 @@ def children(parents: set[int]) -> set[int]:
     found = set()
     for name in os.listdir("/proc"):
         if name.isdigit():
-            with contextlib.suppress(OSError):  # it ended meanwhile
+            with contextlib.suppress(OSError):  # the process may have ended
                 with open(f"/proc/{name}/stat", "rb") as file:
                     fields = file.read().rpartition(b")")[2].split()
                 if int(fields[_PARENT]) in parents:
@@ -66,13 +67,13 @@ def kill_children(spared: frozenset[int] = frozenset()) -> set[int]:
     """
     found = children({os.getpid()}) - spared
     for pid in found:
-        with contextlib.suppress(OSError):  # it runs as another user now, which must end it
+        with contextlib.suppress(OSError):  # it runs as another user now, who must end it
             os.kill(pid, signal.SIGKILL)
     return found
 
 
 def main() -> None:
-    """Start the program in `argv`, obey the commands, and return when none of its processes is left."""
+    """Start the program in `argv`, run the commands, and return when none of its processes is left."""
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     adopt_orphans()
@@ -88,7 +89,7 @@ def main() -> None:
 
 
 def _keep(pid: int, woken: int) -> int:
-    """Return the wait status of `pid` when it and all of its descendants have ended."""
+    """Return the wait status of `pid` after it and all of its descendants have ended."""
     status: int | None = None
     ending = False
     while True:
@@ -111,10 +112,10 @@ def _keep(pid: int, woken: int) -> int:
 
 
 def _obey(pid: int) -> bool:
-    """Carry out the sidecar's commands for `pid`, which is not reaped yet; return whether to kill."""
+    """Run one command of the sidecar for `pid`, which is not reaped yet; return whether to kill."""
     command = os.read(COMMANDS, 1)
     if command == TERMINATE:
-        with contextlib.suppress(ProcessLookupError):  # it has no group yet
+        with contextlib.suppress(ProcessLookupError):  # it does not have a group yet
             os.killpg(pid, signal.SIGTERM)
     return command != TERMINATE
 
@@ -139,7 +140,7 @@ def _spawn(arguments: list[str]) -> int:
         os.setsid()
         os.dup2(os.open(os.devnull, os.O_RDONLY), COMMANDS)
         for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE, signal.SIGXFSZ):
-            signal.signal(number, signal.SIG_DFL)  # the program would inherit an ignored signal
+            signal.signal(number, signal.SIG_DFL)  # otherwise the program would inherit the ignored signal
         _yield_to_the_trainer()
         os.execv(arguments[0], arguments)  # noqa: S606 - the sidecar's own command line
     except OSError as error:
@@ -150,14 +151,15 @@ def _spawn(arguments: list[str]) -> int:
 def _yield_to_the_trainer() -> None:
     """Set a scheduling policy with which the program does not preempt a trainer on the same processor.
 
-    A trainer that wakes one simulator by a request has others to wake, and was preempted at nearly each.
+    A trainer wakes its simulators one after another by requests. Without this, a woken simulator preempted
+    the trainer at nearly each request.
     """
-    with contextlib.suppress(OSError):  # optional: sandboxes may refuse it
+    with contextlib.suppress(OSError):  # optional, because sandboxes may refuse it
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _report(line: str) -> None:
-    """Report to the sidecar, if it is still there."""
+    """Report to the sidecar, if it still runs."""
     with contextlib.suppress(BrokenPipeError):
         os.write(REPORTS, f"{line}\n".encode())
 

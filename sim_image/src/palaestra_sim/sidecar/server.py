@@ -1,7 +1,7 @@
-"""The routes of a sidecar's two ports, and nothing of what they mean to the simulator.
+"""The routes of a sidecar's two ports; `simulator` decides what a request does.
 
 Control is for the trainer of the same pod and has no authentication, so it listens on loopback only.
-Health is for everybody who may reach the pod, so it takes no requests that change something.
+Health is for all clients that can reach the pod, so none of its requests changes anything.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,11 +24,11 @@ from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import LifecycleEvent
 from palaestra_sim.sidecar.simulator import CommandResult, NoAnswer, SupervisedSimulator
 
-_ABOVE = ("", STANDBY)  # the paths of the first simulator, and of one that stands by for it
+_ABOVE = ("", STANDBY)  # path prefixes of the first simulator and of its standby
 
 
 def bound(option: str, address: Address, routes: Routes) -> Server:
-    """Return a server of these routes, which does not answer yet.
+    """Return a server for these routes, not yet started.
 
     Args:
         option: the option with the address, for messages.
@@ -36,7 +36,7 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
         routes: its paths.
 
     Raises:
-        SidecarError: the address is in use, or not of this machine.
+        SidecarError: the address is in use, or does not belong to this machine.
     """
     try:
         return Server(address, routes, name="palaestra-sidecar")
@@ -73,7 +73,7 @@ def health_routes(simulators: Sequence[SupervisedSimulator], registry: Collector
 
 
 def _state(simulator: SupervisedSimulator) -> Route:
-    """Return the route of a question for a simulator's state."""
+    """Return the route of a request for a simulator's state."""
     return lambda _: json_response(HTTPStatus.OK, simulator.as_answered().to_json())
 
 
@@ -104,7 +104,7 @@ def _stop(simulator: SupervisedSimulator) -> Route:
 
 
 def _asked(ask: Callable[[], CommandResult]) -> Response:
-    """Return the answer of the simulator's owner to a request."""
+    """Return the response of the simulator's owner to a request."""
     try:
         answer = ask()
     except NoAnswer as error:

@@ -1,8 +1,8 @@
-"""The signals of the sidecar, received by one thread that waits for nothing else.
+"""The signals of the sidecar, received by one thread that only waits for signals.
 
-They are blocked everywhere (`blocked`) and received with sigtimedwait. A handler would not be enough: Python
-runs handlers in the main thread, so a signal that arrives just before that thread blocks on something else
-wakes no thread. Process 1 receives blocked signals too, although it has no handler for them.
+They are blocked in all threads (`blocked_signals`) and received with sigtimedwait. A handler would not be
+enough: Python runs handlers in the main thread, so a signal that arrives just before that thread blocks on
+another wait does not wake it. Process 1 receives blocked signals too, although it has no handler for them.
 """
 
 import os
@@ -15,12 +15,12 @@ from palaestra_sim.sidecar.blocked_signals import ENDS, TAKEN
 from palaestra_sim.sidecar.process import reap
 from palaestra_sim.sidecar.reaper import adopt_orphans
 
-SHUTDOWN_S = 1.8  # the sidecar ends this long after the first signal, even if something hangs
+SHUTDOWN_S = 1.8  # the sidecar exits at most this long after the first signal, even if something hangs
 EXIT_HUNG = 1
 
 
 def take(shut_down: Callable[[], None]) -> None:
-    """Reap children and obey SIGTERM and SIGINT from now on, in a thread of its own.
+    """From now on, reap children and handle SIGTERM and SIGINT, in a separate thread.
 
     `shut_down` is called at the first SIGTERM or SIGINT. Orphaned descendants of this process become its
     children, as if it were process 1.
@@ -37,4 +37,4 @@ def _take(shut_down: Callable[[], None]) -> None:
     while (left_s := give_up - time.monotonic()) > 0:
         signal.sigtimedwait(TAKEN, left_s)
         reap()
-    os._exit(EXIT_HUNG)  # the reaper reads the end of its pipe and ends the rest
+    os._exit(EXIT_HUNG)  # this closes the pipe to the reaper, which ends the remaining processes

@@ -1,7 +1,7 @@
-"""The simulator of this sidecar: the one owner of its state.
+"""A simulator of this sidecar: the one owner of its state.
 
-Requests, reports of the process, the deadline of a stop and the end of the container all become messages
-in one queue, and one thread takes them in order. So no two of them can act on the same state, and no lock
+Requests, reports of the process, the deadline of a stop and the shutdown of the container all become messages
+in one queue, and one thread handles them in order. So no two of them can act on the same state, and no lock
 is needed. Other threads read `state`, an immutable value that is replaced as a whole.
 """
 
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class NoAnswer(TimeoutError):
-    """The owner of the state did not answer a request in time."""
+    """The owner of the state did not respond to a request in time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,8 @@ class SupervisedSimulator:
     Args:
         command: starts the simulator.
         state: the state before the first start.
-        left_out: the file in which the simulator reports what it leaves out; None: it has none.
+        left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
+            file.
         clock: returns seconds, from any origin.
     """
 
@@ -88,20 +89,20 @@ class SupervisedSimulator:
         }
 
     def ask(self, event: LifecycleEvent, deadline_s: float = 0.0) -> CommandResult:
-        """Return the answer to a request; from any thread but the owner's.
+        """Send a request to the owner and return the result; safe from any thread except the owner's.
 
         Raises:
-            NoAnswer: the owner is stuck, or has ended.
+            NoAnswer: the owner hangs, or has ended.
         """
         answers: queue.SimpleQueue[CommandResult] = queue.SimpleQueue()
         self._inbox.put(_Message(event=event, deadline_s=deadline_s, answers=answers))
         try:
             return answers.get(timeout=_ANSWER_S)
         except queue.Empty:
-            raise NoAnswer(f"no answer to {event} within {_ANSWER_S:g} s") from None
+            raise NoAnswer(f"no response to {event} within {_ANSWER_S:g} s") from None
 
     def shut_down(self) -> None:
-        """End the simulator and make `run` return; from any thread."""
+        """End the simulator and make `run` return; safe from any thread."""
         self._inbox.put(_Message(event=LifecycleEvent.SHUTDOWN))
 
     def as_answered(self) -> SimulatorState:
@@ -111,12 +112,12 @@ class SupervisedSimulator:
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def usage(self) -> Usage:
-        """Return the usage of its processes; zero if none runs. From any thread."""
+        """Return the usage of its processes; zero if none runs. Safe from any thread."""
         process = self._process
         return Usage() if process is None else process.usage()
 
     def run(self) -> None:
-        """Process messages in order, until a shutdown has ended the simulator."""
+        """Handle messages in order, until a shutdown has ended the simulator."""
         while not (self._closing and self._process is None):
             message = self._next()
             if isinstance(message, Started):
@@ -132,7 +133,7 @@ class SupervisedSimulator:
             return _Message(event=LifecycleEvent.DEADLINE)
 
     def _take(self, message: _Message) -> None:
-        """Carry out the table's action for one message, and answer it."""
+        """Run the table's action for one message, and send the result."""
         self._closing |= message.event is LifecycleEvent.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:
@@ -189,7 +190,7 @@ class SupervisedSimulator:
         return self._after(message.ended or Ended(), state, expected=True)
 
     def _after(self, ended: Ended, state: SimulatorState, *, expected: bool) -> SimulatorState:
-        """Close the process that ended; return the state with its exit."""
+        """Close the process that ended; return the state with its last exit."""
         if self._process is not None:
             self._process.close()
         self._process = None
@@ -198,13 +199,13 @@ class SupervisedSimulator:
         return replace(state, pid=None, last_exit=last)
 
     def _to_end_within(self, deadline_s: float, state: SimulatorState) -> SimulatorState:
-        """Set the deadline of the kill, if it is earlier than the current one. Return the state with it."""
+        """Set the time of the kill, if it is earlier than the current one; return the new state."""
         kill_at = self._clock() + deadline_s
         self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
         return replace(state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
 
     def _report(self, report: Started | Ended) -> None:
-        """Receive a report from the process's thread."""
+        """Receive a report from a thread of the process."""
         if isinstance(report, Ended):
             self._inbox.put(_Message(event=LifecycleEvent.EXITED, ended=report))
         else:
@@ -212,7 +213,7 @@ class SupervisedSimulator:
 
 
 def _described(ended: Ended) -> tuple[str, str]:
-    """Return the kind of a faulty end, and a sentence about it."""
+    """Return the kind of an unexpected end, and a sentence about it."""
     said = f"; it said last: {ended.last_line}" if ended.last_line else ""
     if ended.code is not None:
         return "code", f"the simulator ended with code {ended.code}{said}"

@@ -1,8 +1,8 @@
-"""Put the world that the simulator will run where it can run it.
+"""Write the file of the world that the simulator will run, in a folder where it finds all other files.
 
-Only the sidecar writes names into a world. It gets a source world, from the image or from the replica's
-ConfigMap. ConfigMaps of older releases hold a generated world for each simulator; the generator makes the
-same world again from a generated one.
+Only the sidecar writes ROS names into a world. It gets a source world, from the image or from the replica's
+ConfigMap. ConfigMaps of older releases hold a generated world for each simulator. From a generated world, the
+generator produces the same world again.
 """
 
 import os
@@ -32,7 +32,7 @@ def read(world: Path) -> bytes:
     """Return the bytes of a world.
 
     Raises:
-        SidecarError: the file does not exist, or may not be read.
+        SidecarError: the file does not exist, or cannot be read.
     """
     try:
         return read_bounded(world)
@@ -49,11 +49,11 @@ def named(
     as_project: bool = False,
     root: Path | None = None,
 ) -> Path:
-    """Write this simulator's world, made from `world`, into the folder `work`; return its path.
+    """Write this simulator's world, generated from `world`, into the folder `work`; return its path.
 
-    With `as_project`, or if the world refers to files beside it, it is written into a Webots project in
-    `work`, with links to the files around `world`. These go up to `root`; None: to the nearest folder that
-    holds all files.
+    With `as_project`, or if the world names files by paths relative to it, the result is a Webots project in
+    `work`, with links to the files around `world`. The links reach up to `root`; if it is None, to the
+    nearest folder that holds all files.
 
     Raises:
         WorldError: the world is wrong.
@@ -82,7 +82,7 @@ def renamed(
 
 
 def root_of(world: Path, given: Path | None) -> Path:
-    """Return the folder around `world` that holds all that it names: `given`, or the nearest one.
+    """Return the folder around `world` that holds all files that it names: `given`, or the nearest one.
 
     Raises:
         WorldError, SidecarError: as `named` does.
@@ -96,7 +96,7 @@ def root_of(world: Path, given: Path | None) -> Path:
 
 
 def root_of_model(world: Path, given: Path | None) -> Path | None:
-    """Return the same for a model of MuJoCo; None for another world, of which no simulator here asks it.
+    """Return the same for an MJCF model; None for another world, for which no simulator here needs it.
 
     Raises:
         WorldError, SidecarError: as `named` does.

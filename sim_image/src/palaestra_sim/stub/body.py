@@ -1,7 +1,7 @@
 """A robot on the floor: from the speed of its base to a pose, basic step by basic step.
 
 A robot is one or several upright cylinders. An obstacle pushes it out along the normal, so that it slides
-while its wheels turn. There is no mass, no bounce and no friction. Everything is a function of the commands.
+while its wheels turn. There is no mass, no bounce and no friction. The motion depends only on the commands.
 """
 
 from __future__ import annotations
@@ -17,29 +17,28 @@ from palaestra_sim.stub.obstacles import Contact, Disc, FlatObstacle, Neighborho
 from palaestra_sim.stub.outline import RoundPart
 
 _PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
-_RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, give or take rounding
-_STRIDE: Final = 0.3  # of the smallest radius: how far a robot may move before it looks for contacts
+_RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, up to rounding
+_STRIDE: Final = 0.3  # of the smallest radius: maximum motion between two checks for contacts
 
 
 class StubBody(Disc):
     """A robot of upright cylinders: see `Body`.
 
-    Its own disc is the one around all of them.
+    As a `Disc` it is the disc around all of them.
 
     Args:
         base: its wheels.
-        outline: the cylinders; none: nothing can run into it.
-        rim: for each cylinder, the shape that it is of.
+        outline: the cylinders; without any, nothing can touch it.
+        rim: for each cylinder, the shape to which it belongs.
         heights: z of their lower and upper ends, in the robot's frame.
 
     Attributes:
-        base: as given.
-        rim, heights: as given.
+        base, rim, heights: the arguments.
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: the parts that were touched since the bumpers were last read, a bit each (part 0 is 1); their
-            reader clears it.
+        touched: the cylinders that were touched since the bumpers were last read, one bit each (the first is
+            1); the bumpers' reader clears it.
     """
 
     __slots__ = (
@@ -71,7 +70,7 @@ class StubBody(Disc):
         self.heights = heights
         self._parts = tuple(outline)
         self._stride_m = _STRIDE * min((radius for _, _, radius in outline), default=0.0)
-        # Of the farthest axis; a turn moves nothing of a cylinder that stands in the middle.
+        # Distance of the farthest axis; a turn does not move a cylinder whose axis is in the middle.
         self._arm_m = max((math.hypot(x, y) for x, y, _ in outline), default=0.0)
         self._solids = Neighborhood((), 0.0)
         self._others: tuple[StubBody, ...] = ()
@@ -92,7 +91,7 @@ class StubBody(Disc):
         ]
 
     def bits(self, outline: Sequence[Shape]) -> int:
-        """Return the cylinders that are of these shapes, as bits of `touched`."""
+        """Return the cylinders that belong to these shapes, as bits of `touched`."""
         return sum(1 << index for index, shape in enumerate(self.rim) if shape in outline)
 
     def face(self, solids: Neighborhood, others: Sequence[StubBody]) -> None:
@@ -101,7 +100,7 @@ class StubBody(Disc):
         self._others = tuple(others)
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        """Return the push that moves a round robot at x, y out of this one; None if they do not touch."""
         deepest: Contact | None = None
         for disc in self.discs:
             contact = disc.contact(x, y, radius)
@@ -115,7 +114,7 @@ class StubBody(Disc):
             disc.scan(frame, rays, reach)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Place the robot somewhere; its motion continues."""
+        """Set the position and heading of the robot; its motion continues."""
         self.x = x
         self.y = y
         self.heading_rad = heading_rad
@@ -123,24 +122,24 @@ class StubBody(Disc):
         self.s = math.sin(heading_rad)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters the first part and leaves the last; enter > leave: it misses."""
+        """Return the meters to where a ray enters and leaves the first part; enter > leave if it misses."""
         crossings = [disc.crossing(frame, ray) for disc in self.discs]
         met = [crossing for crossing in crossings if crossing[1] >= 0.0 and crossing[0] <= crossing[1]]
         return min(met, default=(math.inf, -math.inf))
 
     def halt(self) -> None:
-        """Stop all motion; the motors begin again from rest."""
+        """Stop all motion; the motors start from rest."""
         self.base.halt()
         self.velocity = (0.0, 0.0, 0.0)
         self.touched = 0
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors start from there."""
+        """Give the body a velocity in world axes; its motors continue from there."""
         self.base.push(vx * self.c + vy * self.s, vy * self.c - vx * self.s, omega)
         self.velocity = (vx, vy, omega)
 
     def advance(self, step_s: float) -> None:
-        """Move on by one basic step."""
+        """Move the robot by one basic step."""
         if self.base.turn(step_s):
             self._move(step_s)
         else:
@@ -148,7 +147,7 @@ class StubBody(Disc):
             self._push_out()
 
     def _move(self, step_s: float) -> None:
-        """Drive along an arc, in strides short enough that nothing is passed through."""
+        """Drive along an arc, in strides short enough that the robot passes through nothing."""
         base = self.base
         c = self.c
         s = self.s
@@ -194,7 +193,7 @@ class StubBody(Disc):
                 return
 
     def _leave(self, obstacle: FlatObstacle) -> bool:
-        """Push the robot out of one obstacle; return whether it was clear of it."""
+        """Push the robot out of one obstacle; return whether it did not touch it."""
         clear = True
         bit = 1
         for along, aside, radius in self._parts:
@@ -213,7 +212,7 @@ class StubBody(Disc):
         return clear
 
     def feel(self, x: float, y: float, radius: float) -> None:
-        """Note which parts a round robot at x, y touches."""
+        """Record which parts a round robot at x, y touches."""
         for index, disc in enumerate(self.discs):
             contact = disc.contact(x, y, radius)
             if contact is not None and contact[2] > _RESTING_M:

@@ -9,7 +9,7 @@ from palaestra_sim.stub.physics import StubPhysics
 
 STUB = Program(
     name="palaestra-stub",
-    description="Simulate a world, and answer over ROS 1 like the `ros` controller of Webots.",
+    description="Simulate a world with the ROS 1 interface of Webots' `ros` controller.",
     physics=StubPhysics,
 )
 

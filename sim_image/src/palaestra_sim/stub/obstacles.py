@@ -1,7 +1,7 @@
 """The obstacles of robots and rays, seen from above: discs and blocks.
 
-Each shape computes how deep a round robot is inside it, and how far rays travel until they meet it. Heights
-are checked before: every shape here is as high as the robots.
+Each shape computes how deep a round robot is inside it, and the distance that a ray travels until it meets
+the shape. Callers check heights first: here, every shape is as high as the robots.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from palaestra_sim.scene.sensor_rays import Ray
 # A contact: x and y of the unit normal that points at the robot, depth in meters.
 Contact = tuple[float, float, float]
 
-_SAME_PLACE_M2 = 1e-24  # a square; those of still smaller distances lose their digits
+_SAME_PLACE_M2 = 1e-24  # squared distance below which rounding destroys the direction
 
 
 class FlatObstacle(Protocol):
@@ -26,21 +26,21 @@ class FlatObstacle(Protocol):
         ...
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        """Return the push that moves a round robot at x, y out of the shape; None if it does not touch."""
         ...
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` (meters, one a ray) to where the rays meet the shape.
+        """Shorten each `reach` to the distance at which its ray meets the shape.
 
         Args:
             frame: x, y, cos and sin of the robot's heading.
             rays: in the robot's frame.
-            reach: changed in place.
+            reach: in meters, one for each ray; changed in place.
         """
         ...
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the shape, in meters along it; enter > leave: it misses."""
+        """Return the meters to where a ray enters and leaves the shape; enter > leave if it misses."""
         ...
 
 
@@ -59,7 +59,7 @@ class Disc:
         return math.hypot(x - self.x, y - self.y) - self.radius
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        """Return the push that moves a round robot at x, y out of the disc; None if it does not touch."""
         dx = x - self.x
         dy = y - self.y
         reach = radius + self.radius
@@ -72,7 +72,7 @@ class Disc:
         return (dx / distance, dy / distance, reach - distance)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` to where the rays of a robot at `frame` meet the disc."""
+        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the disc."""
         x, y, c, s = frame
         dx = self.x - x
         dy = self.y - y
@@ -89,7 +89,7 @@ class Disc:
                 reach[i] = min(reach[i], max(0.0, along - math.sqrt(half)))
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the disc, in meters along it; enter > leave: it misses."""
+        """Return the meters to where a ray enters and leaves the disc; enter > leave if it misses."""
         x, y, c, s = frame
         dx = self.x - x
         dy = self.y - y
@@ -123,7 +123,7 @@ class Block:
         return math.hypot(max(abs(lx) - self.half_x, 0.0), max(abs(ly) - self.half_y, 0.0))
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
-        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        """Return the push that moves a round robot at x, y out of the block; None if it does not touch."""
         lx, ly = self._local(x, y)
         dx = lx - max(-self.half_x, min(self.half_x, lx))
         dy = ly - max(-self.half_y, min(self.half_y, ly))
@@ -138,7 +138,7 @@ class Block:
         return (nx * self.c - ny * self.s, nx * self.s + ny * self.c, depth)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` to where the rays of a robot at `frame` meet the block."""
+        """Shorten each `reach` to the distance at which its ray, of a robot at `frame`, meets the block."""
         x, y = self._local(frame[0], frame[1])
         c = frame[2] * self.c + frame[3] * self.s
         s = frame[3] * self.c - frame[2] * self.s
@@ -150,7 +150,7 @@ class Block:
                 reach[i] = min(reach[i], enter)
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the block, in meters along it; enter > leave: it misses."""
+        """Return the meters to where a ray enters and leaves the block; enter > leave if it misses."""
         x, y = self._local(frame[0], frame[1])
         c = frame[2] * self.c + frame[3] * self.s
         s = frame[3] * self.c - frame[2] * self.s
@@ -174,7 +174,7 @@ class Block:
 
 
 def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
-    """Return how far a ray travels until it enters and leaves the range from -half to half."""
+    """Return the distances at which a ray enters and leaves the range from -half to half."""
     if direction == 0.0:
         return (-math.inf, math.inf) if -half <= origin <= half else (math.inf, -math.inf)
     first = (-half - origin) / direction
@@ -185,7 +185,7 @@ def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
 class Neighborhood:
     """The obstacles within reach of a point, cached by squares of the floor.
 
-    Most squares have none or one, so the cost of a step does not grow with the world.
+    Most squares have at most one obstacle, so the cost of a step does not grow with the world.
     """
 
     __slots__ = ("_margin", "_obstacles", "_squares")

@@ -1,11 +1,11 @@
 """Outlines, seen from above: discs and blocks of obstacles, and discs of robots.
 
-A shape has one outline, which holds from its lower to its upper end. That is exact for boxes and cylinders
-that stand or lie. Of a ball, a capsule and a mesh it is the widest outline.
+A shape has one outline, which holds from its lower to its upper end. That is exact for upright and lying
+boxes and cylinders. For a ball, a capsule and a mesh it is the widest outline.
 
 A robot's outline is a set of discs, fixed in its frame. A disc keeps its shape however the robot turns, so a
-contact costs the same at every heading. A box becomes a row of discs, with its length and its width, and with
-round corners.
+contact costs the same at every heading. A box becomes a row of discs with its length, its width, and round
+corners.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.obstacles import Block, Disc
 
 _Z: Final = 2
-_MOST_DISCS: Final = 16  # of one box; a bar more than eight times as long as wide has gaps between them
+_MOST_DISCS: Final = 16  # of one box; if its length is over eight times its width, gaps remain between discs
 
 
 class RoundPart(NamedTuple):
@@ -33,10 +33,10 @@ class RoundPart(NamedTuple):
 def discs_of_box(
     x_m: float, y_m: float, heading_rad: float, length_m: float, width_m: float
 ) -> tuple[RoundPart, ...]:
-    """Return discs that cover a box but for its corners, and reach no further than the box.
+    """Return discs that cover a box except its corners, and do not extend beyond the box.
 
-    The box has its center at x, y and its length along the heading. The discs stand along its longer axis, at
-    most a radius apart, so a long side dips by 7 % of the width at most.
+    The box has its center at x, y and its length along the heading. The discs are on its longer axis, at most
+    one radius apart, so a long side has dents of at most 7 % of the width.
     """
     if width_m > length_m:
         return discs_of_box(x_m, y_m, heading_rad + math.pi / 2.0, width_m, length_m)
@@ -52,7 +52,7 @@ def discs_of_box(
 
 
 def obstacle(shape: Shape) -> Disc | Block:
-    """Return the outline of a shape, where it is now."""
+    """Return the outline of a shape at its current place."""
     pose = shape.pose
     x, y, _ = pose.position
     vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
@@ -63,7 +63,7 @@ def obstacle(shape: Shape) -> Disc | Block:
 
 
 def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
-    """Return the discs of a robot's outline with their shapes, without those inside another one."""
+    """Return the discs of a robot's outline with their shapes, without discs inside another one."""
     parts = [(part, shape) for shape in shapes for part in _discs(shape)]
     return [
         (part, shape)
@@ -77,7 +77,7 @@ def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
 
 
 def _footprint(shape: Shape, pose: Pose, vertical: int) -> tuple[float, float, float]:
-    """Return the heading of one of its level axes, its extent along this one, and that across."""
+    """Return the heading of one of its level axes, its extent along this axis, and its extent across."""
     along, across = (axis for axis in range(3) if axis != vertical)
     heading_rad = math.atan2(pose.rotation[3 + along], pose.rotation[along])
     return heading_rad, shape.size[along], shape.size[across]

@@ -1,6 +1,6 @@
-"""The physics of the stub: every robot moves by itself, and sees and touches what is around it.
+"""The physics of the stub: every robot moves by itself, and detects the objects around it.
 
-Heights are checked when the world is arranged. Motion and rays are then computed as seen from above.
+Heights are checked when the world is arranged. After that, motion and rays are computed as seen from above.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from palaestra_sim.stub.rays import Fan, SlopedBeams, Upright
 
 
 class _Level(NamedTuple):
-    """The level beams of one robot, and the heights between which they are, in the robot's frame."""
+    """The level beams of one robot, and the range of their heights in the robot's frame."""
 
     fan: Fan
     heights: tuple[float, float]
@@ -48,13 +48,13 @@ class StubPhysics:
         self._view: View
 
     def body(self, build: Build) -> StubBody:
-        """Return the body of a robot: upright cylinders, between its heights."""
+        """Return the body of a robot: upright cylinders between its lowest and highest point."""
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         return StubBody(build.base, outline, rim, build.heights)
 
     def begin(self, surroundings: PhysicsSettings) -> None:
-        """Take the floors of the world; there are no forces."""
+        """Set the floors of the world; the stub has no forces."""
         self._surroundings = surroundings
 
     def arrange(
@@ -65,7 +65,7 @@ class StubPhysics:
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose, doors  # refused, see `abilities`
+        del loose, doors  # the world checks refuse both, see `abilities`
         self._solids = tuple(solids)
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
         self._level = {it: beams for it, beams in self._level.items() if it in figures}
@@ -81,7 +81,7 @@ class StubPhysics:
                 sloped.face(uprights, others_now, self._surroundings.heights_m())
 
     def advance(self, step_s: float) -> None:
-        """Move the bodies on by one basic step."""
+        """Move the bodies by one basic step."""
         for figure, body in self._moving:
             if figure.powered:
                 body.advance(step_s)
@@ -90,7 +90,7 @@ class StubPhysics:
         """Do nothing: no motion depends on the past."""
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
         place, body = figure.place, figure.body
         if not isinstance(body, StubBody) or any(not beam.level for beam in beams):
             sloped = SlopedBeams(beams)
@@ -105,27 +105,27 @@ class StubPhysics:
         return lambda: cast((body.x, body.y, body.c, body.s))
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        """Return the same function for beams that meet visible objects and pass through the robot itself."""
         sight = VisualRays(self._view, figure.place, beams)
         return lambda: [glance.distance_m for glance in sight.cast()]
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
-        """Do nothing: without masses a force moves nothing; see `abilities`."""
+        """Do nothing: without masses a force has no effect; see `abilities`."""
 
     def show(self, view: View) -> None:
-        """Take what lidars see of the world; there are no pictures."""
+        """Set the part of the world that lidars see; the stub renders no images."""
         self._view = view
 
     def eye(self, place: Frame, lens: Lens) -> None:
-        """Return None: there are no pictures."""
+        """Return None: the stub renders no images."""
         del place, lens
 
     def film(self, movie: Movie) -> None:
-        """Return None: there are no pictures."""
+        """Return None: the stub renders no images."""
         del movie
 
     def contacts(self) -> Iterable[ContactPoint]:
-        """Return where robots touch obstacles and each other now."""
+        """Return the contact points of robots with obstacles and with each other now."""
         return contact_points(self._moving, self._solids)
 
     def _face(self, figure: Figure, others: Sequence[StubBody]) -> None:
@@ -139,7 +139,7 @@ class StubPhysics:
 
 
 def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
-    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
+    """Return the shapes that reach into a range of heights; to touch it, as a floor does, is not enough."""
     low, high = heights[0] + shift, heights[1] + shift
     found = []
     for shape in solids:
@@ -155,7 +155,7 @@ def _of_robot(figure: Figure, body: StubBody) -> Upright:
 
 
 def _is_on(figure: Figure, shape: Shape) -> bool:
-    """Return whether a shape is a part of a robot, whose own rays pass it."""
+    """Return whether a shape is part of a robot; the robot's own rays pass through it."""
     return figure.place in shape.place.chain()
 
 

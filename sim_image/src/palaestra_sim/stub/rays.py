@@ -1,4 +1,4 @@
-"""Rays: how far the beams of a robot travel. A ray stops at the first obstacle."""
+"""The distances that the beams of a robot travel. A ray stops at the first obstacle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.sensor_rays import Beam, Ray
 from palaestra_sim.stub.obstacles import FlatObstacle, Neighborhood
 
-_GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame as `Fan.cast` takes it
+_GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame in the format of `Fan.cast`
 
 
 class Fan:
@@ -18,7 +18,7 @@ class Fan:
 
     Args:
         rays: in the robot's frame.
-        reach_m: for each ray, the distance beyond which its value is constant.
+        reach_m: for each ray, the distance beyond which the sensor's value is constant.
     """
 
     __slots__ = ("_blank", "_others", "_reach", "_solids", "distances", "rays")
@@ -34,18 +34,18 @@ class Fan:
 
     @property
     def reach_m(self) -> float:
-        """Return the longest distance of a ray's end from the robot's center."""
+        """Return an upper bound on the distance between the end of a ray and the robot's center."""
         return self._reach
 
     def face(self, solids: Neighborhood, others: Sequence[FlatObstacle]) -> None:
-        """Set the obstacles of the rays: standing ones and robots."""
+        """Set the obstacles of the rays: fixed ones and robots."""
         self._solids = solids
         self._others = tuple(others)
 
     def cast(self, frame: tuple[float, float, float, float]) -> list[float]:
-        """Return how far each ray travels in meters, from x, y, cos and sin of the heading.
+        """Return the distance that each ray travels in meters; `frame` is x, y, cos and sin of the heading.
 
-        Rays that meet nothing have their full reach. The list is reused by the next call.
+        Rays that meet nothing have their full reach. The next call reuses the list.
         """
         distances = self.distances
         distances[:] = self._blank
@@ -65,9 +65,9 @@ class Upright(NamedTuple):
 
 
 class SlopedBeams:
-    """The beams of one robot that climb or fall, cast one by one.
+    """The beams of one robot that point up or down, cast one by one.
 
-    Besides the obstacles there are floors, which have no end.
+    Their obstacles include floors, which extend to infinity.
     """
 
     __slots__ = ("_beams", "_floors", "_others", "_solids", "distances")
@@ -82,26 +82,26 @@ class SlopedBeams:
     def face(
         self, solids: Sequence[Upright], others: Sequence[Upright], floors_m: Sequence[float] = (0.0,)
     ) -> None:
-        """Set the obstacles of the beams: standing ones and robots, and the heights of floors."""
+        """Set the obstacles of the beams: fixed ones and robots, and the heights of floors."""
         self._solids = tuple(solids)
         self._others = tuple(others)
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
-        """Return how far each beam travels in meters; `height_m` is of the robot's frame."""
+        """Return the distance that each beam travels, in meters; `height_m` is that of the robot's frame."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam, frame, height_m)
         return self.distances
 
     def cast_from(self, pose: Pose) -> list[float]:
-        """Return the same for a robot that may lean; `pose` is its frame in the axes of the ground."""
+        """Return the same for a robot that may be tilted; `pose` is its frame in the axes of the ground."""
         for index, beam in enumerate(self._beams):
             self.distances[index] = self._first(beam.seen_from(pose), _GROUND, 0.0)
         return self.distances
 
     def _first(self, beam: Beam, frame: tuple[float, float, float, float], height_m: float) -> float:
         start = beam.height_m + height_m
-        stretch = math.hypot(1.0, beam.slope)  # of the beam, for each meter along the floor
+        stretch = math.hypot(1.0, beam.slope)  # length of the beam for each meter along the floor
         nearest = beam.reach_m / stretch
         if beam.slope:
             for floor in self._floors:
@@ -118,7 +118,7 @@ class SlopedBeams:
 
 
 def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:
-    """Return from where to where, along the floor, a beam is between two heights above its origin."""
+    """Return the distances along the floor between which a beam is within two heights above its origin."""
     if slope == 0.0:
         return (-math.inf, math.inf) if low_m < 0.0 < high_m else (math.inf, -math.inf)
     return min(low_m / slope, high_m / slope), max(low_m / slope, high_m / slope)

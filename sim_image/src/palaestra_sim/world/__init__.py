@@ -1,21 +1,22 @@
 """Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
-Pure: bytes in, bytes out. No clock, no network, and no file except what ships and what a world names.
+Pure: bytes in, bytes out. No clock, no network, and no file except built-in ones and those that a world
+names.
 
     parse(source)                              the tree of a `.wbt` world
-    check(source)                              raises unless every simulator can have a world of it
+    check(source)                              raises unless a world can be generated for every simulator
     generate(source, identity, clock=False)    the world of one simulator
-    rename(source, "_2")                       the world of one more, beside those that run
-    robots(source)                             the robots in it that speak ROS
-    own_controllers(source)                    the robots whose controllers are programs of their project
-    root_of(path, source)                      the folder around it that holds all that it names
-    suffix(source)                             how its file ends: ".wbt" or ".xml"
-    ros_name(identity, "robotino")             the name that such a robot gets
-    builtin("arena")                           a world that ships
-    builtin_protos()                           descriptions of robots that ship
-    parse_proto(data, "Stool.proto")           the declaration of a type of node
-    local_protos(path, world)                  the PROTOs whose files lie beside a world
-    shipped_stand_ins()                        solids in the place of PROTOs whose files are not read
+    rename(source, "_2")                       the world of one more simulator on the same ROS master
+    robots(source)                             its robots whose controller is "ros"
+    own_controllers(source)                    its robots whose controllers are programs of their project
+    root_of(path, source)                      the folder around it that holds all files that it names
+    suffix(source)                             the end of its file name: ".wbt" or ".xml"
+    ros_name(identity, "robotino")             the generated name of such a robot
+    builtin("arena")                           a built-in world
+    builtin_protos()                           built-in descriptions of robots
+    parse_proto(data, "Stool.proto")           the declaration of a node type
+    local_protos(path, world)                  the PROTOs whose files belong to a world
+    shipped_stand_ins()                        shapes for PROTOs whose files are not read
     expand(stand_in, values)                   the boxes, cylinders, spheres and planes of one of them
 """
 

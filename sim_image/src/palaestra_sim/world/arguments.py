@@ -1,6 +1,6 @@
-"""Decide what the `controllerArgs` of one robot must be, as edits of the fewest bytes.
+"""Compute the `controllerArgs` of one robot, as edits of as few bytes as possible.
 
-Each string of the list is kept unchanged, replaced, or removed; the order stays. Two forms are corrected,
+Each string of the list is kept, replaced, or removed; the order does not change. Two forms are corrected,
 because their arguments would not reach the controller. A bare string, as in worlds up to R2020a, becomes a
 list. A string with several options becomes one string for each option, because Webots passes each string as a
 single argument.
@@ -15,19 +15,19 @@ from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
-_LONGEST_GAP = 200  # bytes that are repeated between new strings
+_LONGEST_GAP = 200  # bytes; a longer gap is not repeated between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
 def asks_for_clock(robot: Node) -> bool:
-    """Return whether a robot's arguments have a `--clock`."""
+    """Return whether a robot's arguments contain `--clock`."""
     return any(CLOCK in _options(text) for text in robot.texts("controllerArgs"))
 
 
 def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Patch, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
-    With `clock`, the first of several `--clock` stays; none is ever added.
+    With `clock`, the first `--clock` stays and the others are removed; none is ever added.
     """
     value = robot.fields.get("controllerArgs")
     if value is None:
@@ -47,9 +47,9 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
 
 
 def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[bytes, ...]]:
-    """Return, for each string of a list, the strings to write instead; one row for an empty list.
+    """Return, for each string of a list, the strings that replace it; one row for an empty list.
 
-    Missing options follow the name; if the name is missing too, all go to the front.
+    Missing options follow the name; if the name is missing too, all of them come first.
     """
     name, synchronize = quoted(NAME + ros_name), quoted(SYNCHRONIZE)
     rows: list[list[bytes]] = []
@@ -84,7 +84,7 @@ def _options(text: str) -> list[str]:
 
 
 def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Patch:
-    """Replace one string of a list; if it is removed, the blanks before it are too."""
+    """Replace one string of a list; if it is removed, remove the blanks before it too."""
     start = token.start
     if not row:
         start -= len(_UP_TO_COMMENT.sub(b"", _gap_before(world, token)))
@@ -92,7 +92,7 @@ def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: byte
 
 
 def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Patch:
-    """Replace a bare string by a list; an empty string means that there are no arguments."""
+    """Replace a bare string by a list; an empty string stands for no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"
@@ -100,7 +100,7 @@ def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Pat
 
 
 def _new_field(world: World, robot: Node, ros_name: str) -> Patch:
-    """Add `controllerArgs` behind `controller`, on lines of its own if that has one."""
+    """Add `controllerArgs` after `controller`, on separate lines if `controller` has its own line."""
     start, end = robot.fields["controller"].span
     field = world.index(start) - 1
     gap = world.source[world.tokens[field - 1].end : world.tokens[field].start]
@@ -114,6 +114,6 @@ def _new_field(world: World, robot: Node, ros_name: str) -> Patch:
 
 
 def _gap_before(world: World, token: Token) -> bytes:
-    """Return what lies between a token and the one before it: blanks, commas, comments."""
+    """Return the bytes between a token and the previous one: blanks, commas, comments."""
     before = world.tokens[world.index(token.start) - 1]
     return world.source[before.end : token.start]

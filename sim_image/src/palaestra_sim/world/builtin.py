@@ -1,4 +1,4 @@
-"""The worlds and the descriptions of robots that ship, by name."""
+"""The built-in worlds and descriptions of robots, by name."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -12,10 +12,10 @@ _PROTOS = Path(__file__).parent / "protos"
 
 
 def builtin(name: str) -> bytes:
-    """Return the source world that ships as `name`, such as "arena".
+    """Return the built-in source world `name`, such as "arena".
 
     Raises:
-        UnknownWorldError: there is no world of that name; the message names the existing ones.
+        UnknownWorldError: no built-in world has that name; the message lists the existing names.
     """
     path = builtin_path(name)
     if path is None:
@@ -25,13 +25,13 @@ def builtin(name: str) -> bytes:
 
 
 def builtin_path(name: str) -> Path | None:
-    """Return the file of the world that ships as `name`; None if there is none."""
+    """Return the file of the built-in world `name`; None if no world has that name."""
     return _shipped().get(name)
 
 
 @cache
 def builtin_protos() -> Mapping[str, Proto]:
-    """Return the descriptions of robots of Webots that ship, by the names of their PROTOs."""
+    """Return the built-in descriptions of Webots' robots, by the names of their PROTOs."""
     return {path.stem: parse_proto(path.read_bytes(), path.name) for path in sorted(_PROTOS.glob("*.proto"))}
 
 

@@ -1,7 +1,7 @@
-"""Checks for worlds that can be read, but from which no simulator's world can be generated.
+"""Checks for worlds that can be parsed, but from which no simulator's world can be generated.
 
-Each check finds one kind of mistake, at all its places. One error has all of them, in the order of the file.
-No check depends on the simulator: a world that passes once passes for all.
+Each check finds one kind of mistake, at all its places. One error lists all of them, in the order of the
+file. No check depends on the simulator: a world that passes once passes for all.
 """
 
 import re
@@ -36,7 +36,7 @@ Check = Callable[[Candidate], Iterator[WorldError]]
 
 
 def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
-    """No controller is "ros", so a trainer can reach no robot of this world."""
+    """No robot has the controller "ros", so a trainer can reach no robot of this world."""
     if candidate.robots:
         return
     others = [node for node in candidate.world.walk() if _is_robot(node)]
@@ -56,13 +56,13 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` repeats a robot with the same ROS name.
 
-    Any DEF of that name counts, although a `USE` means the last one before it; two names make such a world
-    clearer.
+    All DEFs with that name are compared, although a `USE` refers only to the last one before it. A world with
+    two names is clearer anyway.
     """
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}
     for node in candidate.world.walk():
-        # Nodes nest, so a robot that begins in a node is inside it. The last one in it gives the name.
+        # Nodes nest, so a robot that begins inside a node is part of it. The last such robot gives the name.
         last = bisect_left(starts, node.span[1]) - 1
         if node.def_name is not None and last >= 0 and starts[last] >= node.span[0]:
             containers[node.def_name] = candidate.robots[last]
@@ -74,7 +74,7 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
-    """Two robots have the same Robot.name, by which clients find them and from which their ROS names come."""
+    """Two robots have the same Robot.name, which clients use to find them and which determines ROS names."""
     seen = set()
     for robot in candidate.robots:
         name = robot_name(robot)
@@ -85,7 +85,7 @@ def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def arguments_that_are_no_strings(candidate: Candidate) -> Iterator[WorldError]:
-    """An argument is not a string, so it was meant for another field."""
+    """An argument is not a string, so it was probably meant for another field."""
     for value in _argument_values(candidate):
         for token in candidate.world.inside(value):
             if token.kind != "string" and token.text not in (b"[", b"]"):
@@ -103,7 +103,7 @@ def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def relative_address(candidate: Candidate) -> Iterator[WorldError]:
-    """An address is relative, but the world has no file and so no folder."""
+    """An address is relative, but the world is not in a file, so it has no folder."""
     for token in _addresses(candidate.world):
         if not _ABSOLUTE.match(unquoted(token)):
             fact = f"{token.text.decode()} is relative to the file of the world, and this one has none"
@@ -112,7 +112,7 @@ def relative_address(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def relative_addresses(source: bytes, name: str) -> tuple[str, ...]:
-    """Return the addresses in a world that count from its folder.
+    """Return the addresses in a world that are relative to its folder.
 
     Raises:
         WorldError: the world cannot be read.
@@ -126,7 +126,7 @@ def _is_robot(node: Node) -> bool:
 
 
 def _controller(robot: Node) -> str:
-    """Return the controller of a robot; without one, a Robot has "<generic>" in Webots."""
+    """Return the controller of a robot; the default of a Robot is "<generic>" in Webots."""
     return robot.text("controller") or "<generic>"
 
 
@@ -140,7 +140,7 @@ def _argument_values(candidate: Candidate) -> Iterator[Value]:
 def _addresses(world: World) -> Iterator[Token]:
     """Yield the tokens of all strings that are addresses.
 
-    A texture without a dot is the name of one that Webots has, such as "mountains".
+    A texture without a dot is the name of a built-in texture of Webots, such as "mountains".
     """
     yield from world.externs
     for node in world.walk():
@@ -153,7 +153,7 @@ def _addresses(world: World) -> Iterator[Token]:
 
 
 def _strings(world: World, value: Value) -> Iterator[Token]:
-    """Yield the tokens of the strings of a value that are not empty."""
+    """Yield the tokens of the non-empty strings of a value."""
     return (token for token in world.inside(value) if token.kind == "string" and token.text != b'""')
 
 
@@ -167,7 +167,7 @@ CHECKS: tuple[Check, ...] = (
 """The checks for every world."""
 
 CHECKS_WITHOUT_FILE: tuple[Check, ...] = (*CHECKS, relative_address)
-"""The additional checks for a world without a file, which has no files beside it."""
+"""The additional check for a world without a file, which has no files next to it."""
 
 
 def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidate:
@@ -187,8 +187,8 @@ def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidat
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
-    names, so they need no full address.
+    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
+    names, so it may use relative addresses.
 
     Raises:
         WorldError: the world cannot be read, or a check of this module fails.

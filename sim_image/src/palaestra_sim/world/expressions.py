@@ -2,8 +2,9 @@
 
     0.74   size.x   size.z - frameThickness / 2   0.5 * (size.x + 0.1)   sum(rowsHeights)
 
-A name is a field with one number (TRUE counts as 1, FALSE as 0), `.x`, `.y` and `.z` are the numbers of a
-vector, and `sum` adds all numbers of a field. Nothing else can be written: a file of stand-ins holds no code.
+A name is a field with one number (TRUE counts as 1, FALSE as 0); `.x`, `.y` and `.z` select the numbers of a
+vector; `sum` adds all numbers of a field. The language has nothing else, so a file of stand-ins cannot
+contain code.
 """
 
 import re
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 MAX_LENGTH = 200
-"""Characters of a formula, which bound its nesting too."""
+"""Maximum length of a formula in characters, which also limits its nesting."""
 
 _TOKEN = re.compile(r"\s*(?:(?P<number>\d+\.?\d*)|(?P<name>[A-Za-z_]\w*(?:\.[xyz])?)|(?P<mark>[-+*/()]))")
 
@@ -32,14 +33,14 @@ class _Operation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A formula that was read; `names` are the fields in it, with `.x` or `()` where it says how."""
+    """A parsed formula; `names` are the fields in it, with `.x` or `sum()` if they are used so."""
 
     text: str
     tree: _Tree
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the fields of the formula as they are used: `size.x`, `height`, `sum(rowsHeights)`."""
+        """Return the fields of the formula as it uses them: `size.x`, `height`, `sum(rowsHeights)`."""
         return tuple(_names(self.tree))
 
     def value(self, numbers: Numbers) -> float:
@@ -51,7 +52,7 @@ def parse_formula(written: object) -> Expression:
     """Return the formula of a number or a text.
 
     Raises:
-        ValueError: it is neither, or not a formula; the message has the fact and the remedy.
+        ValueError: it is neither, or the text is not a formula; the message has the fact and the remedy.
     """
     if isinstance(written, int | float) and not isinstance(written, bool):
         return Expression(str(written), float(written))

@@ -1,14 +1,14 @@
-"""Find the PROTO files that lie beside a world.
+"""Find the PROTO files that belong to a world.
 
-A world names the file of each PROTO that it uses in an EXTERNPROTO line, and a PROTO file does so for those
-that it uses. An address with a scheme (https://, webots://) is a PROTO that Webots brings: no file is read,
-and only its name is known. A relative address counts from the folder of the file that names it.
+A world names the file of each PROTO that it uses in an EXTERNPROTO line, and so does a PROTO file. An address
+with a scheme (https://, webots://) is a PROTO that Webots provides: its file is not read, and only its name
+is known. A relative address is relative to the folder of the file that names it.
 
-Before R2022b there were no such lines: a file found its PROTOs by their names in the folder `protos/` of the
-world's project, and in the folders below it. Files of those releases still do here.
+Before R2022b there were no such lines: Webots found PROTOs by their names in the folder `protos/` of the
+world's project, and in its subfolders. Files of those releases are still handled so here.
 
-A PROTO that cannot be used is no error here, since the world may do without it: a stand-in may describe it,
-or its instances may be left out. Its error is in the result, for the caller that needs it.
+A PROTO that cannot be used does not raise an error here, because the world may not need it: a stand-in may
+describe it, or its instances may be left out. Its error is in the result, for callers that need the PROTO.
 """
 
 import re
@@ -24,7 +24,7 @@ from palaestra_sim.world.tokens import Token, unquoted
 from palaestra_sim.world.tree import Node, World, walk
 
 MAX_FILES_DEEP = 20
-"""PROTO files that name each other in a row."""
+"""Maximum length of a chain of PROTO files that name each other."""
 
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
 
@@ -33,7 +33,7 @@ List = Callable[[Path], Iterable[Path]]
 
 
 def _protos_below(folder: Path) -> list[Path]:
-    """Return the PROTO files in a folder and below it; those that are less deep first."""
+    """Return the PROTO files in a folder and its subfolders, the least deep first."""
     return sorted(folder.rglob("*.proto"), key=lambda path: (len(path.parts), path))
 
 
@@ -41,9 +41,9 @@ def _protos_below(folder: Path) -> list[Path]:
 class Protos:
     """The PROTOs that a world and its PROTO files name, by type.
 
-    `local` were read from files. `remote` are the types of addresses with a scheme. `refused` has the error
-    of each type that is in no other part because its file is missing, is no PROTO, has a template, or names
-    itself through others.
+    `local` were read from files. `remote` are the types whose addresses have a scheme. `refused` has the
+    errors of all other types: the file is missing, is not a PROTO, has a template, or names itself through
+    other files.
     """
 
     local: dict[str, Proto] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class Protos:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Namer:
-    """A file with EXTERNPROTO lines: a world, or a PROTO of the type `type_name`."""
+    """A file that can name PROTOs: a world, or the PROTO file of the type `type_name`."""
 
     path: Path | None
     source: Source
@@ -74,9 +74,9 @@ def local_protos(
 ) -> Protos:
     """Return the PROTOs that `world` and its local PROTO files name.
 
-    `world_path` is the file of the world, None if it has none; `name` is its name in errors. Files of the
-    types in `without` are not read, and those types are in no part of the result. `read` returns the bytes of
-    a file or raises OSError, `files_below` the PROTO files in a folder and below it.
+    `world_path` is the file of the world, None without a file; `name` is its name in errors. Types in
+    `without` are ignored: their files are not read, and the result does not contain them. `read` returns the
+    bytes of a file or raises OSError, `files_below` the PROTO files in a folder and its subfolders.
     """
     source = Source(data=world.source, name=name)
     search = _Search(world_path, without, read, files_below)
@@ -99,7 +99,7 @@ class _Search:
         self._by_name: dict[str, Path] | None = None
 
     def follow(self, namer: _Namer) -> None:
-        """Add all that a file names, and what those files name."""
+        """Add the PROTOs that a file names, and those that their files name."""
         for token in namer.externs:
             address = unquoted(token)
             type_name = PurePosixPath(address).name.removesuffix(".proto")
@@ -114,7 +114,7 @@ class _Search:
             self._follow_names(namer)
 
     def _follow_names(self, namer: _Namer) -> None:
-        """Add the PROTOs of the project that a file without EXTERNPROTO lines uses by name."""
+        """Add the PROTOs of the project that a file before R2022b uses by name."""
         for node in walk(namer.nodes):
             path = self._of_project(node.type_name)
             if path is not None and node.type_name not in self._without:
@@ -166,7 +166,7 @@ class _Search:
         """Return the PROTO of a file."""
         try:
             data = self._read(path)
-        except (OSError, ValueError) as error:  # ValueError: a path with a NUL
+        except (OSError, ValueError) as error:  # ValueError: a path with a NUL character
             reason = getattr(error, "strerror", None) or error
             fact = f"{path} cannot be read: {reason}"
             remedy = "correct the address; it counts from the folder of this file"
@@ -179,13 +179,13 @@ class _Search:
 
 
 def _defaults(proto: Proto) -> Iterator[Node]:
-    """Yield the nodes that are defaults of a PROTO's fields."""
+    """Yield the nodes in the defaults of a PROTO's fields."""
     for declared in proto.fields.values():
         yield from (item for item in declared.default.items if isinstance(item, Node))
 
 
 def _endless(namer: _Namer, type_name: str) -> Iterator[tuple[str, str]]:
-    """Yield the fact and the remedy if the files that name each other have no end."""
+    """Yield the fact and the remedy if the chain of files has a cycle or is too long."""
     above = [file.type_name for file in (*namer.above, namer)]
     if type_name in above:
         fact = f"{namer.type_name} and {type_name} are made of each other"

@@ -1,7 +1,7 @@
 """The two formats of worlds: `.wbt`, and MJCF, which begins with `<`.
 
-A world may come without a file, so its format is read from its first byte. The modules beside this one have
-`.wbt` worlds, `mjcf` has the others.
+A world may come without a file, so its first byte decides its format. The modules of this package handle
+`.wbt` worlds, `mjcf` handles the others.
 """
 
 from palaestra_sim.world import mjcf
@@ -18,15 +18,15 @@ WBT = ".wbt"
 
 
 def suffix(source: bytes) -> str:
-    """Return the end of the file name of a world with these bytes: ".wbt" or ".xml"."""
+    """Return the suffix of the file name for a world with these bytes: ".wbt" or ".xml"."""
     return MJCF if mjcf.is_mjcf(source) else WBT
 
 
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
-    names, so they need no full address.
+    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
+    names, so it may use relative addresses.
 
     Raises:
         WorldError: the world cannot be read, or a check fails.
@@ -45,7 +45,7 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock` if its world asks for it; true for at most one simulator of a
+    `clock`: this simulator may publish `/clock` if its world requests it; true for at most one simulator of a
     ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
@@ -62,17 +62,17 @@ def rename(source: bytes, ending: str, *, name: str = "world", relative_addresse
     for `check`.
 
     Raises:
-        WorldError: as for `check`; or a robot has no ROS name, or its name would become too long.
+        WorldError: as for `check`; or a robot has no ROS name, or its new name is too long.
     """
     renamer = mjcf.rename if mjcf.is_mjcf(source) else rename_wbt
     return renamer(source, ending, name=name, relative_addresses=relative_addresses)
 
 
 def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
-    """Return every robot of a world that speaks ROS, in source order.
+    """Return every robot of a world whose controller is "ros", in source order.
 
     Raises:
-        WorldError: the bytes are no world file.
+        WorldError: the bytes are not a world file.
     """
     return mjcf.robots(source, name) if mjcf.is_mjcf(source) else robots_wbt(source, name)
 
@@ -81,6 +81,6 @@ def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str]
     """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
 
     Raises:
-        WorldError: the bytes are no world file.
+        WorldError: the bytes are not a world file.
     """
     return () if mjcf.is_mjcf(source) else own_controllers_wbt(source, name)

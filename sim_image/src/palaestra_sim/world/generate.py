@@ -1,14 +1,14 @@
-"""Generate the world of one simulator: its source world with ROS names of its own.
+"""Generate the world of one simulator: its source world with generated ROS names.
 
-Only the `controllerArgs` of robots whose controller is "ros" change, and of those only
+Only the `controllerArgs` of robots whose controller is "ros" change, and only these arguments:
 
-    --name=          the robot's ROS name; added if there is none, and never two
+    --name=          the robot's ROS name; added if it is missing, and never twice
     --synchronize    added, so that the simulation waits for its client to step it
-    --clock          never added. `clock` says whether this simulator may keep one: then the first
-                     of the world stays and the rest go, else all go. Two on one ROS master would
+    --clock          never added. With `clock`, the first one of the world stays and the others
+                     are removed; without it, all are removed. Two on one ROS master would
                      publish two times on one topic.
 
-All other bytes stay unchanged. The same generation from a generated world gives the same world.
+All other bytes are unchanged. Generation from a generated world gives the same world again.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock` if its world asks for it; true for at most one simulator of a
+    `clock`: this simulator may publish `/clock` if its world requests it; true for at most one simulator of a
     ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
@@ -49,7 +49,7 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
     for `check`.
 
     Raises:
-        WorldError: as for `check`; or a robot has no ROS name, or its name would become too long.
+        WorldError: as for `check`; or a robot has no ROS name, or its new name is too long.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
     return _named(found, [_longer(found, robot, suffix) for robot in found.robots], clock=False)

@@ -3,10 +3,10 @@
     <job>_r<replica>_<group>_<index><slot>_<robot>_<hash>
     move_to_target_r0_collect_1a_robotino_8c31f2
 
-The words are for people; they may be cut, and characters may be replaced. The hash is taken over the original
-words, so two names with the same words still differ. A name is legal in ROS 1 (a letter first, then
-`[A-Za-z0-9_]`) and at most 63 bytes long: the `ros` controller copies it into a buffer of 64 bytes without a
-check.
+The readable part is for people; it may be cut, and characters may be replaced. The hash covers the original
+values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter first, then
+`[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of 64 bytes
+without a check.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from dataclasses import astuple, dataclass
 
 MAX_NAME_BYTES = 63
 HASH_DIGITS = 6
-# Of the 63 bytes, at least 15 are for the robot, so that people can distinguish robots.
+# At least 15 of the 63 bytes are for the robot, so that people can distinguish robots.
 _MAX_PREFIX = 40
 _MAX_GROUP = 16
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
@@ -26,7 +26,7 @@ _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 class RunIdentity:
     """The simulator of a world: one of a group, of a replica, of a job.
 
-    `uid` is the job's UID, "" outside a cluster. `slot` is "a", or "b" for a standby beside it.
+    `uid` is the job's UID, "" outside a cluster. `slot` is "a", or "b" for the standby.
     """
 
     job: str

@@ -1,7 +1,7 @@
-"""The simple shapes that stand for an object: boxes, cylinders, spheres and planes in the object's frame.
+"""The simple shapes that replace an object: boxes, cylinders, spheres and planes in the object's frame.
 
-A Form describes one shape by formulas, as a file of stand-ins writes it. With the fields of an object it
-becomes Parts, which have numbers. A wall along a path, or in a ring, becomes a box for each straight piece.
+A Form describes one shape by formulas, as a file of stand-ins contains it. The fields of an object turn it
+into ShapeParts, which have numbers. A wall along a path, or in a ring, becomes a box for each straight piece.
 """
 
 import math
@@ -16,7 +16,7 @@ Shape: TypeAlias = Literal["box", "cylinder", "sphere", "plane"]
 FormKind: TypeAlias = Literal["box", "cylinder", "sphere", "plane", "ring", "wall"]
 
 LENGTHS: dict[FormKind, int] = {"box": 3, "cylinder": 2, "sphere": 1, "plane": 2, "ring": 3, "wall": 2}
-"""How many lengths a form has; see `Form`."""
+"""The number of lengths of each form; see `Form`."""
 
 _PIECES_OF_RING = 24
 
@@ -39,10 +39,10 @@ class ShapePart:
 class Form:
     """A shape by formulas.
 
-    The lengths of box, cylinder, sphere and plane are those of a Part. A ring has (inner radius, thickness,
-    height), a wall (thickness, height); a wall stands along the points of the field `path`, and goes back to
-    the first one if `closed`. `at` is the center. It is the center of the lower side with `on_base`, and for
-    ring and wall always. The object has the form only if `when` isn't 0, and `unless` is 0.
+    The lengths of box, cylinder, sphere and plane are those of a ShapePart. A ring has (inner radius,
+    thickness, height), a wall (thickness, height). A wall follows the points of the field `path`, and returns
+    to the first one if `closed`. `at` is the center; with `on_base`, and always for ring and wall, it is the
+    center of the lower side. The object has the form only if `when` is not 0 and `unless` is 0.
     """
 
     kind: FormKind
@@ -58,9 +58,9 @@ class Form:
     def parts(
         self, numbers: Numbers, points: Callable[[str], Sequence[Sequence[float]]]
     ) -> Iterator[ShapePart]:
-        """Yield the parts of an object; a length that isn't positive makes none.
+        """Yield the parts of an object; a form with a length that is not positive has no parts.
 
-        `numbers` returns the numbers of a field, `points` the vectors of one that is a list.
+        `numbers` returns the numbers of a field, `points` the vectors of a field that is a list.
         """
         if self.when is not None and not self.when.value(numbers):
             return

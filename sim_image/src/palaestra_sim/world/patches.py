@@ -1,8 +1,8 @@
-"""Change a few spans of a world and leave every other byte alone.
+"""Change a few spans of a world and leave every other byte unchanged.
 
-An edit has the bytes to replace, and the tokens that it intends to put there. After the change the result is
-cut into tokens again, and must have the old tokens with exactly those changes. So an accidental change of the
-surroundings is found here, not by a simulator.
+A patch has the bytes to insert, and the tokens that they must form. After the change, the result is split
+into tokens again. It must have the old tokens with exactly those changes. So an accidental change of the
+nearby bytes is found here, not by a simulator.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def _meant(tokens: Sequence[Token], edits: Sequence[Patch]) -> list[bytes]:
 
 
 def _check(result: Source, meant: Sequence[bytes]) -> None:
-    """Refuse a result whose tokens are not the intended ones.
+    """Check that a result has the intended tokens.
 
     Both sequences end with the empty text, and no other token is empty, so a sequence of another length
     differs too.
@@ -63,4 +63,4 @@ def _check(result: Source, meant: Sequence[bytes]) -> None:
     for token, text in zip(tokenize(result), meant, strict=False):
         if token.text != text:
             fact = f"the generated world has {token.text!r} where {text!r} was meant"
-            raise result.error(token.start, fact, "report this world, the generator is wrong")
+            raise result.error(token.start, fact, "report this world; the generator has a bug")

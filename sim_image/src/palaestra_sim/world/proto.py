@@ -1,4 +1,4 @@
-"""Parse a PROTO file: the declaration of a type of node by its fields and one node.
+"""Parse a PROTO file: the declaration of a node type by its fields and one node.
 
     #VRML_SIM R2023b utf8
     EXTERNPROTO "Leg.proto"
@@ -9,8 +9,8 @@
       Solid { translation IS translation }
     }
 
-Nothing is expanded here. An instance of the type is a copy of `body` in which every `IS` has the value that
-the instance gives to the field, else its default. For any bytes the result is a Proto or a WorldError. A
+Nothing is expanded here. An instance of the type is a copy of `body` in which every `IS` is replaced by the
+instance's value of the field, or else by the default. For any bytes the result is a Proto or a WorldError. A
 template, from which Webots generates the file with Lua or JavaScript, is refused.
 """
 
@@ -37,7 +37,7 @@ class ProtoField:
     """A field that a PROTO declares.
 
     `type` is a type such as "SFVec3f"; `access` is the word before it, such as "hiddenField". `allowed` has
-    the values to which the declaration restricts the field; it is empty without a restriction.
+    the values that the declaration permits; it is empty if all are permitted.
     """
 
     type: str
@@ -48,9 +48,9 @@ class ProtoField:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proto:
-    """A PROTO file as read: its type, the fields in source order, and the node that it stands for.
+    """A parsed PROTO file: its type, the fields in source order, and the node that it stands for.
 
-    `externs` are the string tokens of its EXTERNPROTO lines. Every span is one of `source`.
+    `externs` are the string tokens of its EXTERNPROTO lines. Every span refers to `source`.
     """
 
     name: str
@@ -64,8 +64,8 @@ def parse_proto(data: bytes, name: str) -> Proto:
     """Return the PROTO that `data` declares; `name` is the name of its file in errors.
 
     Raises:
-        WorldError: the bytes are no PROTO file, or one with a template; the message has the place, the fact
-            and the remedy.
+        WorldError: the bytes are not a PROTO file, or they have a template; the message has the place, the
+            fact and the remedy.
     """
     source = Source(data=data, name=name, kind="PROTO")
     source.header()
@@ -82,7 +82,7 @@ def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
     """Return the fields that `text` declares as a PROTO does; the word before a type may be missing.
 
     Raises:
-        WorldError: the text has something else; its lines count from 1.
+        WorldError: the text has anything else; its lines count from 1.
     """
     source = Source(data=text.encode(), name=name, kind="PROTO")
     return _ProtoReader(source, tokenize(source)).fields(name)
@@ -91,7 +91,7 @@ def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
 def _templates(data: bytes) -> Iterator[int]:
     """Yield the place of each opening of a template, and of each comment that names its language.
 
-    Only the first one is certain: the code of a template is no PROTO, and has other comments and strings.
+    Only the first place is reliable: after it, the code of the template has other comments and strings.
     """
     for match in _NOT_CODE.finditer(data):
         comment = match.group("comment")
@@ -101,7 +101,7 @@ def _templates(data: bytes) -> Iterator[int]:
 
 
 def _undeclared(proto: Proto) -> Iterator[WorldError]:
-    """Yield an error for each IS in the body that names no field of the PROTO."""
+    """Yield an error for each IS in the body that refers to a field which the PROTO does not have."""
     for node in walk([proto.body]):
         for name, value in node.fields.items():
             for item in value.items:
@@ -112,7 +112,7 @@ def _undeclared(proto: Proto) -> Iterator[WorldError]:
 
 
 class _ProtoReader(Reader):
-    """The rules of a PROTO file, beside those for its nodes."""
+    """The grammar rules of a PROTO file, in addition to those for its nodes."""
 
     _access_needed = True
 
@@ -127,7 +127,7 @@ class _ProtoReader(Reader):
         fields = self._declarations(name)
         self._expect(b"{", "the body of a PROTO is written { Type { … } }")
         self._is_refused = None
-        self._last_counts = True  # published PROTOs have such fields
+        self._last_counts = True  # published PROTOs repeat fields
         body = self._body(name)
         self._expect(b"}", "a PROTO has one node")
         self._end()

@@ -1,8 +1,8 @@
 """Parse the tokens of a world file into its tree.
 
-Recursive descent with one function for each rule of the grammar. A number limits the depth, not Python's
-stack. For any bytes the result is a World or a WorldError. The rules for nodes are those of PROTO files too;
-the module `proto` has the others.
+Recursive descent with one function for each rule of the grammar. A constant limits the depth, so Python's
+stack does not. For any bytes the result is a World or a WorldError. The rules for nodes apply to PROTO files
+too; the module `proto` has the others.
 """
 
 import re
@@ -13,7 +13,7 @@ from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token, Tokens, glance, tokenize, unquoted
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
-# Four Python calls a level, so 400 of the 1000 that Python allows. An arm nests two nodes a joint.
+# Each level takes four Python calls, so 400 of the 1000 that Python allows. An arm nests two nodes per joint.
 MAX_DEPTH = 100
 
 _RESERVED = frozenset(
@@ -27,7 +27,7 @@ def parse(source: bytes, name: str = "world") -> World:
     """Return the world that `source` describes; `name` is its name in errors.
 
     Raises:
-        WorldError: the bytes are no world file; the message has the place, the fact and the remedy.
+        WorldError: the bytes are not a world file; the message has the place, the fact and the remedy.
     """
     text = Source(data=source, name=name)
     header = text.header()
@@ -35,10 +35,10 @@ def parse(source: bytes, name: str = "world") -> World:
 
 
 def parse_nodes(text: str, name: str) -> World:
-    """Return the nodes of a text that has no header, as a program gives them; `name` is for errors.
+    """Return the nodes of a text without a header, as a client sends them; `name` is its name in errors.
 
     Raises:
-        WorldError: the text describes no nodes; the message has the place, the fact and the remedy.
+        WorldError: the text does not describe nodes; the message has the place, the fact and the remedy.
     """
     source = Source(data=text.encode(), name=name, headless=True)
     return Reader(source, tokenize(source)).world("")
@@ -55,7 +55,7 @@ class Reader:
         self._taken_up_to = 0  # the byte after the last token taken
         self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
         self._last_counts = (
-            False  # of two values of one field: Webots reads both, and a world needs no second
+            False  # whether a field may occur twice; Webots reads both, but a world needs only one
         )
 
     def world(self, header: str) -> World:
@@ -161,7 +161,7 @@ class Reader:
         raise self._error(token, f"{shown(token)} where a value of {name} should be", "write one")
 
     def _span(self, first: Token) -> tuple[int, int]:
-        """Return the span from the token `first` to the last one taken."""
+        """Return the span from the token `first` to the end of the last token taken."""
         return (first.start, self._taken_up_to)
 
     def _name(self, role: str) -> str:

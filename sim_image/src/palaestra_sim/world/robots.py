@@ -1,8 +1,8 @@
-"""Find the robots of a world that speak ROS.
+"""Find the robots of a world whose controller is "ros".
 
-A robot speaks ROS if its `controller` is "ros", for any type: a plain Robot or a PROTO, at the top or
-nested in another node's children, endPoint or slots. A PROTO whose own default is "ros" is not found; its
-world must have `controller "ros"`.
+They may have any type: a plain Robot or a PROTO, at the top or nested in another node's children, endPoint or
+slots. A PROTO whose default controller is "ros" is not found; its instance in the world must have
+`controller "ros"`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class WorldRobot:
     """A robot whose controller is "ros".
 
     `robot` is its Robot.name; `ros_name` is from its `--name=`, None without. `supervisor`: it may read and
-    change the whole scene. `synchronize`: it waits for a client to step. `definition` is its DEF name.
+    change the whole scene. `synchronize`: it waits for a client's step. `definition` is its DEF name.
     """
 
     robot: str
@@ -35,7 +35,7 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
     """Return every robot of a world whose controller is "ros", in source order.
 
     Raises:
-        WorldError: the bytes are no world file.
+        WorldError: the bytes are not a world file.
     """
     return tuple(described(node) for node in ros_robots(parse(source, name)))
 
@@ -43,10 +43,10 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
 def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
     """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
 
-    "ros" and "void" are parts of Webots, and "<none>", "<generic>" and "<extern>" are no programs.
+    "ros" and "void" are parts of Webots, and "<none>", "<generic>" and "<extern>" are not programs.
 
     Raises:
-        WorldError: the bytes are no world file.
+        WorldError: the bytes are not a world file.
     """
     named = ((robot_name(node), node.text("controller")) for node in parse(source, name).walk())
     return tuple(
@@ -64,7 +64,7 @@ def ros_robots(world: World) -> tuple[Node, ...]:
 def robot_name(node: Node) -> str:
     """Return the Robot.name of a robot's node.
 
-    Without one, Webots calls a Robot "robot". A PROTO has a default of its own that is not in the world, so
+    The default of a Robot is "robot" in Webots. The default of a PROTO is not in the world, so for a PROTO
     its type is returned instead.
     """
     default = "robot" if node.type_name == "Robot" else node.type_name
@@ -77,7 +77,7 @@ def described(node: Node) -> WorldRobot:
     names = [argument.removeprefix(NAME) for argument in arguments if argument.startswith(NAME)]
     return WorldRobot(
         robot=robot_name(node),
-        ros_name=names[-1] if names else None,  # the controller takes the last one
+        ros_name=names[-1] if names else None,  # the controller uses the last one
         supervisor=node.flag("supervisor", default=False),
         synchronize=SYNCHRONIZE in arguments,
         definition=node.def_name or "",

@@ -1,4 +1,4 @@
-"""The folder around a world that holds all that the world names."""
+"""The folder around a world that holds all files that the world names."""
 
 from pathlib import Path
 
@@ -14,12 +14,12 @@ def placed(world: Path) -> Path:
 
 
 def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
-    """Return the folder around a world that holds all that it names: `given`, or the nearest one.
+    """Return the folder around a world that holds all files that it names: `given`, or the nearest one.
 
-    The nearest one is the Webots project of the world, or above it. `world` is a path as from `placed`.
+    The nearest one is the Webots project of the world, or a folder above it. `world` is a path from `placed`.
 
     Raises:
-        RootError: `given` is not above the world, or does not hold all that the world names.
+        RootError: `given` is not above the world, or does not hold all files that the world names.
         WorldError: a file of the model is wrong, or leads to the root of the file system.
         OSError: a file of the model cannot be read.
     """
@@ -36,7 +36,7 @@ def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
 
 
 def _levels(source: bytes, world: Path, given: Path | None) -> int:
-    """Return by how many folders the files that a world names, and that are there, lead above its own."""
+    """Return the number of folders by which existing files that a world names lead above its folder."""
     if mjcf.is_mjcf(source):
         project = mjcf.Project(world, mjcf.describe(source, str(world)), given)
         project.open()

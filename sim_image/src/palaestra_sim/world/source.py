@@ -1,7 +1,7 @@
 """The bytes of one world or PROTO file, and errors at places in it.
 
-This package works on byte offsets, but people read lines and columns. Only this module converts one into the
-other, so that every error of a world has its place.
+This package works with byte offsets, but people read lines and columns. Only this module converts an offset
+to line and column, so that every error of a world has its place.
 """
 
 import re
@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from palaestra_sim.errors import WorldError
 
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors begin a file in UTF-8 with it
-# Webots takes blanks after the hash, as PROTOs of drones have them.
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors put it at the start of a UTF-8 file
+# Webots accepts blanks after the hash; PROTOs of drones have them.
 _RELEASE = re.compile(rb"#[ \t]*VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
-_CONTINUED = bytes(range(0x80, 0xC0))  # bytes of UTF-8 that begin no character
+_CONTINUED = bytes(range(0x80, 0xC0))  # continuation bytes of UTF-8, which do not begin a character
 _BLOCK = 4096  # bytes between two marks
 _HEADER = re.compile(rb"#[ \t]*VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
@@ -22,7 +22,7 @@ _HEADER = re.compile(rb"#[ \t]*VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?
 class Source:
     """The bytes of a file, and its name in errors; `kind` is "world" or "PROTO".
 
-    A `headless` one is no file: a program gave it, without a first line, in the syntax of today.
+    A `headless` source is not a file: a client sent it, without a first line, in the current syntax.
     """
 
     data: bytes
@@ -33,14 +33,14 @@ class Source:
 
     @property
     def begin(self) -> int:
-        """Return the offset of the first line, after a byte-order mark if there is one."""
+        """Return the offset of the first line, after a byte-order mark if the file has one."""
         return len(_BYTE_ORDER_MARK) if self.data.startswith(_BYTE_ORDER_MARK) else 0
 
     def header(self) -> str:
         """Return the first line, such as `#VRML_SIM R2023b utf8`.
 
         Raises:
-            WorldError: the file isn't UTF-8, or doesn't begin with such a line.
+            WorldError: the file is not UTF-8, or does not begin with such a line.
         """
         try:
             self.data.decode("utf-8")
@@ -72,8 +72,8 @@ class Source:
 class _Mark(NamedTuple):
     """A place in a file: its offset, the lines before it, and the characters before it in its own line.
 
-    A file has a mark for each block, so that the place of an error costs no walk from the begin of the file,
-    nor of a long line.
+    A file has a mark for each block, so the search for the place of an error does not scan the whole file or
+    a long line.
     """
 
     at: int
@@ -82,7 +82,7 @@ class _Mark(NamedTuple):
 
 
 def _marked(data: bytes) -> list[_Mark]:
-    """Return the marks of a file, one for the begin of each block."""
+    """Return the marks of a file, one at the start of each block."""
     marks = [_Mark(0, 0, 0)]
     for at in range(_BLOCK, len(data) + 1, _BLOCK):
         marks.append(_Mark(at, *_after(marks[-1], data, at)))
@@ -90,7 +90,7 @@ def _marked(data: bytes) -> list[_Mark]:
 
 
 def _after(mark: _Mark, data: bytes, offset: int) -> tuple[int, int]:
-    """Return line and column, from 0, of a byte behind a mark and before the next one."""
+    """Return line and column, from 0, of a byte after a mark and before the next one."""
     line = mark.line + data.count(b"\n", mark.at, offset)
     line_start = data.rfind(b"\n", mark.at, offset) + 1
     begins, before = (line_start, 0) if line_start else (mark.at, mark.column)

@@ -10,10 +10,10 @@ A file of stand-ins is TOML, one table for each type:
     box = "size"
 
 `fields` declares the fields and their defaults as a PROTO does, and as Webots' manual prints them. Every
-object has `translation`, `rotation` and `name` too. The shape is `box`, `cylinder`, `sphere`, `plane`, `ring`
-or `wall`, or several of them in `parts`; lengths are numbers or formulas (`formulas.py`). The lists `flat`
-and `drawn` at the top of the file name types with nothing to run into: what lies on the ground, and what is
-only looked at.
+object also has `translation`, `rotation` and `name`. The shape is `box`, `cylinder`, `sphere`, `plane`,
+`ring` or `wall`, or several of them in `parts`; lengths are numbers or formulas (`expressions.py`). The lists
+`flat` and `drawn` at the top of the file name types without obstacles: `flat` objects lie on the ground, and
+`drawn` objects are only visible.
 """
 
 import re
@@ -42,15 +42,15 @@ _FIELDS_OF_FORM: dict[FormKind, tuple[str, ...]] = {
 }
 
 Values: TypeAlias = Mapping[str, Sequence[Item]]
-"""The items of an object's fields; a field that is missing, or has no fitting items, has its default."""
+"""The items of an object's fields; a missing field, or one without fitting items, has its default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StandIn:
-    """The description of a type: its fields, and what stands for it.
+    """The description of a type: its fields, and the shapes that replace it.
 
-    `kind` is "solid"; or "flat" for what lies on the ground, or "drawn" for what is only looked at, which
-    both have no forms.
+    `kind` is "solid", "flat" for an object that lies on the ground, or "drawn" for one that is only visible.
+    The latter two have no forms.
     """
 
     name: str
@@ -79,7 +79,7 @@ def expand(stand_in: StandIn, values: Values) -> tuple[ShapePart, ...]:
 
 @cache
 def shipped() -> Mapping[str, StandIn]:
-    """Return the stand-ins that ship, by type."""
+    """Return the built-in stand-ins, by type."""
     return load_stand_ins(_SHIPPED.read_text(encoding="utf-8"), _SHIPPED.name)
 
 
@@ -108,14 +108,14 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
 
 
 def _listed(names: object, place: str) -> Iterator[str]:
-    """Yield the types of one of the lists."""
+    """Yield the types in one of the lists."""
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise StandInError(f'{place}: this is no list of types; write ["Carpet"], before the first table')
     yield from names
 
 
 class _Entry:
-    """One table of a file of stand-ins; `place` is where it is, for errors."""
+    """One table of a file of stand-ins; `place` is its place in errors."""
 
     def __init__(self, place: str, type_name: str, table: dict[str, Any]) -> None:
         self._place = place
@@ -152,7 +152,7 @@ class _Entry:
         return tuple(self._form(part, f"parts[{number}].") for number, part in enumerate(parts))
 
     def _form(self, table: dict[str, Any], prefix: str) -> Form:
-        """Return the form of a table with one shape; `prefix` is where it is in the entry."""
+        """Return the form of a table with one shape; `prefix` is its place in the entry."""
         shapes: list[FormKind] = [kind for kind in LENGTHS if table.get(kind) is not None]
         unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
         if unknown:
@@ -197,7 +197,7 @@ class _Entry:
         return self._vector(written, place, "xyz")
 
     def _vector(self, written: object, place: str, axes: str) -> tuple[Expression, ...]:
-        """Return the formulas of a list of lengths, or of the name of a field with as many."""
+        """Return the formulas of a list of lengths, or of the name of a field with as many numbers."""
         if isinstance(written, str):
             written = [f"{written}.{axis}" for axis in axes]
         if not isinstance(written, list) or len(written) != len(axes):
@@ -225,7 +225,7 @@ class _Entry:
         return self._formula(table[key], prefix + key) if key in table else None
 
     def _formula(self, written: object, place: str) -> Expression:
-        """Return a formula whose fields are declared, and have such numbers."""
+        """Return a formula, after a check that its fields are declared and have the numbers that it uses."""
         try:
             formula = parse_formula(written)
         except ValueError as error:
@@ -236,7 +236,7 @@ class _Entry:
         return formula
 
     def _check(self, used: str, place: str) -> None:
-        """Refuse a field that is not declared, or has no such numbers."""
+        """Check that a field is declared and has the numbers that a formula uses."""
         summed = used.startswith("sum(")
         name, _, axis = used.removeprefix("sum(").removesuffix(")").partition(".")
         declared = self._fields.get(name)
@@ -262,7 +262,7 @@ def _words(names: Any) -> str:
 
 
 def _numbers(items: Sequence[Item]) -> Sequence[float]:
-    """Return the items as numbers, TRUE as 1; () if one is none."""
+    """Return the items as numbers, TRUE as 1; () if an item is not a number."""
     if not all(isinstance(item, int | float) for item in items):
         return ()
     return tuple(float(item) for item in items if isinstance(item, int | float))
@@ -270,7 +270,7 @@ def _numbers(items: Sequence[Item]) -> Sequence[float]:
 
 @cache
 def _standard(type_name: str) -> Mapping[str, ProtoField]:
-    """Return the fields that every object has; its name is the type in small words, as in Webots."""
+    """Return the fields that every object has; the default name is the type in lower case, as in Webots."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type_name).lower()
     text = f'SFVec3f translation 0 0 0 SFRotation rotation 0 0 1 0 SFString name "{words}"'
     return MappingProxyType(parse_fields(text, type_name))

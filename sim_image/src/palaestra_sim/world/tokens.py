@@ -1,8 +1,8 @@
-r"""Cut a world file into tokens, each with its offset in the bytes.
+r"""Split a world file into tokens, each with its offset in the bytes.
 
-No token has the gaps between tokens (blanks, line ends, commas and comments); the editor of a world copies
-them from the bytes. Only this module reads and writes strings. They have the escapes `\"` and `\\`; every
-other backslash stands for itself.
+The gaps between tokens (blanks, line ends, commas and comments) belong to no token; the editor of a world
+copies them from the bytes. Only this module reads and writes strings. They have the escapes `\"` and `\\`;
+every other backslash stands for itself.
 """
 
 import re
@@ -26,9 +26,9 @@ _TOKEN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-# Possessive, because a long number that is followed by a letter would take quadratic time otherwise.
+# Possessive quantifiers, because otherwise a long number before a letter would take quadratic time.
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
-GLANCE = 40  # characters that an error shows of one text of a file
+GLANCE = 40  # maximum number of characters that an error shows of a text
 _ESCAPE = re.compile(r'\\(["\\])')
 
 
@@ -46,15 +46,15 @@ _PLACE_OF: Final[dict[str, int]] = {kind: place for place, kind in enumerate(_KI
 
 
 class Tokens(Sequence[Token]):
-    """The tokens of a file, of which only the places are kept: nine bytes for each.
+    """The tokens of a file, of which only the places are stored: nine bytes for each.
 
-    A `Token` is made when it is asked for. All of them at once would take 150 MB for a file of 1 MB.
+    A `Token` is created on access. All of them at once would take 150 MB for a file of 1 MB.
     """
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._kinds = bytearray()
-        self._starts = array("I")  # no file has 4 GiB
+        self._starts = array("I")  # 32 bits are enough, because no file has 4 GiB
         self._ends = array("I")
 
     def append(self, kind: str, start: int, end: int) -> None:
@@ -68,7 +68,7 @@ class Tokens(Sequence[Token]):
         return bisect_left(self._starts, offset, lo=first)
 
     def __len__(self) -> int:
-        """Return how many they are, with the one of kind `end`."""
+        """Return the number of tokens, including the one of kind `end`."""
         return len(self._kinds)
 
     @overload
@@ -92,7 +92,7 @@ class Tokens(Sequence[Token]):
 
 
 def tokenize(source: Source) -> Tokens:
-    """Return the tokens of a world in order, closed by an empty one of kind `end`.
+    """Return the tokens of a world in order, followed by an empty one of kind `end`.
 
     Raises:
         WorldError: a string is never closed, a number is malformed, or a character is not allowed.
@@ -115,17 +115,17 @@ def quoted(text: str) -> bytes:
 
 
 def glance(text: str) -> str:
-    """Return a text of a file as an error shows it: shortened to `GLANCE` characters."""
+    """Return a text of a file for an error message, shortened to `GLANCE` characters."""
     return text if len(text) <= GLANCE else text[:GLANCE] + "…"
 
 
 def unquoted(token: Token) -> str:
-    """Return the text that a token of kind `string` stands for."""
+    """Return the text of a token of kind `string`, without quotes and escapes."""
     return _ESCAPE.sub(r"\1", token.text[1:-1].decode())
 
 
 def _misfit(source: Source, match: re.Match[bytes]) -> Exception:
-    """Return the error for text that fits no kind of token."""
+    """Return the error for text that is not a token of any kind."""
     text = match.group()
     if text == b'"':
         fact = "this string is not closed on its line"

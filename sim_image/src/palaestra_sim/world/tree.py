@@ -1,8 +1,8 @@
 """A world or PROTO file as nodes, fields and values.
 
 The readers know the grammars of `.wbt` and `.proto`, but no node type: other modules know the fields of a
-Robot or a PROTO, and find the `DEF` of a `USE`. Nothing is resolved, and every node and value has the span of
-its bytes.
+Robot or a PROTO, and find the `DEF` of a `USE`. Nothing is resolved here, and every node and value has the
+span of its bytes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,9 +25,8 @@ class Is:
 class Value:
     """The value of a field: numbers, booleans, strings, nodes, `None` for NULL; in source order.
 
-    `translation 0 0 1` has three items and is not bracketed. `translation IS place`, which only the body of a
-    PROTO has, has one. The span is (start, end) in bytes,
-    brackets included.
+    `translation 0 0 1` has three items and is not bracketed. `translation IS place`, which occurs only in the
+    body of a PROTO, has one item. The span is (start, end) in bytes, brackets included.
     """
 
     items: tuple[Item, ...]
@@ -58,7 +57,7 @@ class Node:
         return numbers if len(numbers) == len(value.items) else None
 
     def text(self, name: str) -> str | None:
-        """Return the first string of a field, unescaped; None if there is none."""
+        """Return the first string of a field, unescaped; None if the field has no string."""
         return next(iter(self.texts(name)), None)
 
     def texts(self, name: str) -> tuple[str, ...]:
@@ -66,7 +65,7 @@ class Node:
         return tuple(item for item in self._items(name) if isinstance(item, str))
 
     def flag(self, name: str, default: bool) -> bool:  # noqa: FBT001 - reads as in the world
-        """Return the TRUE or FALSE of a field, or `default` if it has none."""
+        """Return the TRUE or FALSE of a field, or `default` if the field has neither."""
         return next((item for item in self._items(name) if isinstance(item, bool)), default)
 
     def nodes(self, name: str) -> tuple["Node", ...]:
@@ -80,7 +79,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """A world file as read: its bytes, its first line, and its nodes in source order.
+    """A parsed world file: its bytes, its first line, and its nodes in source order.
 
     `externs` are the string tokens of its EXTERNPROTO lines; `tokens` end with one of kind `end`.
     """
@@ -107,7 +106,7 @@ class World:
 
 
 def walk(nodes: Sequence[Node]) -> Iterator[Node]:
-    """Yield these nodes and all inside them, parents before children, in source order."""
+    """Yield these nodes and all nodes inside them, parents before children, in source order."""
     waiting = list(reversed(nodes))
     while waiting:
         node = waiting.pop()

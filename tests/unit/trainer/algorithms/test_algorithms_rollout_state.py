@@ -100,10 +100,10 @@ def model_of(name):
         next(space for space in ACTIONS.values() if isinstance(space, ALGORITHMS[name].actions)),
     )
     task = MaskedTask if name == "MaskablePPO" else FakeTask
-    keepers = [Restarter(Member(task(seen, acted))) for _ in range(2)]
+    restarters = [Restarter(Member(task(seen, acted))) for _ in range(2)]
     hyperparameters = {"policy_kwargs": {"net_arch": [4]}} | HYPERPARAMETERS[name]
     return make_model(
-        Algorithm(name=name, hyperparameters=hyperparameters), SimulatorsVecEnv(keepers, 1), seed=1
+        Algorithm(name=name, hyperparameters=hyperparameters), SimulatorsVecEnv(restarters, 1), seed=1
     )
 
 

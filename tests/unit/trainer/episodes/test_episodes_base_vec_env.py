@@ -58,8 +58,8 @@ def wrapped(render_mode=None):
 
 
 @pytest.fixture
-def keepers(make_member):
-    """Make keepers of members with the environment."""
+def restarters(make_member):
+    """Make restarters of members with the environment."""
 
     def make(render_mode=None):
         members = [make_member(f"collect-{index}") for index in range(MEMBERS)]
@@ -71,8 +71,8 @@ def keepers(make_member):
 
 
 VECTORS = {
-    "of a run": lambda keepers: SimulatorsVecEnv(keepers, 1),
-    "tolerant": lambda keepers: FaultTolerantVecEnv(EnvGroup(keepers, lambda: None)),
+    "of a run": lambda restarters: SimulatorsVecEnv(restarters, 1),
+    "tolerant": lambda restarters: FaultTolerantVecEnv(EnvGroup(restarters, lambda: None)),
 }
 CALLS = {
     "an attribute of the environment": lambda env: env.get_attr("level"),
@@ -99,26 +99,26 @@ def reference(request):
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
-def test_a_vector_answers_as_those_of_stable_baselines3(keepers, make, call, reference):
+def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, reference):
     """Callbacks of others are written for them."""
-    assert call(make(keepers())) == call(reference)
+    assert call(make(restarters())) == call(reference)
 
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array"])
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
-def test_a_vector_draws_as_that_of_stable_baselines3(keepers, make, render_mode):
+def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mode):
     """One picture of all, or none."""
-    env, reference = make(keepers(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
+    env, reference = make(restarters(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())
     assert np.array_equal(env.render(), reference.render())
 
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
-def test_the_options_of_the_next_reset_reach_the_environments_once(keepers, make):
+def test_the_options_of_the_next_reset_reach_the_environments_once(restarters, make):
     """Beside those that a run gives."""
-    env = make(keepers())
+    env = make(restarters())
     env.set_options([{"start": index} for index in range(MEMBERS)])
 
     env.reset()
@@ -130,9 +130,9 @@ def test_the_options_of_the_next_reset_reach_the_environments_once(keepers, make
 
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
-def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(keepers, make):
+def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(restarters, make):
     """Curricula set attributes. A new attribute is set in the environment, and not in a wrapper."""
-    env = make(keepers())
+    env = make(restarters())
     env.reset()
 
     env.set_attr("level", 2)
@@ -145,39 +145,39 @@ def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(keepers,
     assert [getattr(it.unwrapped, "fresh", None) for it in env._targets(None)] == [None, "new", None]
 
 
-def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(keepers):
+def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters):
     """The environment of a standby is another object."""
-    [keeper, *_] = keepers()
-    env = SimulatorsVecEnv([keeper], 1)
+    [restarter, *_] = restarters()
+    env = SimulatorsVecEnv([restarter], 1)
     env.reset()
     env.set_attr("level", 2)
 
-    keeper.member.env = wrapped()
+    restarter.member.env = wrapped()
     env.reset()
 
     assert env.reset_infos[0]["level"] == 2
 
 
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
-    keepers, monkeypatch
+    restarters, monkeypatch
 ):
-    """The keeper's own thread uses the simulator meanwhile."""
-    [keeper, *_] = keepers()
-    env = SimulatorsVecEnv([keeper], 1)
+    """The restarter's own thread uses the simulator meanwhile."""
+    [restarter, *_] = restarters()
+    env = SimulatorsVecEnv([restarter], 1)
     env.reset()
 
     with monkeypatch.context() as patch:
         patch.setattr(Restarter, "busy", True)
         env.set_attr("level", 2)
-        meanwhile = keeper.member.env.unwrapped.level
+        meanwhile = restarter.member.env.unwrapped.level
     env.reset()
 
     assert (meanwhile, env.reset_infos[0]["level"]) == (0, 2)
 
 
-def test_a_vector_of_gymnasium_has_calls_and_attributes_as_the_library_s_own(keepers):
+def test_a_vector_of_gymnasium_has_calls_and_attributes_as_the_library_s_own(restarters):
     """Loops of other libraries read and set them."""
-    env = FaultTolerantVectorEnv(EnvGroup(keepers("rgb_array"), lambda: None))
+    env = FaultTolerantVectorEnv(EnvGroup(restarters("rgb_array"), lambda: None))
     reference = SyncVectorEnv([lambda: wrapped("rgb_array")] * MEMBERS)
 
     for each in (env, reference):

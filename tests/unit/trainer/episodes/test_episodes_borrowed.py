@@ -99,8 +99,8 @@ class Frozen(Hostile):
 
 
 @pytest.fixture
-def keeper(make_member):
-    """The keeper of a member with an environment."""
+def restarter(make_member):
+    """The restarter of a member with an environment."""
 
     def make(environment):
         member = make_member("collect-0")
@@ -115,29 +115,29 @@ def actions():
     return np.random.default_rng(1).uniform(-1, 1, (STEPS, 1, 2)).astype(np.float32)
 
 
-def collected(keeper):
+def collected(restarter):
     """Return the rows of the training loop, and the actions that an exact resume repeats."""
-    env = SimulatorsVecEnv([keeper], 1)
+    env = SimulatorsVecEnv([restarter], 1)
     rows = [env.reset(), *(env.step(action) for action in actions())]
     return rows, env.reset_infos, env.snapshot()[0].actions
 
 
-def tolerated(keeper):
+def tolerated(restarter):
     """Return the rows of Stable-Baselines3's interface."""
-    env = FaultTolerantVecEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantVecEnv(EnvGroup([restarter], lambda: None))
     env.seed(1)
     return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
 
 
-def vectorized(keeper):
+def vectorized(restarter):
     """Return the rows of gymnasium's vector interface."""
-    env = FaultTolerantVectorEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantVectorEnv(EnvGroup([restarter], lambda: None))
     return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
 
 
-def alone(keeper):
+def alone(restarter):
     """Return the rows of a single environment."""
-    env = FaultTolerantEnv(EnvGroup([keeper], lambda: None))
+    env = FaultTolerantEnv(EnvGroup([restarter], lambda: None))
     rows = []
     for number, [action] in enumerate(actions()):
         if number % LENGTH == 0:
@@ -146,9 +146,9 @@ def alone(keeper):
     return rows
 
 
-def evaluated(keeper):
+def evaluated(restarter):
     """Return the episodes of an evaluation."""
-    return [episode.record() for episode in evaluate(Fixed(), keeper, [1, 2]).episodes]
+    return [episode.record() for episode in evaluate(Fixed(), restarter, [1, 2]).episodes]
 
 
 class Fixed:
@@ -172,15 +172,15 @@ def plain(value):
 
 @pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
 @pytest.mark.parametrize("hostile", [Hostile, Frozen])
-def test_what_an_environment_does_with_its_objects_changes_nothing(keeper, played, hostile):
+def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
     """Else a last observation is the next episode's first, and an exact resume repeats other actions."""
-    assert plain(played(keeper(hostile))) == plain(played(keeper(Honest)))
+    assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 
 
-def test_actions_of_the_training_loop_stay_as_they_are(keeper):
+def test_actions_of_the_training_loop_stay_as_they_are(restarter):
     """They go into the buffer after the step."""
     given = actions()[0]
-    env = SimulatorsVecEnv([keeper(Hostile)], 1)
+    env = SimulatorsVecEnv([restarter(Hostile)], 1)
     env.reset()
 
     env.step(given)
@@ -197,9 +197,9 @@ class Judge(Honest):
         return np.abs(achieved).sum(axis=1)
 
 
-def test_goals_whose_reward_was_computed_stay_as_they_are(keeper):
+def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
     """Hindsight replay learns from them afterwards."""
-    env = SimulatorsVecEnv([keeper(Honest)], 1, judge=Judge())
+    env = SimulatorsVecEnv([restarter(Honest)], 1, judge=Judge())
     achieved, desired = np.ones((4, 2)), np.zeros((4, 2))
 
     [rewards] = env.env_method("compute_reward", achieved, desired, {})
@@ -220,9 +220,9 @@ class Rising(Honest):
         return super().reset(seed=seed, options=options)
 
 
-def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(keeper):
+def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(restarter):
     """A level that a curriculum sets once, and that the environment raises, fell back at the next reset."""
-    env = SimulatorsVecEnv([keeper(Rising)], 1)
+    env = SimulatorsVecEnv([restarter(Rising)], 1)
     env.reset()
     words = ["first"]
     env.set_attr("level", 5)
@@ -246,9 +246,9 @@ class WithWords(Honest):
         return *others, {**dict.fromkeys(words, "mine"), "palaestra": "mine"}
 
 
-def test_words_of_an_environment_are_not_taken_for_ours(keeper):
+def test_words_of_an_environment_are_not_taken_for_ours(restarter):
     """They stay, but for those that only Stable-Baselines3 may say: these are moved, and a line says so."""
-    env = SimulatorsVecEnv([keeper(WithWords)], 1)
+    env = SimulatorsVecEnv([restarter(WithWords)], 1)
     env.reset()
     with structlog.testing.capture_logs() as logged:
         infos = [env.step(action)[3][0] for action in actions()]

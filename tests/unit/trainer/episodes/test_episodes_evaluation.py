@@ -70,18 +70,18 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
 
 def test_a_spent_budget_ends_an_evaluation(make_member):
     """As it ends training."""
-    keeper = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
+    restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
 
     with pytest.raises(FaultBudgetSpent):
-        evaluate(Walker(), keeper, [10])
+        evaluate(Walker(), restarter, [10])
 
 
 @pytest.mark.parametrize("evaluators", [1, 2, 3, 5])
 def test_several_simulators_share_the_episodes(make_member, evaluators):
     """The result does not depend on how many there are, nor does its order."""
-    keepers = [Restarter(make_member(f"evaluate-{index}")) for index in range(evaluators)]
+    restarters = [Restarter(make_member(f"evaluate-{index}")) for index in range(evaluators)]
 
-    evaluation = evaluate_on_all(Walker(), keepers, [10, 21, 32, 43])
+    evaluation = evaluate_on_all(Walker(), restarters, [10, 21, 32, 43])
 
     assert [episode.seed for episode in evaluation.episodes] == [10, 21, 32, 43]
     assert evaluation.success_rate == 0.5
@@ -104,10 +104,10 @@ def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
     """After Ctrl-C the other half of the episodes must not be played."""
     broken = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
     other = make_member("evaluate-1")
-    keepers = [broken, Restarter(other)] if first else [Restarter(other), broken]
+    restarters = [broken, Restarter(other)] if first else [Restarter(other), broken]
 
     with pytest.raises(FaultBudgetSpent):
-        evaluate_on_all(Walker(), keepers, range(10_000))
+        evaluate_on_all(Walker(), restarters, range(10_000))
 
     assert len(other.env.seeds) < 5_000
 
@@ -129,24 +129,24 @@ def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
 def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_member, alone):
     """Also if they have ended all of their own by then."""
     group = Group(2, least=1)
-    keepers = [
+    restarters = [
         Restarter(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
         Restarter(make_member("evaluate-1"), group=group),
     ]
 
     for _ in range(2):
-        evaluation = evaluate_on_all(Walker(), keepers, [10] if alone else range(20))
+        evaluation = evaluate_on_all(Walker(), restarters, [10] if alone else range(20))
         assert len(evaluation.episodes) == (1 if alone else 20)
 
-    assert keepers[1].member.env.seeds
+    assert restarters[1].member.env.seeds
 
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
     """It would wait for ever."""
-    keeper = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
+    restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):
-        evaluate(Walker(), keeper, [10])
+        evaluate(Walker(), restarter, [10])
 
 
 def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):

@@ -29,8 +29,8 @@ def make_env():
     made = []
 
     def make(*members, limit=None, run_seed=1, **options):
-        keepers = [Restarter(member, limit) for member in members]
-        env = SimulatorsVecEnv(keepers, run_seed, **options)
+        restarters = [Restarter(member, limit) for member in members]
+        env = SimulatorsVecEnv(restarters, run_seed, **options)
         made.append(env)
         return env
 
@@ -47,7 +47,7 @@ def walk(env, steps, action=RIGHT):
 def end_of_mending(name):
     """Return when the thread that mends a member has ended."""
     for thread in threading.enumerate():
-        if thread.name == f"keeper-{name}":
+        if thread.name == f"restarter-{name}":
             thread.join(20.0)
 
 
@@ -395,8 +395,8 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
     """One fault an hour for a week is no reason to give up."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
-    keeper = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
-    env = SimulatorsVecEnv([keeper], 1)
+    restarter = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
+    env = SimulatorsVecEnv([restarter], 1)
     env.reset()
 
     walk(env, 6)
@@ -413,8 +413,8 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
         make_member("collect-1"),
         make_member("collect-2", steps=range(40, 100)),
     ]
-    keepers = [Restarter(member, RestartLimit(restarts=1), group=group) for member in members]
-    env = SimulatorsVecEnv(keepers, 1)
+    restarters = [Restarter(member, RestartLimit(restarts=1), group=group) for member in members]
+    env = SimulatorsVecEnv(restarters, 1)
     env.reset()
     for steps in (1, 2):
         walk(env, steps)
@@ -422,7 +422,7 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
 
     rows = walk(env, 30)
 
-    assert keepers[0].lost
+    assert restarters[0].lost
     assert members[0].log == ["restart", "stop"]
     assert all(infos[1]["palaestra"]["valid"] and infos[2]["palaestra"]["valid"] for _, _, _, infos in rows)
     assert not any(dones[0] or infos[0]["palaestra"]["valid"] for _, _, dones, infos in rows)
@@ -445,12 +445,12 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
 
 def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, clock):
     """A line every few seconds hides those that matter; the first says that the limits work."""
-    keeper = Restarter(make_member(recycle_after=1), clock=clock)
+    restarter = Restarter(make_member(recycle_after=1), clock=clock)
 
     with structlog.testing.capture_logs() as logs:
-        keeper.reset(seed=1)
+        restarter.reset(seed=1)
         for clock.now in (0.0, 5.0, 59.0, 61.0, 62.0, 122.0):
-            keeper.reset(seed=1)
+            restarter.reset(seed=1)
 
     told = [line["times"] for line in logs if line["event"] == "simulator recycled"]
     assert told == [1, 4, 6]

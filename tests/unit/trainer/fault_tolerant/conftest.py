@@ -15,14 +15,14 @@ def make_players():
     made = []
 
     def make(*members, restarts=10, **options):
-        keepers = [Restarter(member, RestartLimit(restarts=restarts)) for member in members]
+        restarters = [Restarter(member, RestartLimit(restarts=restarts)) for member in members]
         rows, released = [], []
 
         def release():
-            settle(keepers)
+            settle(restarters)
             released.append(1)
 
-        players = EnvGroup(keepers, release, played=rows.append, **options)
+        players = EnvGroup(restarters, release, played=rows.append, **options)
         players.rows, players.released = rows, released
         made.append(players)
         return players

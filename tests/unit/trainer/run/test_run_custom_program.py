@@ -24,7 +24,7 @@ PROGRAM = """
 import sys
 from palaestra_trainer import report
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.run.custom_program import Reported
+from palaestra_trainer.run.custom_program import ProgramReport
 for line in sys.stdin:
     report(**eval(line))
     print("reported", flush=True)

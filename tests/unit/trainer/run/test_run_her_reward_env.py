@@ -11,7 +11,7 @@ from palaestra_trainer.configuration import Configuration, Environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
 from palaestra_trainer.robots import Gripper, Scanner
 from palaestra_trainer.run.her_reward_env import make_judge
-from palaestra_trainer.webots.facade_registry import offered
+from palaestra_trainer.webots.facade import open_facades
 
 
 class Reach(gymnasium.Env):
@@ -100,4 +100,4 @@ def test_the_judge_s_simulator_is_offered_to_no_environment(job):
     """There is none behind it."""
     make_judge(job(Reach))
 
-    assert offered() is None
+    assert open_facades.offered() is None

@@ -94,13 +94,13 @@ def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
     watcher = NullWatcher()
     watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
     members = [make_member("collect-0"), make_member("collect-1")]
-    keepers = [Restarter(member, watcher=watcher) for member in members]
-    for keeper in keepers:
-        keeper.reset(1)
+    restarters = [Restarter(member, watcher=watcher) for member in members]
+    for restarter in restarters:
+        restarter.reset(1)
 
     for work in [let_others] * 11 + [compute_for_a_while]:
         members[0].take_step, members[1].take_step = let_others, work
-        take_turns([lambda: keepers[0].step(0), lambda: keepers[1].step(0)])
+        take_turns([lambda: restarters[0].step(0), lambda: restarters[1].step(0)])
 
     assert told == [("collect-1", True)]
 

@@ -198,7 +198,7 @@ def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_membe
         fleet.start(interruption.check)
     released.set()
     for thread in threading.enumerate():
-        if thread.name == "keeper-collect-0":
+        if thread.name == "restarter-collect-0":
             thread.join(DEADLINE_S)
 
     assert member.log == ["start"]
@@ -220,11 +220,11 @@ def test_training_begins_when_enough_of_each_group_are_up(make_configuration, ma
 
     fleet.start()
 
-    assert [keeper.busy for keeper in fleet.collecting] == [True, False]
+    assert [restarter.busy for restarter in fleet.collecting] == [True, False]
     assert "restarted collect-0" not in watcher.told
     members[0].release.set()
-    wait([work for keeper in fleet.collecting if (work := keeper.under_way)], DEADLINE_S)
-    assert all(keeper.up() for keeper in fleet.collecting)
+    wait([work for restarter in fleet.collecting if (work := restarter.under_way)], DEADLINE_S)
+    assert all(restarter.up() for restarter in fleet.collecting)
     assert watcher.told[-1] == "restarted collect-0"
 
 
@@ -269,7 +269,7 @@ def test_training_does_not_begin_before_every_one_was_tried(make_configuration, 
     fleet.start(check)
 
     assert len(looks) >= 3
-    assert all(keeper.up() for keeper in fleet.collecting)
+    assert all(restarter.up() for restarter in fleet.collecting)
 
 
 def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_configuration, make_member):
@@ -279,9 +279,9 @@ def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_con
     fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
 
     fleet.start()
-    wait([work for keeper in fleet.collecting if (work := keeper.under_way)], DEADLINE_S)
+    wait([work for restarter in fleet.collecting if (work := restarter.under_way)], DEADLINE_S)
 
-    assert [keeper.lost for keeper in fleet.collecting] == [True, False]
+    assert [restarter.lost for restarter in fleet.collecting] == [True, False]
     assert watcher.told[-1] == "given up collect-0"
     assert watcher.told.count("flapping collect-0") == 8
 
@@ -290,12 +290,12 @@ def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
     """No thread may touch a simulator that its owner has stopped."""
     fleet, members = make_fleet(held=True)
     fleet.start()
-    (keeper,) = fleet.collecting
-    keeper.begin_mending(SimulatorHung("collect-0", "slow"))
+    (restarter,) = fleet.collecting
+    restarter.begin_mending(SimulatorHung("collect-0", "slow"))
 
     fleet.stop()
 
-    assert not keeper.busy
+    assert not restarter.busy
     assert members[0].log == ["start", "restart", "stop"]
 
 
@@ -315,12 +315,12 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
 def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
     """The others collect meanwhile; a member that runs before it rests again would step while paused."""
     member = make_member(recycle_after=1, held=True)
-    keeper = Restarter(member)
-    keeper.reset(seed=1)
+    restarter = Restarter(member)
+    restarter.reset(seed=1)
 
-    keeper.recycle_resting(episodes=1)
-    busy = keeper.busy
-    keeper.unpause(check=member.release.set)
+    restarter.recycle_resting(episodes=1)
+    busy = restarter.busy
+    restarter.unpause(check=member.release.set)
 
     assert busy
     assert member.log == ["restart", "pause", "run"]
@@ -329,26 +329,26 @@ def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_ru
 def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
     """Its next evaluation is over before it is worn."""
     member = make_member(recycle_after=24)
-    keeper = Restarter(member)
-    keeper.reset(seed=1)
+    restarter = Restarter(member)
+    restarter.reset(seed=1)
 
-    keeper.recycle_resting(episodes=20)
+    restarter.recycle_resting(episodes=20)
 
-    assert not keeper.busy
+    assert not restarter.busy
     assert member.log == []
 
 
 def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make_member):
     """In the background again: another simulator may play its episodes."""
     member = make_member(recycle_after=1, starts=[1])
-    keeper = Restarter(member)
-    keeper.reset(seed=1)
+    restarter = Restarter(member)
+    restarter.reset(seed=1)
 
-    keeper.recycle_resting(episodes=1)
-    keeper.unpause()
-    await_one([keeper])
+    restarter.recycle_resting(episodes=1)
+    restarter.unpause()
+    await_one([restarter])
 
-    assert keeper.up()
+    assert restarter.up()
     assert member.log.count("restart") == 2
 
 
@@ -357,10 +357,10 @@ def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make
     member = make_member("collect-0", recycle_after=1, held=True)
     fleet, _ = make_fleet(member)
     fleet.start()
-    [keeper] = fleet.collecting
-    keeper.reset(seed=1)
+    [restarter] = fleet.collecting
+    restarter.reset(seed=1)
 
-    keeper.recycle_resting(episodes=1)
+    restarter.recycle_resting(episodes=1)
     with structlog.testing.capture_logs() as logs:
         fleet.stop()
 
@@ -370,15 +370,15 @@ def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make
 
 def test_fifty_faults_leave_nothing_behind(make_member):
     """Neither threads nor descriptors: a week of training has many more."""
-    keeper = Restarter(make_member(), RestartLimit(restarts=50))
+    restarter = Restarter(make_member(), RestartLimit(restarts=50))
     threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 
     for number in range(50):
-        keeper.begin_mending(SimulatorHung("collect-0", f"fault {number}"))
-        await_one([keeper])
-        assert keeper.up()
+        restarter.begin_mending(SimulatorHung("collect-0", f"fault {number}"))
+        await_one([restarter])
+        assert restarter.up()
     for thread in threading.enumerate():
-        if thread.name == "keeper-collect-0":
+        if thread.name == "restarter-collect-0":
             thread.join(DEADLINE_S)
 
     assert threading.active_count() == threads

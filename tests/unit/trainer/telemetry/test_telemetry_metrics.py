@@ -149,13 +149,13 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
     """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
-    keeper = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
-    progress.figures.meters = {"collect-0": keeper.meter}
-    keeper.reset(1)
-    keeper.step(1)
-    keeper.step(1)
-    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
-    await_one([keeper])
+    restarter = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
+    progress.figures.meters = {"collect-0": restarter.meter}
+    restarter.reset(1)
+    restarter.step(1)
+    restarter.step(1)
+    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
+    await_one([restarter])
 
     steps = values(progress, "palaestra_simulator_step_duration_seconds_count", "simulator")
     assert steps == {("collect-0",): 2}
@@ -167,13 +167,13 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
 
 def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
     """By the same window by which the simulator is given up."""
-    keeper = Restarter(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
-    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
-    await_one([keeper])
-    before = keeper.meter.budget_spent
+    restarter = Restarter(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
+    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
+    await_one([restarter])
+    before = restarter.meter.budget_spent
     clock.now = 60.0
 
-    assert (before, keeper.meter.budget_spent) == (0.5, 0.0)
+    assert (before, restarter.meter.budget_spent) == (0.5, 0.0)
 
 
 def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):

@@ -153,7 +153,7 @@ def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, mon
 
 
 def test_a_step_ends_the_age_of_progress(progress, clock):
-    """Also one of an evaluation: the keeper of any simulator reports it."""
+    """Also one of an evaluation: the restarter of any simulator reports it."""
     progress.stepped(1)
     clock.now = 60.0
     before = progress.status().last_progress_age_s

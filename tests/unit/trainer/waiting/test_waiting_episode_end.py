@@ -34,8 +34,8 @@ class First:
 
 
 @pytest.fixture
-def keeper(make_member):
-    """The keeper of a member with the task."""
+def restarter(make_member):
+    """The restarter of a member with the task."""
     member = make_member("collect-0")
     member.env = Endless(OBSERVATIONS["Box"], ACTIONS["Discrete"])
     return Restarter(member)
@@ -47,15 +47,15 @@ def few(monkeypatch):
     monkeypatch.setattr(episode_end, "MOST_STEPS", 50)
 
 
-def test_an_evaluation_gives_an_endless_episode_up(keeper):
+def test_an_evaluation_gives_an_endless_episode_up(restarter):
     """A policy that stands still would keep the run for ever, and its steps count as progress."""
     with pytest.raises(ConfigurationError, match="not ended after 50 steps, and an evaluation waits"):
-        evaluate(First(), keeper, [1])
+        evaluate(First(), restarter, [1])
 
 
-def test_reinforce_gives_an_endless_episode_up(keeper):
+def test_reinforce_gives_an_endless_episode_up(restarter):
     """It learns from whole episodes."""
-    model = REINFORCE("MlpPolicy", SimulatorsVecEnv([keeper], 1), policy_kwargs={"net_arch": [4]})
+    model = REINFORCE("MlpPolicy", SimulatorsVecEnv([restarter], 1), policy_kwargs={"net_arch": [4]})
 
     with pytest.raises(ConfigurationError, match="REINFORCE waits for its end; return truncated after"):
         model.learn(30)

@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from palaestra_trainer.webots.facade_registry import give_back, offer, offered, take, withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 
 class Facade:
@@ -21,12 +21,12 @@ def make():
 
     def one():
         made.append(Facade())
-        offer(made[-1])
+        open_facades.offer(made[-1])
         return made[-1]
 
     yield one
     for facade in made:
-        withdraw(facade)
+        open_facades.withdraw(facade)
 
 
 def test_the_newest_facade_is_offered(make):
@@ -34,37 +34,37 @@ def test_the_newest_facade_is_offered(make):
     make()
     newest = make()
 
-    assert offered() is newest
+    assert open_facades.offered() is newest
 
 
 def test_a_facade_has_one_environment_at_a_time(make):
     """Two would move each other's robot."""
     older, newest = make(), make()
-    take(newest)
+    open_facades.take(newest)
 
-    assert offered() is older
-    give_back(newest)
-    assert offered() is newest
+    assert open_facades.offered() is older
+    open_facades.give_back(newest)
+    assert open_facades.offered() is newest
 
 
 def test_a_facade_that_was_closed_is_offered_no_more(make):
     """Also if its environment gives it back later."""
     facade = make()
-    take(facade)
-    withdraw(facade)
-    give_back(facade)
+    open_facades.take(facade)
+    open_facades.withdraw(facade)
+    open_facades.give_back(facade)
 
-    assert offered() is None
+    assert open_facades.offered() is None
 
 
 def test_a_facade_that_nobody_has_is_forgotten():
     """The list must not keep a simulator's connections open."""
     facade = Facade()
-    offer(facade)
+    open_facades.offer(facade)
     del facade
     gc.collect()
 
-    assert offered() is None
+    assert open_facades.offered() is None
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
@@ -74,7 +74,7 @@ def test_a_forked_process_is_offered_none_of_its_parent(make):
 
     child = os.fork()
     if child == 0:
-        os._exit(0 if offered() is None else 1)
+        os._exit(0 if open_facades.offered() is None else 1)
 
     assert os.waitpid(child, 0)[1] == 0
-    assert offered() is facade
+    assert open_facades.offered() is facade

@@ -1,6 +1,6 @@
-"""The hyperparameters that choose a buffer, in the words of Stable-Baselines3 and rl-baselines3-zoo.
+"""The hyperparameters that choose a buffer, with the names of Stable-Baselines3 and rl-baselines3-zoo.
 
-A buffer is HerReplayBuffer by its name, or a class of the author's as `module:Class`.
+A job names HerReplayBuffer, or a class of its author as `module:Class`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class BufferKind:
     """A kind of buffer, and the two hyperparameters that choose one.
 
     Attributes:
-        chooser: names a class.
-        options: holds the keyword arguments of that class.
-        base: what the class extends.
-        by_name: classes that need no module.
+        chooser: the hyperparameter that names a class.
+        options: the hyperparameter with the keyword arguments of that class.
+        base: the class that it must extend.
+        by_name: classes that are named without a module.
     """
 
     chooser: str
@@ -49,7 +49,7 @@ NAMES = (*REPLAY.names, *ROLLOUT.names)
 
 
 def mistakes(given: Mapping[str, Any]) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrong one of these hyperparameters."""
+    """Yield a message with field, fact and remedy for each of these hyperparameters that is wrong."""
     for kind in KINDS:
         yield from _mistakes(kind, given.get(kind.chooser), given.get(kind.options))
 
@@ -58,7 +58,7 @@ def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[
     """Return the keyword arguments of the algorithm's class for these hyperparameters.
 
     Raises:
-        ConfigurationError: the buffer does not take the environment's observation.
+        ConfigurationError: the buffer does not accept the environment's observation.
     """
     found: dict[str, Any] = {}
     for kind in KINDS:
@@ -104,11 +104,11 @@ def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]
 
 
 def _own(kind: BufferKind, name: str) -> type[BaseBuffer]:
-    """Return the class that `name` names, made to store or sample valid rows only."""
+    """Return a subclass of the class that `name` names; it stores or samples only valid rows."""
     return own_buffers.with_valid_rows(user_imports.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
 
 
 def _options(cls: type[BaseBuffer]) -> dict[str, object]:
-    """Return the keyword arguments that an author's class adds; the algorithm gives those of its base."""
+    """Return the keyword arguments that an author's class adds; the algorithm sets those of its base."""
     given = {*parameters(ReplayBuffer), *parameters(RolloutBuffer)}
     return {name: found for name, found in parameters(cls).items() if name not in given}

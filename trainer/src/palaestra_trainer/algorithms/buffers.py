@@ -1,8 +1,8 @@
 """Buffers that keep invalid rows out of every loss.
 
-A row is invalid if its simulator broke during the step. The episode is cut
-before it: the last valid row counts as truncated, so its value is bootstrapped
-and the fault is no penalty.
+A row is invalid if its simulator broke during the step. The episode is truncated
+before it: the value of the last valid row is bootstrapped, so the fault is not a
+penalty.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from palaestra_trainer.infos import is_valid
 
 
 def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
-    """Return which rows of a vector step are valid; shape (n_envs,), bool."""
+    """Return a mask of the valid rows of a vector step; shape (n_envs,), bool."""
     return np.array([is_valid(info) for info in infos], dtype=bool)
 
 
@@ -39,9 +39,9 @@ class Positions(NamedTuple):
 
     Attributes:
         next: row for the next step.
-        full: whether every row is in use; if not, the rows before `next` are.
-        newest: for each member the row of its last step; None if it has none.
-        columns: for each member its next row and whether its column is full; none without such columns.
+        full: whether every row is in use; if not, only the rows before `next` are.
+        newest: for each member the row of its last step; None if no row is.
+        columns: for each member its next row and whether its column is full; empty for a flat buffer.
     """
 
     next: int
@@ -65,7 +65,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
     Attributes:
         chunk_rows: rows of one chunk; the last one may have fewer.
-        changed: numbers of the chunks that were written to; clear it after saving them.
+        changed: numbers of the chunks that have changed; clear it after saving them.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class ValidReplayBuffer(ReplayBuffer):
         self._newest = list(newest)
 
     def can_sample(self) -> bool:
-        """Return whether there is a row to learn from."""
+        """Return whether the buffer has a row to learn from."""
         return self.size() > 0
 
     def add(
@@ -118,20 +118,20 @@ class ValidReplayBuffer(ReplayBuffer):
                 self._truncate(self._newest[row])
 
     def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
-        """Return the rows from `start` to `stop` by column, as they are in memory: views, (rows, 1, ...)."""
+        """Return the rows from `start` to `stop` by column, as views of memory of shape (rows, 1, ...)."""
         return {name: column[start:stop] for name, column in self._columns().items()}
 
     def fill(self, start: int, rows: Mapping[str, np.ndarray]) -> None:
-        """Write rows that `rows` returned back to their place; the write positions do not change.
+        """Write back rows that `rows` returned; the write positions do not change.
 
         Raises:
-            ValueError: they have another shape.
+            ValueError: the rows have another shape.
         """
         for name, column in self._columns().items():
             column[start : start + len(rows[name])] = rows[name]
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop every row in use but the `kept` ones, which move to the start, oldest first."""
+        """Drop all rows in use except the `kept` ones, which move to the start, oldest first."""
         order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
         order = order[kept[order]]
         self.fill(0, {name: column[order] for name, column in self.rows().items()})
@@ -158,25 +158,25 @@ class ValidDictReplayBuffer(ValidReplayBuffer, DictReplayBuffer):
 
 
 class ValidRolloutBuffer(RolloutBuffer):
-    """A rollout buffer in which invalid rows keep their place and are never sampled."""
+    """A rollout buffer in which invalid rows keep their positions and are never sampled."""
 
     valid: np.ndarray
 
     def reset(self) -> None:
-        """Empty the buffer; every row is valid until `mark` says otherwise."""
+        """Empty the buffer; every row is valid until `mark` changes that."""
         self.valid = np.ones((self.buffer_size, self.n_envs), dtype=bool)
         super().reset()
 
     def mark(self, valid: np.ndarray) -> None:
-        """Set which rows of the next added step are valid; shape (n_envs,)."""
+        """Set the mask of valid rows for the next added step; shape (n_envs,)."""
         if self.pos < self.buffer_size:
             self.valid[self.pos] = valid
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Compute both as for a rollout that was truncated before each invalid row.
 
-        An invalid row ends its episode. Its reward is set to its own value, so its error is 0. Then the row
-        before it uses the value of the state that they share, and nothing else.
+        An invalid row ends its episode. Its reward is set to its own value, so its error is 0. So the row
+        before it uses only the value of the state between them.
         """
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)

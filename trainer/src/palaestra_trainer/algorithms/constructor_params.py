@@ -1,4 +1,4 @@
-"""The parameters of classes that pass keyword arguments on to the class that they extend."""
+"""The parameters of classes that pass keyword arguments to the class that they extend."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def parameters(cls: Configurable) -> Mapping[str, inspect.Parameter]:
 
 
 def types(cls: Configurable) -> Mapping[str, Any]:
-    """Return the annotations of these parameters; Any for one that has none, or that cannot be resolved."""
+    """Return the annotations of these parameters; Any if an annotation is missing or cannot be resolved."""
     found: dict[str, Any] = {}
     for constructor in _constructors(cls):
         found = _hints(constructor) | found
@@ -36,7 +36,7 @@ def types(cls: Configurable) -> Mapping[str, Any]:
 
 
 def _constructors(cls: type[object]) -> Iterator[Any]:
-    """Yield the constructors that take part, from the class to the first one without `**kwargs`."""
+    """Yield the constructors that get arguments, from the class to the first one without `**kwargs`."""
     for ancestor in cls.__mro__:
         constructor = vars(ancestor).get("__init__")
         if constructor is None:
@@ -48,7 +48,7 @@ def _constructors(cls: type[object]) -> Iterator[Any]:
 
 def _hints(constructor: Any) -> dict[str, Any]:
     try:
-        # Stable-Baselines3 uses VecEnv in a type, and imports it only for type checkers.
+        # Stable-Baselines3 uses VecEnv in annotations, but imports it only for type checkers.
         return get_type_hints(constructor, localns={"VecEnv": VecEnv})
     except NameError:
         return {}

@@ -1,7 +1,7 @@
-"""The device of a model's networks: the CPU, unless a job asks for a GPU and PyTorch finds one.
+"""The device of a model's networks: the CPU, unless a job requests a GPU and PyTorch finds one.
 
-The CPU is the default even with a GPU. Networks of some hundred units learn faster on it, and only on the
-CPU does a resumed run end with exactly the same numbers.
+The CPU is the default even with a GPU. Networks of some hundred units learn faster on it. Only on the CPU
+does a resumed run end with exactly the same numbers.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Detect NaN and infinite numbers in a learner, at the update that produced them.
 
 After each update, its losses and every learned tensor are checked: one norm per tensor, all in one call.
-That takes 0.05 to 0.2 ms: 0.6 % of an update of DQN, 0.04 % of one of PPO and 2 % of one of A2C, whose
-rollout of five steps takes as long again. No model acts, is evaluated or is saved before this check.
-Observations and rewards are checked where they arise, in `palaestra_trainer.simulators.finite_check`.
+The check takes 0.05 to 0.2 ms: 0.6 % of an update of DQN, 0.04 % of one of PPO and 2 % of one of A2C, whose
+rollout of five steps takes as long as its update. A model does not act, and is not evaluated or saved, before
+this check. `palaestra_trainer.simulators.finite_check` checks observations and rewards.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ class Learner:
 
     def __init__(self, model: BaseAlgorithm) -> None:
         self._model = model
-        # A coefficient that is learned besides the networks is an attribute of the model.
+        # A learned coefficient that is not part of a network is an attribute of the model.
         own = {name: value for name, value in vars(model).items() if isinstance(value, torch.Tensor)}
         self._tensors: Mapping[str, torch.Tensor] = dict(model.policy.named_parameters()) | own
 
     def check(self, step: int) -> None:
-        """Return if every number is finite.
+        """Check that every number is finite.
 
         Raises:
-            Diverged: one is not; the message names the step, and the losses and tensors that hold it.
+            Diverged: a number is not; the message names the step, and the losses and tensors with it.
         """
         if found := self.not_finite():
             raise Diverged(f"step {step}: {found}; {REMEDY}")
 
     def not_finite(self) -> str:
-        """Return the losses and tensors that hold NaN or infinity, as text; "" if there are none."""
+        """Return the losses and tensors that hold NaN or infinity, as text; "" if all are finite."""
         losses = list(_wrong_losses(self._model.logger.name_to_value))
         tensors = list(self._wrong_tensors())
         more = f" and {len(tensors) - 1} other tensors" if len(tensors) > 1 else ""
@@ -58,7 +58,7 @@ class Learner:
 
 
 def _wrong_losses(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the losses that are not finite; other figures, such as an explained variance, may be infinite."""
+    """Yield the losses that are not finite; other values, such as an explained variance, may be infinite."""
     for name, value in values.items():
         if name.startswith("train/") and name.endswith("loss") and not math.isfinite(value):
             yield f"{name} is {value}"

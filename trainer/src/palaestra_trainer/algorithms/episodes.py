@@ -15,7 +15,7 @@ class Batch:
     """The steps of some whole episodes, one after the other.
 
     Attributes:
-        observations: the observation before each step, shape (steps, *observation); of a Dict, by key.
+        observations: the observation before each step, shape (steps, *observation); for a Dict, by key.
         actions: the action of each step, before it is clipped to its bounds; shape (steps, *action).
         returns: discounted reward from each step to its episode's end, shape (steps,), float32.
     """
@@ -33,11 +33,11 @@ class _Episode:
 
 
 class EpisodeRecorder:
-    """Gathers up to `wanted` whole valid episodes of each of `environments` environments.
+    """Collects up to `wanted` whole valid episodes of each of `environments` environments.
 
-    Further episodes of an environment that has its number are dropped, and so
-    are episodes with an invalid row. An environment whose last row was invalid is
-    absent, perhaps for good: the others do not wait for it.
+    When an environment has `wanted` episodes, its further ones are dropped.
+    Episodes with an invalid row are dropped too. An environment whose last row was
+    invalid counts as absent, perhaps permanently: the others do not wait for it.
     """
 
     def __init__(self, environments: int, wanted: int) -> None:
@@ -48,7 +48,7 @@ class EpisodeRecorder:
 
     @property
     def complete(self) -> bool:
-        """Whether every environment has its number of episodes, except absent ones."""
+        """Whether every environment has `wanted` episodes, except absent ones."""
         ready = [len(episodes) == self._wanted for episodes in self._whole]
         return any(ready) and all(done or away for done, away in zip(ready, self._away, strict=True))
 

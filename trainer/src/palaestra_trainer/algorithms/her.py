@@ -1,9 +1,9 @@
 """Hindsight experience replay: learning from goals that an episode reached by accident.
 
-A job chooses it in the words of Stable-Baselines3 and rl-baselines3-zoo: `replay_buffer_class` and
-`replay_buffer_kwargs`. Goals are drawn from whole episodes. So each member has a column of its own, with a
-write position of its own, and a fault closes the episode at its last valid row. Source of the method:
-Andrychowicz et al. (2017), https://arxiv.org/abs/1707.01495
+A job chooses it by hyperparameters of Stable-Baselines3 and rl-baselines3-zoo: `replay_buffer_class` and
+`replay_buffer_kwargs`. Goals are drawn from whole episodes. So each member has its own column, with its own
+write position, and a fault closes the episode at its last valid row. Source of the method: Andrychowicz et
+al. (2017), https://arxiv.org/abs/1707.01495
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def wanted(algorithm: Algorithm) -> bool:
 
 
 def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrong option of the buffer."""
+    """Yield a message with field, fact and remedy for each wrong option of the buffer."""
     for name, value in options.items():
         if name not in OPTIONS:
             yield f"{field}.{name}: is not an option here; {nearest(str(name), list(OPTIONS))}"
@@ -52,10 +52,11 @@ def mistakes(options: Mapping[str, Any], field: str) -> Iterator[str]:
 
 
 def refuse_other_observations(observation: spaces.Space[Any]) -> None:
-    """Return if an observation has goals.
+    """Check that an observation has goals.
 
     Raises:
-        ConfigurationError: it is no Dict with the keys of a goal environment, or its goals are not alike.
+        ConfigurationError: it is not a Dict with the keys of a goal environment, or its goals have different
+            shapes.
     """
     parts = observation.spaces if isinstance(observation, spaces.Dict) else {}
     if not parts.keys() >= {"observation", *GOALS}:
@@ -89,11 +90,11 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         HerReplayBuffer.__init__(
             self, buffer_size, observation_space, action_space, env, device=device, n_envs=n_envs, **options
         )
-        # An info would have to be pickled into checkpoints, and none is passed to `compute_reward`.
+        # Infos are not stored: checkpoints would have to pickle them, and `compute_reward` does not get them.
         self.infos = np.empty((0, n_envs))
         self._next = [0] * n_envs
         self._filled = [False] * n_envs
-        self._under_way = [0] * n_envs  # rows of the episode that is not closed yet
+        self._under_way = [0] * n_envs  # number of rows of the open episode
         self._waited = False
         self.chunk_rows = max(1, CHUNK_BYTES // sum(array[:1].nbytes for array in self.rows().values()))
         self.changed = set()
@@ -115,19 +116,19 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         self._next = [row for row, _ in positions.columns]
         self._filled = [filled for _, filled in positions.columns]
         for column, start in enumerate(positions.newest):
-            # Without a start, the episode does not continue: its rows are never closed, so never sampled.
+            # Without a start, the episode does not continue: it is never closed, so its rows are not sampled.
             rows = 0 if start is None else (self._next[column] - start) % self.buffer_size
             self._under_way[column] = self.buffer_size if start == self._next[column] else rows
             open_rows = self._rows_under_way(column)
-            if self.ep_length[open_rows, column].any():  # closed in a rollout that was dropped
+            if self.ep_length[open_rows, column].any():  # the episode was closed in a dropped rollout
                 self._set_episode(open_rows, column, self._start(column), 0)
 
     def size(self) -> int:
-        """Return the number of rows in use, of the fullest column."""
+        """Return the number of rows in use in the fullest column."""
         return max(map(self._used, range(self.n_envs)))
 
     def can_sample(self) -> bool:
-        """Return whether an episode is closed; the first time that none is, it is logged."""
+        """Return whether an episode is closed; log the first time that this is False."""
         ready = bool((self.ep_length > 0).any())
         if not ready and not self._waited:
             self._waited = True
@@ -143,7 +144,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         done: np.ndarray,
         infos: list[dict[str, Any]],
     ) -> None:
-        """Append each valid row to its member's column; an invalid one closes the episode before it."""
+        """Append each valid row to its member's column; an invalid row closes the episode before it."""
         actions = action.reshape((self.n_envs, self.action_dim))
         for column, info in enumerate(infos):
             if not is_valid(info):
@@ -163,7 +164,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
                 self._close(column)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop every episode of which a row is not among the `kept` ones."""
+        """Drop every episode with a row that is not `kept`."""
         for column in range(self.n_envs):
             lost = np.flatnonzero(~kept[: self._used(column)])
             for start in set(self.ep_start[lost, column].tolist()):
@@ -194,14 +195,14 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         self._under_way[column] = min(self._under_way[column] + 1, self.buffer_size)
 
     def _forget_episode_from(self, row: int, column: int) -> None:
-        """Let no row from `row` on be sampled of the episode of which `row` is overwritten."""
+        """Exclude `row` and the later rows of its old episode from sampling, because `row` is overwritten."""
         length = int(self.ep_length[row, column])
         if length:
             rest = length - (row - int(self.ep_start[row, column])) % self.buffer_size
             self._set_episode((row + np.arange(rest)) % self.buffer_size, column, row, 0)
 
     def _cut(self, column: int) -> None:
-        """Close the episode under way at its last row, as truncated."""
+        """Close the open episode at its last row, as truncated."""
         if self._under_way[column]:
             last = (self._next[column] - 1) % self.buffer_size
             self.dones[last, column] = self.timeouts[last, column] = 1.0

@@ -1,8 +1,8 @@
-"""The values of hyperparameters: checked against a signature, and converted to what it takes.
+"""Check the values of hyperparameters against a signature, and convert them to its types.
 
 A job cannot contain a schedule, a tuple or a class. Schedules are text, points or names of functions, see
-`schedules` and `own_schedules`, and a list stands for a tuple. Activation functions and optimizers have their
-PyTorch names, and any class that a policy takes may be written as `module:Class`.
+`schedules` and `own_schedules`, and a list is written for a tuple. Activation functions and optimizers have
+their PyTorch names, and any class that a policy takes may be written as `module:Class`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ CLASSES: Mapping[str, Mapping[str, type[Any]]] = {
         for it in (optim.Adam, optim.AdamW, optim.NAdam, optim.RAdam, optim.RMSprop, optim.SGD)
     },
 }
-# The classes of which an argument of a policy must be a subclass.
+# Some arguments of a policy must be a subclass of these.
 BASES: Mapping[str, type[Any]] = {
     "activation_fn": nn.Module,
     "optimizer_class": optim.Optimizer,
     "features_extractor_class": BaseFeaturesExtractor,
 }
-# RL-Zoo's files write the modules of PyTorch's classes, by any of the usual names.
+# Files of RL-Zoo write PyTorch's classes with a module, by any of its usual names.
 _MODULE = re.compile(r"^((torch|th)\.)?(nn|optim)\.(?=\w+$)")
 _GIVEN = frozenset({"self", "observation_space", "action_space", "lr_schedule", "use_sde", "return"})
 _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text", type(None): "null"}
@@ -51,7 +51,7 @@ _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: 
 def mistakes(
     cls: type[BaseAlgorithm], policy: type[BasePolicy], hyperparameters: Mapping[str, Any]
 ) -> Iterator[str]:
-    """Yield field, fact and remedy of each value that the class or its policy does not accept."""
+    """Yield a message with field, fact and remedy for each value that the class or its policy refuses."""
     known = types(cls)
     for name, value in hyperparameters.items():
         annotation = known.get(name, Any)
@@ -77,7 +77,7 @@ def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> d
 
 
 def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None) -> type[BasePolicy]:
-    """Return the policy whose arguments a job gives: the one that it names, else the one for numbers."""
+    """Return the policy whose arguments a job may set: the one that it names, else the one for numbers."""
     if isinstance(named, type):
         return named
     aliases = cls.policy_aliases
@@ -86,7 +86,7 @@ def policy_class(cls: type[BaseAlgorithm], named: str | type[BasePolicy] | None)
 
 
 def arguments_of(policy: type[BasePolicy]) -> list[str]:
-    """Return the arguments of a policy that a job may give."""
+    """Return the arguments of a policy that a job may set."""
     return [name for name in types(policy) if name not in _GIVEN]
 
 
@@ -133,7 +133,7 @@ def _mistakes_of_schedule(field: str, name: str) -> Iterator[str]:
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class for a policy's argument: `module:Class`, or a name of PyTorch's in any case.
+    """Return the class for a policy's argument: `module:Class`, or a PyTorch name in upper or lower case.
 
     The name may have its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
     """
@@ -146,12 +146,12 @@ def _class(argument: str, name: Any) -> type[Any] | None:
 
 
 def _bare(name: str) -> str:
-    """Return the name of a class without its module, if that is one of PyTorch's."""
+    """Return the name of a class without its module, if the module is PyTorch's."""
     return _MODULE.sub("", name, count=1)
 
 
 def _refused(value: Any, annotation: Any) -> str:
-    """Return why a value does not match an annotation, as text; "" if it does."""
+    """Return the reason why a value does not match an annotation, as text; "" if it matches."""
     if get_origin(annotation) is type:
         return f"{value!r} is refused; name a class as module:Class"
     config = ConfigDict(arbitrary_types_allowed=True)
@@ -185,7 +185,7 @@ def _kinds(annotation: Any) -> set[Any]:
 
 
 def _words(annotation: Any) -> str:
-    """Return the accepted values of an annotation, in words for a person who writes YAML."""
+    """Return the accepted values of an annotation, as text for a person who writes YAML."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if annotation in _WORDS:
         return _WORDS[annotation]

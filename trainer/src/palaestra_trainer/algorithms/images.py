@@ -1,7 +1,7 @@
 """Image observations: their network, and the order of their channels.
 
 Environments return images with channels last. Stable-Baselines3 transposes them for PyTorch, so its models
-see channels first. A checkpoint keeps them as environments return them.
+get channels first. A checkpoint keeps the layout of the environments.
 """
 
 from __future__ import annotations
@@ -22,24 +22,25 @@ from palaestra_trainer.configuration import Cnn
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
-    """Return the policy's arguments with the network for images that the algorithm names."""
+    """Return the policy's arguments, with the network for images if the job sets `cnn`."""
     if cnn is None:
         return policy_kwargs
-    # As with NatureCNN, nothing is between features and outputs unless `net_arch` names layers.
+    # As with NatureCNN, features and outputs are connected directly unless `net_arch` names layers.
     return {"net_arch": [], **policy_kwargs, "features_extractor_class": SmallCnn}
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:
-    """Return an environment whose images have channels first; return any other unchanged.
+    """Return an environment whose images have channels first; one without images is returned unchanged.
 
-    Stable-Baselines3 would transpose around a normalizer, whose statistics would then have another layout.
+    Otherwise Stable-Baselines3 would transpose after the normalizer, whose statistics would then have another
+    layout.
     """
     last = [image for image in images_in(env.observation_space) if not is_image_space_channels_first(image)]
     return VecTransposeImage(env) if last else env
 
 
 def as_returned(model: BaseAlgorithm, observations: Observations) -> Observations:
-    """Return observations that a model saw in the layout of its environments."""
+    """Convert observations from the layout of a model to that of its environments."""
     if isinstance(observations, dict):
         keys = _transposed(model)
         return {key: _channels_last(seen) if key in keys else seen for key, seen in observations.items()}
@@ -47,7 +48,7 @@ def as_returned(model: BaseAlgorithm, observations: Observations) -> Observation
 
 
 def as_seen(model: BaseAlgorithm, observations: Observations) -> Observations:
-    """Return observations of a model's environments in the layout that the model sees."""
+    """Convert observations from the layout of a model's environments to that of the model."""
     if isinstance(observations, dict):
         keys = _transposed(model)
         return {key: _channels_first(part) if key in keys else part for key, part in observations.items()}

@@ -1,4 +1,4 @@
-"""Settings by which a run learns nothing, or takes other steps than it says: reported, not refused."""
+"""Settings with which a run learns little or takes more steps than set; they are logged, not refused."""
 
 from __future__ import annotations
 

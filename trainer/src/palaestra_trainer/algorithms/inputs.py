@@ -1,8 +1,7 @@
-"""Copies of the inputs of networks that a job brings.
+"""Copy the inputs of networks of a job's author.
 
-Stable-Baselines3 gives a network the memory in which it keeps the observation until it stores the row, and
-gives the networks of actor and critic the same batch. One that writes into its input would change what is
-learned from.
+Stable-Baselines3 passes a network the same memory that it later stores as a row, and passes the same batch to
+the networks of actor and critic. A network that writes into its input would change the data for learning.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ _LIBRARIES = {"palaestra_trainer", "sb3_contrib", "stable_baselines3", "torch"}
 
 
 def give_copies(model: BaseAlgorithm) -> None:
-    """Let each network of the job's author that the policy of `model` calls get copies of its input."""
+    """Make each network of the job's author in the policy of `model` get copies of its inputs."""
     _hook(model.policy, set())
 
 
 def _hook(module: nn.Module, seen: set[int]) -> None:
-    """Hook the outermost modules of other packages; a module may be a part of several."""
+    """Hook the outermost modules of other packages; `seen` has the modules that were visited before."""
     if id(module) in seen:
         return
     seen.add(id(module))

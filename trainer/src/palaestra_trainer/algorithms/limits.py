@@ -1,4 +1,4 @@
-"""The ranges of hyperparameters: outside of them an algorithm fails while it learns, or learns nothing.
+"""The ranges of hyperparameters; with values outside of them an algorithm fails later, or learns nothing.
 
 The algorithms check few of them, and most of these only in `learn`, when simulators are up.
 """
@@ -18,8 +18,8 @@ class Range:
     """The numbers that a hyperparameter may have.
 
     Attributes:
-        least: the least one.
-        most: the greatest one; None: there is none.
+        least: the smallest number.
+        most: the greatest number; None: no upper limit.
         open: whether `least` itself is refused.
     """
 
@@ -28,12 +28,12 @@ class Range:
     open: bool = False
 
     def __contains__(self, value: float) -> bool:
-        """Return whether a number may be used; NaN may not."""
+        """Return whether a number is in the range; NaN is not."""
         enough = value > self.least if self.open else value >= self.least
         return enough and (self.most is None or value <= self.most)
 
     def __str__(self) -> str:
-        """Return the range in words, for a message."""
+        """Return the range as text for a message."""
         if self.most is not None:
             return f"{self.least:g} to {self.most:g}"
         return f"a number {'above' if self.open else 'of at least'} {self.least:g}"
@@ -80,7 +80,7 @@ RANGES_OF_POLICY: Mapping[str, Range] = {
     "n_lstm_layers": COUNT,
     "n_quantiles": COUNT,
 }
-# Batch normalization, or a deviation of advantages, of a single row is none.
+# Batch normalization and the deviation of advantages need at least two rows.
 LEAST_BATCH: Mapping[str, int] = {"CrossQ": 2, "RecurrentPPO": 2, "MaskablePPO": 2}
 
 
@@ -88,7 +88,7 @@ def out_of_range(cls: type, given: Mapping[str, Any]) -> Iterator[tuple[str, str
     """Yield name and fact of each number that is out of its range; values of other types are ignored.
 
     Args:
-        cls: its class; a class that extends one of the table has the same ranges.
+        cls: class of the algorithm; a class that extends one of the table has the same ranges.
         given: hyperparameters by name.
     """
     ranges = dict(RANGES)
@@ -120,7 +120,7 @@ def _outside(prefix: str, given: Mapping[str, Any], ranges: Mapping[str, Range])
 
 
 def _layers(layers: Any) -> Iterator[tuple[str, str]]:
-    """Yield the widths of layers that are none; the layers may be lists by the name of their network."""
+    """Yield name and fact of each invalid width of a layer; layers may be lists by the name of a network."""
     lists = layers.values() if isinstance(layers, dict) else [layers]
     for widths in lists:
         for width in widths if isinstance(widths, list) else ():
@@ -129,7 +129,7 @@ def _layers(layers: Any) -> Iterator[tuple[str, str]]:
 
 
 def _first(frequency: Any) -> Any:
-    """Return the number of a frequency, which may be a list of it and its unit; None: it has none."""
+    """Return the number of a frequency, which may be a list of number and unit; None if it has no number."""
     value = frequency[0] if isinstance(frequency, list | tuple) and frequency else frequency
     return value if _is_number(value) else None
 

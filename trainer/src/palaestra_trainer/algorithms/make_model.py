@@ -1,7 +1,7 @@
-"""Check the algorithm of a job, and make the model.
+"""Check the algorithm of a job, and create the model.
 
-Hyperparameters are keyword arguments of the class and are checked against its signature, names and values,
-so a mistake is found before a simulator is started. Each value that a job sets replaces one default.
+Hyperparameters are keyword arguments of the class. Their names and values are checked against its signature,
+so a mistake is found before a simulator starts. Each value that a job sets replaces one default.
 """
 
 from __future__ import annotations
@@ -81,30 +81,30 @@ def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
 
 
 def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
-    """Return the algorithm with all its hyperparameters: those that are given, and defaults for the rest.
+    """Return the algorithm with all its hyperparameters: those of the job, and defaults for the rest.
 
     Args:
-        algorithm: what the job says.
-        environment: the id of its environment, as the job says it.
+        algorithm: the algorithm of the job.
+        environment: the id of its environment, as in the job.
     """
     arena = environment.rpartition(":")[2] in ARENA_ENVIRONMENTS
     return with_defaults(algorithm, entry_of(algorithm.name).arena if arena else {})
 
 
 def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
-    """Return the algorithm with all its hyperparameters; those of `better` precede the class's defaults."""
+    """Return the algorithm with all its hyperparameters; `better` replaces defaults of the class."""
     known = entry_of(algorithm.name).defaults
     return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
 
 
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
-    """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
+    """Return a new model of the algorithm for `env` on a device; `seed` decides its initial weights.
 
-    Where the algorithm is to normalize, the model's own environment does, see `normalization`.
-    The hyperparameter `policy` is that of a run that began when every observation got MlpPolicy.
+    If the algorithm normalizes, the model's own environment does that, see `normalization`. Only runs of old
+    releases, which used MlpPolicy for every observation, have the hyperparameter `policy`.
 
     Raises:
-        ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
+        ConfigurationError: the algorithm does not fit the environment, or a hyperparameter has a wrong value.
     """
     entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters
@@ -121,7 +121,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         chosen["action_noise"] = added
     chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)
     if "target_update_interval" in chosen:
-        # A vector step is num_envs steps: the target can't be updated more often than that.
+        # A vector step is num_envs steps, and the target cannot be updated more often than each vector step.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     if algorithm.normalize:
         if not algorithm.normalize.observations or isinstance(env.observation_space, spaces.Dict):
@@ -133,8 +133,8 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     except ConfigurationError:
         raise
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
-        # Stable-Baselines3 checks values and spaces by assertions; a policy of the job's author, or a part
-        # of one, may raise anything. A RuntimeError may be a device without memory, which a retry may have.
+        # Stable-Baselines3 checks values and spaces by assertions, and a policy of the job's author may raise
+        # anything. A RuntimeError is not caught: the device may be out of memory, and a retry may help.
         raise ConfigurationError(
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
             f"({fact_of(error)}); change them, or use another algorithm"
@@ -145,7 +145,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
 
 
 def _refuse_dropping_all(model: BaseAlgorithm) -> None:
-    """Refuse a TQC that drops all quantiles of its critics: the mean of none is NaN."""
+    """Refuse a TQC that drops all quantiles of its critics, because the mean of no quantiles is NaN."""
     if not isinstance(model, TQC) or model.top_quantiles_to_drop_per_net < model.critic.n_quantiles:
         return
     raise ConfigurationError(

@@ -1,7 +1,7 @@
 """MaskablePPO's rollouts without invalid rows.
 
-A row has the mask that its action was chosen by. While a simulator is mended, its rows have masks that allow
-every action; these rows reach no loss.
+A row has the mask with which its action was chosen. While a simulator restarts, its rows have masks that
+allow every action; these rows reach no loss.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class _Masked(ValidRolloutBuffer):
     def _parts(self, rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
         """Yield `rows` in parts of `size`; a single last row joins the part before it.
 
-        Unlike PPO, MaskablePPO takes the deviation of a single advantage, which is NaN.
+        Unlike PPO, MaskablePPO computes the deviation even of a single advantage, which is NaN.
         """
         return batches(rows, size)
 

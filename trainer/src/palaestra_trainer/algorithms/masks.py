@@ -15,7 +15,7 @@ from palaestra_trainer.errors import ConfigurationError
 
 
 def is_masked(algorithm: Algorithm) -> bool:
-    """Return whether an algorithm asks the environment which actions it allows."""
+    """Return whether an algorithm needs masks of the allowed actions from the environment."""
     return issubclass(entry_of(algorithm.name).original, MaskablePPO)
 
 
@@ -25,15 +25,15 @@ def takes_masks(policy: object) -> bool:
 
 
 def refuse_without_masks(algorithm: Algorithm, env: gymnasium.Env[Any, Any], name: str) -> None:
-    """Refuse an environment without masks if the algorithm asks for them.
+    """Refuse an environment without masks if the algorithm needs them.
 
     Args:
-        algorithm: what the job says.
-        env: the environment; its simulator does not have to be up.
-        name: its id.
+        algorithm: the algorithm of the job.
+        env: the environment; its simulator need not be up.
+        name: id of the environment.
 
     Raises:
-        ConfigurationError: it has no method `action_masks`.
+        ConfigurationError: the environment has no method `action_masks`.
     """
     if is_masked(algorithm) and not gives_masks(env):
         raise ConfigurationError(
@@ -46,10 +46,10 @@ def predict_allowed(policy: Any, masks: Any, *seen: Any, deterministic: bool = T
     """Return an action that the masks allow, and the policy's next state.
 
     Args:
-        policy: `takes_masks` is true of it.
-        masks: as `action_masks` returns them.
+        policy: a policy for which `takes_masks` is True.
+        masks: masks as `action_masks` returns them.
         seen: observation, state, and whether an episode begins.
-        deterministic: without chance.
+        deterministic: whether the most probable action is chosen.
     """
     action, state = policy.predict(*seen, deterministic=deterministic, action_masks=masks)
     return action, state

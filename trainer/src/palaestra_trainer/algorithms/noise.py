@@ -1,6 +1,6 @@
-"""Noise on actions, in the words of rl-baselines3-zoo: `noise_type` and `noise_std`.
+"""Noise on actions, with the hyperparameters of rl-baselines3-zoo: `noise_type` and `noise_std`.
 
-Each member has a process of its own, which restarts with its episodes.
+Each member has its own noise process, which restarts with each episode.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NAMES = ("noise_type", "noise_std")
 
 
 def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
-    """Yield field, fact and remedy of each wrong one of the two hyperparameters."""
+    """Yield a message with field, fact and remedy for each of the two hyperparameters that is wrong."""
     kind, deviation = given.get("noise_type"), given.get("noise_std")
     if kind is not None and kind not in KINDS:
         yield f"{field}.noise_type: {kind!r} is not known; {nearest(str(kind), dict(KINDS))}"
@@ -40,7 +40,7 @@ def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
 
 
 def action_noise(given: Mapping[str, Any], env: VecEnv) -> ActionNoise | None:
-    """Return the noise of a model in `env`; None if no type is given, or actions are no numbers."""
+    """Return the noise of a model in `env`; None if no type is set, or if actions are not a Box."""
     kind = given.get("noise_type")
     if kind is None or not isinstance(env.action_space, spaces.Box):
         return None
@@ -50,13 +50,13 @@ def action_noise(given: Mapping[str, Any], env: VecEnv) -> ActionNoise | None:
 
 
 def positions(noise: ActionNoise | None) -> np.ndarray | None:
-    """Return where the process of each member is, shape (members, *action); None if nothing of it lasts."""
+    """Return the state of each member's process, shape (members, *action); None if the noise has no state."""
     processes = _processes(noise)
     return np.stack([process.noise_prev for process in processes]) if processes else None
 
 
 def put_back(noise: ActionNoise | None, before: np.ndarray) -> None:
-    """Let the processes continue from `before`; a member beyond it starts at its beginning."""
+    """Set the processes to the states in `before`; the process of a member without one starts at 0."""
     for process, position in zip(_processes(noise), before, strict=False):
         process.noise_prev = position
 

@@ -1,10 +1,9 @@
 """Normalize observations and rewards: Stable-Baselines3's VecNormalize, with statistics of valid rows only.
 
-Observations are shifted and scaled by their running mean and deviation, rewards scaled by the deviation of
-the discounted return. In a Dict, each Box of numbers has statistics of its own. Images and discrete values
-are not normalized. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are part
-of a policy, which cannot be used without them, so they are kept in the file of the model. The reasons are in
-docs/decisions/0010-normalize.md.
+Observations are shifted and scaled by their running mean and deviation; rewards are scaled by the deviation
+of the discounted return. In a Dict, each Box of numbers has its own statistics. Images and discrete values
+are not normalized. Invalid rows affect neither a statistic nor a loss. A policy cannot be used without the
+statistics, so they are in the file of the model. docs/decisions/0010-normalize.md gives the reasons.
 """
 
 from __future__ import annotations
@@ -68,8 +67,8 @@ class ValidNormalize(VecNormalize):
 
     Args:
         venv: marks the invalid rows of a step or a reset (`palaestra_trainer.infos`).
-        wanted: which values to normalize, and where to clip them.
-        gamma: discount of the return that rewards are scaled by.
+        wanted: the values to normalize, and the limits to which they are clipped.
+        gamma: discount of the return; its deviation scales the rewards.
     """
 
     venv: VecEnv
@@ -88,7 +87,7 @@ class ValidNormalize(VecNormalize):
 
     @property
     def scales(self) -> Mapping[str, Moments]:
-        """The statistics of observations and rewards, each only if normalized; set it to restore them."""
+        """The statistics of observations and rewards, if these are normalized; set it to restore them."""
         return {name: Moments.of(running) for name, running in self._running().items()}
 
     @scales.setter
@@ -105,7 +104,7 @@ class ValidNormalize(VecNormalize):
         return self.normalize_obs(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Return a step's rows, normalized by statistics that already include its valid rows."""
+        """Return the rows of a step, normalized by statistics that already include its valid rows."""
         rows, rewards, dones, infos = self.venv.step_wait()
         observations, valid = cast("Observations", rows), valid_rows(infos)
         self.old_obs, self.old_reward = observations, rewards
@@ -120,9 +119,9 @@ class ValidNormalize(VecNormalize):
         return self.normalize_obs(observations), self.normalize_reward(rewards), dones, infos
 
     def go_on(self, observations: Observations, returns: np.ndarray) -> Any:
-        """Restore the position at which `observations` were the last ones; return them normalized.
+        """Set the last observations and returns of a resumed run; return the observations normalized.
 
-        `returns` are the discounted rewards of the episodes until then, one per member.
+        `returns` are the discounted rewards of the running episodes, one per member.
         """
         self.old_obs, self.returns = observations, returns
         return self.normalize_obs(observations)
@@ -134,10 +133,10 @@ class ValidNormalize(VecNormalize):
         return scales | {"epsilon": self.epsilon}
 
     def learn_from_json(self, content: Mapping[str, Any]) -> None:
-        """Take over statistics that another normalizer with the same settings wrote by `to_json`.
+        """Load statistics that another normalizer with the same settings wrote by `to_json`.
 
         Raises:
-            KeyError, TypeError, ValueError: the content or its settings are different.
+            KeyError, TypeError, ValueError: the content is invalid, or its settings are different.
         """
         running, there = self._running(), sorted(content.keys() - {"epsilon"})
         if there != sorted(running):
@@ -149,10 +148,10 @@ class ValidNormalize(VecNormalize):
         self.scales = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in there}
 
     def take_over(self, content: Mapping[str, Any]) -> None:
-        """Take over some statistics of `to_json`; where to clip stays as this run wants it.
+        """Load some statistics that `to_json` wrote; the clip values of this run do not change.
 
         Raises:
-            KeyError, TypeError, ValueError: the content is no such result, or of another shape.
+            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
         """
         running = self._running()
         found = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in content}
@@ -185,7 +184,7 @@ class Normalized:
     """A policy that takes unnormalized observations and normalizes them as during its training.
 
     Attributes:
-        model: it takes normalized observations.
+        model: the model, which takes normalized observations.
     """
 
     def __init__(self, model: BaseAlgorithm, normalizer: ValidNormalize) -> None:
@@ -206,7 +205,7 @@ class Normalized:
 
 
 def normalizer_of(model: BaseAlgorithm) -> ValidNormalize | None:
-    """Return the normalizer of a model's observations and rewards; None: it has none."""
+    """Return the normalizer of a model's observations and rewards; None: the model does not normalize."""
     found = model.get_vec_normalize_env()
     return found if isinstance(found, ValidNormalize) else None
 

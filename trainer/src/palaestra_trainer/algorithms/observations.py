@@ -16,14 +16,14 @@ def part(observations: Any, rows: Any) -> Any:
 
 
 def each(observations: Any, change: Callable[[Any], Any]) -> Any:
-    """Return observations with `change` made to their array, or to each of their arrays."""
+    """Return observations after `change` was applied to their array, or to each of their arrays."""
     if isinstance(observations, dict):
         return {key: change(column) for key, column in observations.items()}
     return change(observations)
 
 
 def stacked(rows: Sequence[Any]) -> Observations:
-    """Return single observations as those of as many members; without any, an empty array."""
+    """Return single observations as the rows of one array, or of one array per key; empty without any."""
     if rows and isinstance(rows[0], dict):
         return {key: np.array([row[key] for row in rows]) for key in rows[0]}
     return np.array(rows)
@@ -37,10 +37,10 @@ def by_name(observations: Any, name: str) -> dict[str, Any]:
 
 
 def from_names(arrays: Mapping[str, np.ndarray], name: str) -> Observations:
-    """Return the observations whose arrays `by_name` returned; other arrays may be among them.
+    """Return the observations whose arrays `by_name` returned; `arrays` may contain other arrays too.
 
     Raises:
-        KeyError: they are missing.
+        KeyError: the arrays of the observations are missing.
     """
     found = {
         key.removeprefix(f"{name}/"): column for key, column in arrays.items() if key.startswith(f"{name}/")
@@ -49,7 +49,7 @@ def from_names(arrays: Mapping[str, np.ndarray], name: str) -> Observations:
 
 
 def equal_rows(one: Observations, other: Observations) -> np.ndarray:
-    """Return which rows are equal, as far as both have rows; shape (rows,), bool."""
+    """Return a mask of the equal rows, for the rows that both have; shape (rows,), bool."""
     pairs = [(column, by_name(other, "")[name]) for name, column in by_name(one, "").items()]
     rows = min(len(column) for pair in pairs for column in pair)
     return np.array(

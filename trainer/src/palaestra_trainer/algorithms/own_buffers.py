@@ -1,7 +1,7 @@
 """Buffers of a job's author: classes that extend a buffer of Stable-Baselines3.
 
-In Python's order of methods, such a class comes after the buffer for valid rows. So its `add` gets one valid
-row at a time, and its returns are those of a rollout that was truncated before each invalid row.
+In Python's method resolution order, such a class comes after the buffer for valid rows. So its `add` gets one
+valid row at a time, and its returns are those of a rollout that was truncated before each invalid row.
 """
 
 from __future__ import annotations
@@ -35,32 +35,32 @@ from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
-# Rollout buffers, and the class for valid rows of each; the classes that extend others come first.
+# Each rollout buffer has a class for valid rows; subclasses come before the classes that they extend.
 VALID_ROLLOUTS: Mapping[type[Any], type[Any]] = {
     MaskableDictRolloutBuffer: ValidMaskableDictRolloutBuffer,
     MaskableRolloutBuffer: ValidMaskableRolloutBuffer,
     DictRolloutBuffer: ValidDictRolloutBuffer,
     RolloutBuffer: ValidRolloutBuffer,
 }
-# What an author's class may extend.
+# An author's class may extend one of these.
 _VALID: Mapping[type[Any], type[Any]] = {
     DictReplayBuffer: ValidDictReplayBuffer,
     ReplayBuffer: ValidReplayBuffer,
     **VALID_ROLLOUTS,
 }
-# These read the rows after a row; in one column, such a row may be another member's.
+# These classes read the rows after a row; in a single column the next row may belong to another member.
 _NEIGHBOURS = (HerReplayBuffer, NStepReplayBuffer)
 _STATE_METHODS = ("state_dict", "load_state_dict")
 
 
 class OwnBuffer(BaseBuffer):
-    """What a checkpoint keeps of an author's buffer, besides the rows that every buffer has.
+    """The state of an author's buffer that a checkpoint keeps besides the rows.
 
-    That is what `state_dict` returns, where the class has it and `load_state_dict`; else every attribute that
-    the class adds.
+    It is the result of `state_dict` if the class has `state_dict` and `load_state_dict`, else every attribute
+    that the class adds.
 
     Raises:
-        ConfigurationError: no checkpoint could write an attribute.
+        ConfigurationError: a checkpoint cannot hold an attribute.
     """
 
     _rows_only: type[BaseBuffer]  # the buffer for valid rows that this one extends
@@ -78,10 +78,10 @@ class OwnBuffer(BaseBuffer):
         self.own_state()
 
     def own_state(self) -> dict[str, Any]:
-        """Return what the class adds, by name: arrays, tensors, and values that JSON has.
+        """Return the state that the class adds, by name: arrays, tensors, and JSON values.
 
         Raises:
-            ConfigurationError: something is of another kind, or the author's `state_dict` failed.
+            ConfigurationError: a value has another type, or the author's `state_dict` failed.
         """
         state = self._own_state()
         for name, value in state.items():
@@ -94,7 +94,7 @@ class OwnBuffer(BaseBuffer):
         return state
 
     def put_own_state(self, state: Mapping[str, Any]) -> None:
-        """Let the buffer go on from what `own_state` returned.
+        """Restore the state that `own_state` returned.
 
         Raises:
             ConfigurationError: the author's `load_state_dict` failed.
@@ -107,7 +107,7 @@ class OwnBuffer(BaseBuffer):
             setattr(self, name, value)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Refuse to drop all rows but the `kept` ones: only the class knows what else belongs to them.
+        """Refuse to drop rows that are not `kept`, because only the class knows the state that they need.
 
         Raises:
             ConfigurationError: always.
@@ -131,15 +131,15 @@ def field_of(cls: type[BaseBuffer]) -> str:
 
 
 def of_valid_rows(cls: Any) -> Any:
-    """Return the class of a buffer if it is for valid rows, else a subclass that is, as `with_valid_rows`."""
+    """Return the class of a buffer if it is for valid rows, else its subclass from `with_valid_rows`."""
     return cls if issubclass(cls, ValidReplayBuffer | ValidRolloutBuffer) else with_valid_rows(cls)
 
 
 def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
-    """Return a subclass of an author's buffer, with its name, that stores or samples valid rows only.
+    """Return a subclass of an author's buffer, with its name, that stores or samples only valid rows.
 
     Raises:
-        ConfigurationError: invalid rows would reach its samples, or rows of another episode.
+        ConfigurationError: its samples would contain invalid rows, or rows of another episode.
     """
     if issubclass(named, _NEIGHBOURS):
         raise ConfigurationError(
@@ -157,10 +157,10 @@ def with_valid_rows(named: type[BaseBuffer]) -> type[BaseBuffer]:
 
 
 def refuse_other_observations(cls: type[BaseBuffer], observation: spaces.Space[Any]) -> None:
-    """Return if a buffer takes the observation.
+    """Check that a buffer accepts the observation.
 
     Raises:
-        ConfigurationError: it takes a Dict and the observation is none, or the other way round.
+        ConfigurationError: only one of the two is for a Dict: the buffer or the observation.
     """
     takes_dict = issubclass(cls, DictReplayBuffer | DictRolloutBuffer)
     if takes_dict == isinstance(observation, spaces.Dict):
@@ -188,7 +188,7 @@ def _has_state_methods(buffer: BaseBuffer) -> bool:
 
 
 def _can_be_written(value: Any) -> bool:
-    """Return whether a value is the same after it was written and read."""
+    """Return whether a value stays the same when it is written and read."""
     if isinstance(value, np.ndarray):
         return not value.dtype.hasobject
     if isinstance(value, torch.Tensor | float):  # NaN is not equal to itself

@@ -1,4 +1,4 @@
-"""Schedules of a job's author: functions of the share of the steps that is left, named as `module:function`.
+"""Schedules of a job's author: functions of the remaining share of the steps, named as `module:function`.
 
 A model contains the name of the function, never its code.
 """
@@ -11,11 +11,11 @@ from collections.abc import Callable
 from palaestra_trainer import user_imports
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
-_TRIED = (1.0, 0.5, 0.0)  # shares of the steps that are left
+_TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps
 
 
 def own_schedule(name: str, field: str) -> Callable[[float], float]:
-    """Return the function that `name` names, after a few calls.
+    """Return the function that `name` names, after a check of a few of its values.
 
     Args:
         name: `module:function`.

@@ -1,7 +1,7 @@
 """RecurrentPPO's rollouts without invalid rows.
 
-An LSTM learns from whole sequences, so rows are not shuffled. Invalid rows are left out of every sequence.
-The first valid row after them begins an episode, so the LSTM restarts there, in collection and in the update.
+An LSTM learns from whole sequences, so rows are not shuffled. Sequences do not contain invalid rows. The
+first valid row after them begins an episode, so the LSTM restarts there, in collection and in the update.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class _Sequences(ValidRolloutBuffer):
         rows = np.flatnonzero(self.swap_and_flatten(self.valid))
         first_of_member = np.zeros((self.buffer_size, self.n_envs))
         first_of_member[0] = 1.0
-        draw: Any = self._get_samples  # RecurrentPPO's has another second argument than RolloutBuffer's
+        draw: Any = self._get_samples  # its second argument differs from that of RolloutBuffer
         turned = np.roll(rows, -np.random.randint(len(rows)))
         for batch in batches(turned, batch_size or len(rows)):
             yield draw(batch, self.swap_and_flatten(first_of_member))

@@ -1,8 +1,8 @@
 """The algorithms by name, with their defaults.
 
 The defaults are those of the class: Stable-Baselines3's, sb3-contrib's, or ours for REINFORCE. Only the
-arena's environments have some of their own, which were found by experiment. A job may also name a class of
-its own as `module:Class`; its entry is made when it is asked for.
+arena's environments have other defaults, which were found by experiment. A job may also name a class of its
+author as `module:Class`; its entry is created when it is needed.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ from palaestra_trainer.algorithms.valid_rows import with_valid_rows
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 
-# Arguments of the classes that the training loop itself gives, that are checked with others, or that
-# valid-row buffers cannot honour: they store rows of several members in one line.
+# A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some, and
+# others are checked elsewhere. Buffers for valid rows cannot support the rest, because they store rows of
+# several members in one column.
 OURS = frozenset(
     {
         "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
@@ -49,10 +50,10 @@ class RegisteredAlgorithm:
     """One algorithm.
 
     Attributes:
-        original: its class, as its package has it; it loads a model.zip.
+        original: its class in its package; this class loads a model.zip.
         arena: hyperparameters that suit the arena's environments better than the defaults of the class.
-        actions: kinds of action spaces that it learns in; None: unknown until a model is made.
-        log_interval: episodes off policy, or rollouts on policy, between two lines of figures.
+        actions: types of action spaces that it supports; None: unknown until a model is created.
+        log_interval: episodes off policy, or rollouts on policy, between two records of values.
     """
 
     original: type[BaseAlgorithm]
@@ -62,7 +63,7 @@ class RegisteredAlgorithm:
 
     @property
     def cls(self) -> type[BaseAlgorithm]:
-        """The class that counts and learns from valid rows only."""
+        """The class that counts and learns from only valid rows."""
         return with_valid_rows(self.original)
 
     @property
@@ -77,7 +78,7 @@ class RegisteredAlgorithm:
 
     @property
     def takes_rollout_buffers(self) -> bool:
-        """Whether it takes the class of its rollout buffer."""
+        """Whether the class of its rollout buffer is an argument."""
         return buffer_options.ROLLOUT.chooser in parameters(self.original)
 
     @property
@@ -129,7 +130,7 @@ def _entry(
 
 ALGORITHMS: Mapping[str, RegisteredAlgorithm] = MappingProxyType(
     {
-        # Soft target updates at every step and as many gradient steps as environment steps:
+        # DQN has soft target updates at every step and as many gradient steps as environment steps, because
         # hard updates ended 10 points lower on the same 50,000 steps.
         "DQN": _entry(
             sb3.DQN,
@@ -204,7 +205,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
     """Return the entry of an algorithm: one of the table, or that of a class `module:Class`.
 
     Raises:
-        ConfigurationError: there is none of that name, or the class is no algorithm that can be used.
+        ConfigurationError: no algorithm has that name, or the class cannot be used as an algorithm.
     """
     if name in ALGORITHMS:
         return ALGORITHMS[name]
@@ -212,7 +213,7 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
     if user_imports.names_class(name):
         entry = _entry(user_imports.class_named(name, "algorithm.name", BaseAlgorithm))
-        with_valid_rows(entry.original)  # raises if rows of a fault would reach its losses
+        with_valid_rows(entry.original)  # raises if invalid rows would reach its losses
         return entry
     raise ConfigurationError(
         f"algorithm.name: {name} is not an algorithm; {nearest(name, dict(ALGORITHMS))} "

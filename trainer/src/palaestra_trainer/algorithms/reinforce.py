@@ -2,7 +2,7 @@
 
 It learns from whole episodes, by the gradient of log pi(a|s) * (G - b): G is the
 discounted return from the step on, b an optional baseline. It has save, load,
-predict, callbacks and logger of `BaseAlgorithm`, and uses its policies.
+predict, callbacks and logger of `BaseAlgorithm`, and uses the same policies.
 """
 
 from __future__ import annotations
@@ -36,30 +36,30 @@ class REINFORCE(BaseAlgorithm):
     One update learns from `episodes_per_update` whole episodes of each
     environment. The number is the same for each, because taking the episodes that
     end first would prefer short ones. Further episodes that an environment plays
-    until the others finish are dropped, and so is an episode that a fault cut. An
-    environment that is being restarted is not waited for. Training ends at the
-    first episode end at or after `total_timesteps`. A truncated episode counts as
-    ended: its return is the sum until then.
+    until the others finish are dropped, and so are episodes that a fault
+    truncated. The update does not wait for an environment that restarts. Training
+    ends when an episode ends at or after `total_timesteps`. A truncated episode
+    counts as ended: its return is the sum until then.
 
     Args:
-        policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or a class; an actor-critic one, whose value
-            network is trained only if it is the baseline.
+        policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or an actor-critic class; its value network is
+            trained only if it is the baseline.
         env: environment or VecEnv to learn in.
-        learning_rate: of Adam, or a function of the remaining progress (1 to 0).
+        learning_rate: learning rate of Adam, or a function of the remaining progress (1 to 0).
         episodes_per_update: whole episodes of each environment in one update.
         gamma: discount per step, 0 to 1.
-        baseline: "value" subtracts a learned V(s), "none" nothing.
+        baseline: "value" subtracts a learned V(s), "none" subtracts nothing.
         normalize_advantage: give G - b mean 0 and deviation 1 within an update; without a baseline
             no mean is subtracted, and G is divided by its root mean square.
-        ent_coef: weight of the policy's entropy, against early certainty.
+        ent_coef: weight of the policy's entropy; prevents early certainty.
         vf_coef: weight of the baseline's squared error.
         max_grad_norm: longest gradient; longer ones are scaled down.
         stats_window_size: episodes in the logged means.
         tensorboard_log: folder of event files, if no logger is set.
         policy_kwargs: keyword arguments of the policy, e.g. `net_arch`.
         verbose: 0 quiet, 1 info.
-        seed: of networks and action sampling.
-        device: where the networks live.
+        seed: seed of networks and action sampling.
+        device: device of the networks.
     """
 
     policy: ActorCriticPolicy
@@ -186,7 +186,7 @@ class REINFORCE(BaseAlgorithm):
             if dones.any() and self.num_timesteps >= self._total_timesteps:
                 break
         if not dones.all():
-            # An environment may be in an episode of the policy that is about to change.
+            # An environment may be in an episode that began with the policy before the update.
             self._last_obs = self.env.reset()  # type: ignore[assignment]  # as in Stable-Baselines3
         callback.on_rollout_end()
         return recorder.batch(self.gamma)
@@ -206,7 +206,7 @@ class REINFORCE(BaseAlgorithm):
         self.logger.record("train/loss", loss.item())
 
     def dump_logs(self) -> None:
-        """Write the means over the last episodes, the speed, and what `train` recorded."""
+        """Write the means over the last episodes, the speed, and the values that `train` recorded."""
         seconds = max((time.time_ns() - self.start_time) / 1e9, sys.float_info.epsilon)
         fps = int((self.num_timesteps - self._num_timesteps_at_start) / seconds)
         self.logger.record("time/episodes", self._episode_num, exclude="tensorboard")
@@ -238,7 +238,7 @@ class REINFORCE(BaseAlgorithm):
         return loss
 
     def _advantages(self, returns: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-        """Return G - b of each step, normalized if that is set."""
+        """Return G - b of each step, normalized if `normalize_advantage`."""
         if self.baseline == "none":
             return returns / (returns.square().mean().sqrt() + 1e-8) if self.normalize_advantage else returns
         advantages = returns - values

@@ -1,7 +1,7 @@
 """The size of a replay buffer, computed from the spaces before the buffer exists.
 
-NumPy allocates memory when a row is first written. So a buffer that is larger than the run has steps needs
-memory for the steps only.
+NumPy allocates memory when a row is first written. So a buffer with more rows than the run has steps needs
+memory only for these steps.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from palaestra_trainer.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize
 _REWARD_DONE_TIMEOUT = 3 * _FLOAT
-_EPISODE = 2 * np.dtype(np.int64).itemsize  # start and length, with hindsight
+_EPISODE = 2 * np.dtype(np.int64).itemsize  # start and length, with hindsight experience replay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplaySize:
-    """A replay buffer by its size.
+    """The size of a replay buffer.
 
     Attributes:
         rows: rows that the run can fill: `buffer_size`, or the steps of the run if they are fewer.
@@ -41,18 +41,19 @@ class ReplaySize:
         return self.rows * self.row_bytes
 
     def disk_bytes(self, every_steps: int, keep: int) -> int:
-        """Size of all checkpoints together: they share the rows that did not change between them.
+        """Return the size of all checkpoints together; they share rows that did not change between them.
 
-        Each but the newest has rows of its own, as many as were overwritten until the next one. One more
-        checkpoint than is kept exists while it is written.
+        Each checkpoint but the newest has its own copy of the rows that were overwritten before the next one.
+        While a checkpoint is written, one more than `keep` exists.
         """
         return self.memory_bytes + keep * min(every_steps, self.rows) * self.row_bytes
 
     def most_rows(self, memory_bytes: int, disk_bytes: int, every_steps: int, keep: int) -> int:
-        """Return the number of rows with which a buffer fits into memory, and its checkpoints on the disk."""
+        """Return the most rows with which a buffer fits into memory, and its checkpoints on the disk."""
         in_memory = memory_bytes // self.row_bytes
         on_disk = disk_bytes // self.row_bytes
-        # Up to `every_steps` rows, every checkpoint may have all rows; beyond, each has `every_steps` more.
+        # With up to `every_steps` rows, each checkpoint may have all rows for itself; with more rows, each
+        # has `every_steps` rows for itself.
         fitting = on_disk - keep * every_steps
         return max(0, min(in_memory, fitting if fitting >= every_steps else on_disk // (keep + 1)))
 
@@ -60,10 +61,10 @@ class ReplaySize:
 def replay_size(
     algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
 ) -> ReplaySize | None:
-    """Return the size of an algorithm's replay buffer; None: it has none, or no policy takes the space.
+    """Return the size of an algorithm's replay buffer; None: it has no buffer, or no policy takes the space.
 
     Args:
-        algorithm: with all its hyperparameters.
+        algorithm: the algorithm with all its hyperparameters.
         observation: the environment's space.
         action: the environment's space.
         steps: steps of the whole run.

@@ -1,9 +1,9 @@
-"""The state of each algorithm beside its saved tensors: a rollout changes it, and a resume needs it.
+"""The state of each algorithm besides its saved tensors: a rollout changes it, and a resume needs it.
 
-Every algorithm counts steps, and keeps its last observation and statistics of episodes; `checkpoint.state`
-keeps these, and the action noise. This table has the rest, by class: networks that a rollout changes, the
-state of an LSTM, counts. A class of a user's own has the entry of its nearest ancestor in the table. For one
-without such an ancestor, the whole policy is copied at each boundary, because a rollout may change any part.
+Every algorithm counts steps, and keeps its last observation and statistics of episodes. `checkpoint.state`
+saves these, and the action noise. This table has the rest, by class: networks that a rollout changes, the
+state of an LSTM, counts. A user's class has the entry of its nearest ancestor in the table. Without such an
+ancestor, the whole policy is copied at each boundary, because a rollout may change any part.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from palaestra_trainer.algorithms.reinforce import REINFORCE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RolloutState:
-    """The attributes of an algorithm that change in a rollout, beside those that every algorithm has.
+    """The attributes of an algorithm that change in a rollout, besides those that every algorithm has.
 
     Attributes:
-        networks: networks of which a rollout changes tensors; an update may change them too.
+        networks: networks with tensors that a rollout changes; an update may change them too.
         memories: states of recurrent networks, nested tuples of tensors of shape (layers, members, units).
-        numbers: what it counts or derives from counts.
+        numbers: its counts, and numbers derived from them.
     """
 
     networks: tuple[str, ...] = ()

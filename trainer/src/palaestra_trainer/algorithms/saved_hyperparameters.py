@@ -1,7 +1,7 @@
-"""The hyperparameters that a run began with; it keeps them even if the defaults change later.
+"""The hyperparameters that a run began with; the run keeps them even if the defaults change later.
 
-All of them are in the run directory. Releases up to a5276f3 wrote no such file; their runs continue with the
-values that those releases gave every environment: the arena's, and MlpPolicy also for images.
+All of them are in a file of the run directory. Releases up to a5276f3 did not write it. Their runs continue
+with the values that these releases used for every environment: the arena's, and MlpPolicy even for images.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ def begin_with(
     """Return the algorithm of an attempt with all its hyperparameters.
 
     Args:
-        configuration: of the run.
-        directory: of the run; the run may not have begun.
-        before: the run whose checkpoint it resumes from, its own or another; None: there is no checkpoint.
+        configuration: the configuration of the run.
+        directory: the directory of the run, which may not have begun.
+        before: the run whose checkpoint it resumes from, itself or another; None: it begins without one.
 
     Raises:
         ConfigurationError: the file in the run directory cannot be read.
@@ -50,7 +50,7 @@ def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
     """Write the algorithm with which a run begins into its directory, unless the run has begun.
 
     Raises:
-        OSError: it could not be written.
+        OSError: the file could not be written.
     """
     if directory.hyperparameters.exists() or directory.attempts.exists():
         return

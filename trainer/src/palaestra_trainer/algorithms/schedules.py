@@ -4,10 +4,10 @@
 [share of the steps, value], such as `[[0, 0.001], [0.5, 0.0002]]`, with straight lines between them. Before
 the first and after the last point the value is constant.
 
-Stable-Baselines3 pickles the schedules of a model into its model.zip. So a schedule is made of classes and
-functions of the standard library, NumPy and Stable-Baselines3: the file has their names and some numbers.
-A class of this package would have to be importable there, or be stored as byte code, which only the Python
-that wrote it can read.
+Stable-Baselines3 pickles the schedules of a model into its model.zip. So a schedule consists of classes and
+functions of the standard library, NumPy and Stable-Baselines3: the file has only their names and some
+numbers. A class of this package would have to be importable by every reader of the file, or be stored as byte
+code, which only the version of Python that wrote it can read.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
 
 
 def schedule_of(value: Any) -> Callable[[float], float] | None:
-    """Return the schedule that a value of a job writes; None if it writes none.
+    """Return the schedule that a value of a job describes; None if the value is not a schedule.
 
-    The schedule takes the share of the training that is left, 1 to 0.
+    The schedule takes the remaining share of the training, 1 to 0.
     """
     if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
         return LinearSchedule(float(number[1]), 0.0, 1.0)
@@ -35,7 +35,7 @@ def schedule_of(value: Any) -> Callable[[float], float] | None:
 
 
 def _through(points: list[list[float]]) -> Callable[[float], float]:
-    """Return straight lines between points [share of the steps, value], by increasing share."""
+    """Return a schedule of straight lines between points [share of the steps, value], by increasing share."""
     left = [1.0 - share for share, _ in reversed(points)]
     return partial(np.interp, xp=left, fp=[float(value) for _, value in reversed(points)])
 

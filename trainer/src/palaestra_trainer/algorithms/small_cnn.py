@@ -2,8 +2,9 @@
 
 It has 16 and 32 channels and 128 units, where NatureCNN has 32, 64 and 64 channels and 512 units.
 
-A model.zip has only the name of this class, so Stable-Baselines3 loads the file where this package is
-installed. The class itself would be byte code, which only the Python that wrote it can read.
+A model.zip has only the name of this class, so Stable-Baselines3 loads the file if this package is installed.
+If the file contained the class itself, it would be byte code, which only the version of Python that wrote it
+can read.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Which algorithm fits which environment, and the policy that it gets there.
+"""Check that an algorithm fits an environment, and choose its policy.
 
-Everything that does not fit is refused here, by the spaces alone, before a simulator starts.
+The checks need only the spaces, so they refuse a mismatch before a simulator starts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.errors import ConfigurationError
 
 KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
-# Pixels per side that the convolutions of each network need.
+# The convolutions of each network need at least this number of pixels per side.
 SMALLEST: Mapping[Cnn | None, int] = {None: 36, "small": 20}
 
 
@@ -39,7 +39,7 @@ def policy_of_spaces(
 
 
 def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse observations and actions that the algorithm takes wrongly, or not at all.
+    """Refuse observations and actions that the algorithm would misread, or does not support.
 
     Raises:
         ConfigurationError: one line for each reason.
@@ -49,10 +49,10 @@ def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.S
 
 
 def named_policy(algorithm: Algorithm, entry: RegisteredAlgorithm) -> str | type[BasePolicy] | None:
-    """Return the policy that the job names: an alias of the algorithm or a class; None: it names none.
+    """Return the policy that the job names: an alias of the algorithm or a class; None if it names no policy.
 
     Raises:
-        ConfigurationError: it is neither.
+        ConfigurationError: the name is neither an alias nor a class.
     """
     name = algorithm.policy
     known = aliases(entry.original)
@@ -72,15 +72,15 @@ def aliases(cls: type[BaseAlgorithm]) -> Mapping[str, type[BasePolicy]]:
 
 
 def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
-    """Return the images of an observation: itself, or parts of a Dict."""
+    """Return the images of an observation: the observation itself, or parts of a Dict."""
     parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
     return [part for part in parts if isinstance(part, spaces.Box) and is_image_space(part)]
 
 
 def scalable(space: spaces.Space[Any]) -> list[str] | bool:
-    """Return the keys of a Dict whose numbers may be normalized; of another space, whether its may be.
+    """Return the keys of a Dict whose parts may be normalized; for another space, whether it may be.
 
-    Networks scale images themselves, and the numbers of a Discrete are names.
+    Networks scale images themselves, and the numbers of a Discrete are labels without a scale.
     """
     if isinstance(space, spaces.Dict):
         return [key for key, part in space.spaces.items() if scalable(part)]
@@ -88,7 +88,7 @@ def scalable(space: spaces.Space[Any]) -> list[str] | bool:
 
 
 def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse spaces that every algorithm of Stable-Baselines3 takes wrongly, or not at all.
+    """Refuse spaces that every algorithm of Stable-Baselines3 would misread, or does not support.
 
     Raises:
         ConfigurationError: one line for each reason.
@@ -128,7 +128,7 @@ def _flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
 
 
 def _flaw(part: spaces.Space[Any]) -> str:
-    """Return what Stable-Baselines3 would take wrongly in a space, and the remedy; "" if there is nothing."""
+    """Return the reason why Stable-Baselines3 would misread a space, and the remedy; "" if it would not."""
     if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
         start = np.asarray(part.start).tolist()
         return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
@@ -140,7 +140,7 @@ def _flaw(part: spaces.Space[Any]) -> str:
 
 
 def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
-    """Return why a Box is no action; an observation may be one."""
+    """Return the reason why a Box cannot be an action space, and the remedy; "" if it can."""
     if not isinstance(acted, spaces.Box):
         return ""
     if not np.issubdtype(acted.dtype, np.floating):

@@ -1,7 +1,7 @@
-"""The remedy for a word that is not a hyperparameter of the algorithm.
+"""The remedy for a name that is not a hyperparameter of the algorithm.
 
-The most similar hyperparameter is suggested only for a misspelling. A word with a meaning of its own, such as
-`n_timesteps`, which is not `n_steps`, gets its own place instead.
+The most similar hyperparameter is suggested only for a misspelling. For a name with another meaning, such as
+`n_timesteps`, which is not `n_steps`, the remedy is the field of the job for that value.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, OF_ZOO
 from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorithm
 from palaestra_trainer.configuration import nearest
 
-_MISSPELLED = 0.85  # gama and num_steps are above, n_timesteps and n_epochs for n_steps below
-# Names of other libraries for the same value.
+_MISSPELLED = 0.85  # gama and num_steps are above it; n_timesteps and n_epochs, compared with n_steps, below
+# Other libraries use these names for the same value.
 _SAME: Mapping[str, str] = MappingProxyType(
     {
         "clip_coef": "clip_range",
@@ -39,14 +39,14 @@ _SAME: Mapping[str, str] = MappingProxyType(
 def mistakes(
     algorithm: str, entry: RegisteredAlgorithm, of_policy: Container[str], given: Iterable[str], field: str
 ) -> Iterator[str]:
-    """Yield field, fact and remedy of each word that is not a hyperparameter of the algorithm.
+    """Yield a message with field, fact and remedy for each name that is not a hyperparameter.
 
     Args:
-        algorithm: its name in the job.
+        algorithm: name of the algorithm in the job.
         entry: its entry.
         of_policy: the arguments of its policy.
-        given: the words that the job gives.
-        field: the field of the job with the words.
+        given: the names that the job sets.
+        field: the field of the job with these names.
     """
     known = entry.known
     unknown = [word for word in given if word not in known]

@@ -1,9 +1,9 @@
-"""Algorithms that are compatible with Stable-Baselines3, made to count and learn from valid rows only.
+"""Subclasses of Stable-Baselines3 algorithms that count and learn from only valid rows.
 
-Two mixins do this by overriding methods that Stable-Baselines3 calls between a
-step and its storage; no code is copied. `with_valid_rows` adds one of them to a
-class. A saved model contains neither that class nor the names of the buffers, so
-the original class can load it.
+Two mixins override methods that Stable-Baselines3 calls between a step and its
+storage; no code is copied. `with_valid_rows` adds one of them to a class. A saved
+model contains neither that subclass nor the names of the buffers, so the original
+class can load it.
 """
 
 from __future__ import annotations
@@ -40,19 +40,20 @@ from palaestra_trainer.algorithms.recurrent import (
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.errors import ConfigurationError
 
-# Rollout buffers and what takes their place; a buffer of another class may need rows that these do not take.
+# Each rollout buffer is replaced by the class on its right. Other classes of buffers are refused, because
+# they may need rows that these do not store.
 _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     **own_buffers.VALID_ROLLOUTS,
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
 }
-# Evaluations and exported files give masks to MaskablePPO and its subclasses only.
+# Evaluations and exported files give masks only to MaskablePPO and its subclasses.
 _WITH_MASKS = (MaskableRolloutBuffer, MaskableDictRolloutBuffer)
 _BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class", "rollout_buffer_kwargs")
 
 
 class ValidRowsCounted(BaseAlgorithm):
-    """Counts only valid rows as steps; an invalid row never counts as part of an episode."""
+    """Counts only valid rows as steps; an invalid row is never part of an episode."""
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
         valid = valid_rows(infos)
@@ -81,14 +82,14 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
     ) -> RolloutReturn:
-        """Collect the steps of `train_freq`, but none beyond the target."""
+        """Collect the steps of `train_freq`, but stop at the target of the run."""
         if train_freq.unit is TrainFrequencyUnit.STEP:
             missing = math.ceil((self._total_timesteps - self.num_timesteps) / env.num_envs)
             train_freq = train_freq._replace(frequency=max(1, min(train_freq.frequency, missing)))
         return super().collect_rollouts(env, callback, train_freq, *args, **kwargs)
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
-        """Learn from the buffer, unless it has nothing to sample, e.g. because of faults."""
+        """Learn from the buffer, unless it has no rows to sample, e.g. because of faults."""
         if cast("ValidReplayBuffer", self.replay_buffer).can_sample():
             super().train(gradient_steps=gradient_steps, batch_size=batch_size)
 
@@ -97,7 +98,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     """An on-policy algorithm whose rollouts mask invalid rows.
 
     Raises:
-        ConfigurationError: it creates its own kind of rollout buffer, in which nothing would be masked.
+        ConfigurationError: it creates its own kind of rollout buffer, in which rows would not be masked.
     """
 
     def _masked(self) -> ValidRolloutBuffer:
@@ -127,7 +128,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         )
 
     def _refuse_masks(self, buffer: RolloutBuffer) -> None:
-        """Refuse a buffer that stores masks in an algorithm that has none, and the other way round."""
+        """Refuse a buffer with masks in an algorithm without masks, and one without masks in MaskablePPO."""
         takes_masks = isinstance(self, MaskablePPO)
         if isinstance(buffer, _WITH_MASKS) == takes_masks:
             return
@@ -157,7 +158,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
 
 @cache
 def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
-    """Return a subclass of `cls`, with its name, that counts and learns from valid rows only.
+    """Return a subclass of `cls`, with its name, that counts and learns from only valid rows.
 
     Raises:
         ConfigurationError: `cls` is neither an on-policy nor an off-policy algorithm of Stable-Baselines3.

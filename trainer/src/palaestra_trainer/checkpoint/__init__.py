@@ -1,10 +1,10 @@
-"""Saving and finding the state from which a run goes on, as if it had never ended.
+"""Save the state of a run, and find it again, so that a resumed run continues as if it had never ended.
 
-A checkpoint is a folder `<step>/` with the model's tensors, its experience, everything else that its next
-step depends on and, written last, a manifest with the digest of each file. It is made under a temporary
-name and renamed, so it is there as a whole or not at all; one that was damaged later is skipped. Loading
-unpickles nothing: the model is rebuilt from the configuration, tensors are read with `weights_only`, the
-rest is JSON and plain arrays. How a resumed run comes to be the same: docs/decisions/0008-exact-resume.md.
+A checkpoint is a folder `<step>/` with the model's tensors, its experience, and the rest of the state that
+the next step depends on. A manifest with the digest of each file is written last. The folder is written under
+a temporary name and renamed, so a checkpoint is complete or absent; one that was damaged later is skipped.
+Loading does not unpickle: the model is rebuilt from the configuration, tensors are read with `weights_only`,
+and the rest is JSON and plain arrays. docs/decisions/0008-exact-resume.md explains exact resumes.
 """
 
 from palaestra_trainer.checkpoint.initial_policy import begin_from

@@ -1,7 +1,7 @@
-"""Begin a run with the policy of another: its tensors, and what its normalizer knows.
+"""Begin a run with the policy of another run: its tensors, and the statistics of its normalizer.
 
 The file is the zip of any model of Stable-Baselines3. Nothing in it is unpickled, so it need not be trusted.
-Optimizers begin anew, and so does everything that a run counts.
+The optimizers are new, and all counts of the run start at 0.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from palaestra_trainer.errors import ConfigurationError
 log = structlog.get_logger(__name__)
 
 POLICY = "policy.pth"
-_SHOWN = 3  # mismatches in a message
-_OVERHEAD_BYTES = 1 << 20  # names, statistics, and what the format of PyTorch adds
+_SHOWN = 3  # number of mismatches in a message
+_OVERHEAD_BYTES = 1 << 20  # for names, statistics, and the overhead of PyTorch's format
 
 
 def begin_from(path: Path, model: BaseAlgorithm) -> None:
-    """Let a new model have the policy in a zip, and its statistics where both normalize.
+    """Load the policy of a zip into a new model, and its statistics if both normalize.
 
     Raises:
         ConfigurationError: the file cannot be read, or a tensor or statistic does not fit this model.
@@ -47,12 +47,12 @@ def begin_from(path: Path, model: BaseAlgorithm) -> None:
 
 
 def _most_bytes(own: Mapping[str, torch.Tensor]) -> int:
-    """Return how many bytes a policy of these tensors can need in a file, at twice their precision."""
+    """Return the most bytes that a policy of these tensors can need in a file, at twice their precision."""
     return 2 * sum(tensor.nbytes for tensor in own.values()) + _OVERHEAD_BYTES
 
 
 def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, Any]]:
-    """Return the tensors and the statistics in a zip whose members have at most so many bytes."""
+    """Return the tensors and the statistics in a zip; refuse members of more than `most` bytes together."""
     try:
         with zipfile.ZipFile(path) as archive:
             statistics = [NORMALIZE] if NORMALIZE in archive.namelist() else []
@@ -66,7 +66,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
         return torch.load(content, map_location=device, weights_only=True), known
     except ConfigurationError:
         raise
-    except pickle.UnpicklingError as error:  # its text recommends to unpickle
+    except pickle.UnpicklingError as error:  # its own text recommends to unpickle, so it is not shown
         raise _refused(
             path, f"{POLICY} holds more than tensors, which is never unpickled; name a model.zip"
         ) from error
@@ -76,7 +76,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
 
 
 def _refuse_larger(path: Path, members: Iterable[zipfile.ZipInfo], most: int) -> None:
-    """Refuse members of a zip that unpack to more than the policy of this run can need, before they do."""
+    """Refuse members of a zip that would unpack to more bytes than the policy of this run can need."""
     unpacked = sum(each.file_size for each in members)
     if unpacked > most:
         raise _refused(
@@ -109,8 +109,8 @@ def _take_statistics(path: Path, model: BaseAlgorithm, known: Mapping[str, Any])
     own = {} if normalizer is None else normalizer.scales
     if own.keys() - {"rewards"} != known.keys() - {"rewards", "epsilon"}:
         log.warning(
-            "the initial policy and this run normalize different observations, so it sees others than it "
-            "learned from; set algorithm.normalize as it was",
+            "the initial policy and this run normalize different observations, so the policy gets other "
+            "values than in its training; set algorithm.normalize as in its run",
             file=str(path),
         )
     if normalizer is None:

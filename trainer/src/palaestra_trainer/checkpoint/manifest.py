@@ -1,4 +1,4 @@
-"""What a checkpoint says of itself, and whether it is what it says."""
+"""The manifest of a checkpoint: its metadata, and the digests that show damage."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from palaestra_trainer.errors import ConfigurationError
 
 MANIFEST = "manifest.json"
 EXPERIENCE = "experience"
-# 1 lacked random generators and the episodes under way, so a run could go on from it, but not exactly.
+# Format 1 lacked random generators and running episodes, so a run could not be resumed from it exactly.
 FORMAT = 2
 _OLD_FORMATS = (1,)  # without a digest of the manifest itself
-_NOT_COMPARED = {"callbacks"}  # a run may go on with others: a model does not consist of them
+_NOT_COMPARED = {"callbacks"}  # a run may continue with other callbacks, because they are not part of a model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
-    """What a checkpoint says of itself.
+    """The metadata of a checkpoint.
 
     Attributes:
         step: valid environment steps learned from.
         seed: the replica's seed.
-        algorithm: name and hyperparameters it was made with.
-        environment: id, reward and options it was made with.
+        algorithm: name and hyperparameters of the run.
+        environment: id, reward and options of the run.
         counters: counters of the run, see `progress.Counters`.
-        files: sha256 of each file beside the manifest.
-        format: version of this layout.
+        files: sha256 of each file of the checkpoint except the manifest.
+        format: version of this format.
     """
 
     step: int
@@ -45,7 +45,7 @@ class Manifest:
     format: int = FORMAT
 
     def write(self, folder: Path) -> None:
-        """Write it into a checkpoint's folder, with a digest of its own."""
+        """Write it into a checkpoint's folder, with a digest of the manifest itself."""
         content = asdict(self)
         text = json.dumps(content | {"digest": _digest_of(content)}, indent=2)
         (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
@@ -53,12 +53,12 @@ class Manifest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SavedCheckpoint:
-    """A checkpoint whose files are what its manifest says.
+    """A checkpoint whose files match its manifest.
 
     Attributes:
         path: its folder.
-        manifest: what it says of itself.
-        lost: files of experience that are damaged; the rest is whole.
+        manifest: its manifest.
+        lost: files of experience that are damaged; all other files are undamaged.
     """
 
     path: Path
@@ -67,9 +67,9 @@ class SavedCheckpoint:
 
 
 def describe(configuration: Configuration, step: int, counters: Mapping[str, Any]) -> Manifest:
-    """Return the manifest of a checkpoint of this run, its files not named yet.
+    """Return the manifest of a checkpoint of this run, without its files.
 
-    Fields that are None are left out, so an older release finds an unknown field only if the job sets it.
+    Fields that are None are omitted, so an older release finds an unknown field only if the job sets it.
     """
     return Manifest(
         step=step,
@@ -81,11 +81,11 @@ def describe(configuration: Configuration, step: int, counters: Mapping[str, Any
 
 
 def read(folder: Path) -> SavedCheckpoint:
-    """Return the checkpoint in a folder, its files compared with their digests.
+    """Return the checkpoint in a folder, after a comparison of its files with their digests.
 
     Raises:
-        OSError, ValueError, TypeError: it is damaged, not only in its experience.
-        ConfigurationError: it is whole and of a format that this release does not read.
+        OSError, ValueError, TypeError: a file other than experience is damaged.
+        ConfigurationError: it is undamaged, but this release does not read its format.
     """
     manifest = _read_manifest(folder)
     damaged = [name for name, digest in manifest.files.items() if not _is(folder / name, digest)]
@@ -102,7 +102,7 @@ def digest_of(path: Path) -> str:
 
 
 def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration) -> None:
-    """Return if the checkpoint is of a run of this configuration.
+    """Check that the checkpoint is of a run of this configuration.
 
     Raises:
         ConfigurationError: it is of another algorithm or environment.
@@ -120,9 +120,9 @@ def refuse_another_run(checkpoint: SavedCheckpoint, configuration: Configuration
 
 
 def _completed(saved: dict[str, Any], section: type[BaseModel]) -> dict[str, Any]:
-    """Return what an older release saved, with the fields that are new since at their defaults.
+    """Return a section that an older release saved, with the defaults of fields that are newer.
 
-    What a newer release saved is compared as it stands.
+    A section of a newer release is returned unchanged.
     """
     try:
         return section.model_validate(saved).model_dump(mode="json")

@@ -1,4 +1,4 @@
-"""What a checkpoint keeps of an author's buffer besides its rows: arrays, tensors and plain values."""
+"""The state of an author's buffer in a checkpoint, besides its rows: arrays, tensors and plain values."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _ARRAY, _TENSOR, _PLAIN = "array:", "tensor:", "plain"
 
 
 def write(model: BaseAlgorithm, folder: Path) -> None:
-    """Write the state of the model's buffer, if that is of an author's class.
+    """Write the state of the model's buffer, if the buffer has an author's class.
 
     Raises:
-        ConfigurationError: the buffer has something that no checkpoint can write.
+        ConfigurationError: the buffer has a value that a checkpoint cannot hold.
     """
     buffer = _own_buffer(model)
     if buffer is None:
@@ -38,10 +38,10 @@ def write(model: BaseAlgorithm, folder: Path) -> None:
 
 
 def read(model: BaseAlgorithm, folder: Path) -> None:
-    """Put what `write` wrote there into the buffer of an equal model.
+    """Load the file that `write` wrote into the buffer of an equal model.
 
     Raises:
-        OSError, ValueError, KeyError: it is damaged.
+        OSError, ValueError, KeyError: the file is damaged.
     """
     buffer = _own_buffer(model)
     if buffer is None:

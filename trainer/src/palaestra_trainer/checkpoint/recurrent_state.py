@@ -1,4 +1,4 @@
-"""The tensors that an algorithm changes in a rollout, as `algorithms.beside` declares them."""
+"""The tensors that an algorithm changes in a rollout, as `algorithms.rollout_state` declares them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.algorithms.rollout_state import beside
 
 
 def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the tensors of the networks that a rollout changes, to be copied or written to."""
+    """Return the tensors of the networks that a rollout changes; the caller copies or overwrites them."""
     return [
         tensor
         for name in beside(model).networks
@@ -21,14 +21,14 @@ def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
 
 
 def memories(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the states of the model's recurrent networks; nothing writes to them later."""
+    """Return the states of the model's recurrent networks; no code writes to these tensors later."""
     return [state for name in beside(model).memories for state in _tensors(getattr(model, name))]
 
 
 def remember(model: BaseAlgorithm, states: Sequence[torch.Tensor]) -> None:
-    """Let the model continue with the states that `memories` returned.
+    """Set the states that `memories` returned, so that the model continues with them.
 
-    A member without a state keeps the model's own; it begins an episode, and its state with it.
+    A member without a saved state keeps the model's current one; its episode and its state begin together.
     """
     left = iter(states)
     for name in beside(model).memories:
@@ -44,7 +44,7 @@ def _tensors(states: Any) -> Iterator[torch.Tensor]:
 
 
 def _replaced(states: Any, left: Iterator[torch.Tensor]) -> Any:
-    """Return nested tuples of the same kinds with the tensors of `left` in their place."""
+    """Return nested tuples of the same types with the tensors of `left` in place of the old ones."""
     if isinstance(states, torch.Tensor):
         known = next(left).to(states.device)[:, : states.shape[1]]
         return torch.cat([known, states[:, known.shape[1] :]], dim=1)

@@ -1,7 +1,7 @@
-"""A replay buffer on disk: rows as they lie in memory, in chunks that later checkpoints share.
+"""A replay buffer on disk: rows in their format in memory, in chunks that later checkpoints share.
 
-Between two checkpoints few rows change. A chunk of which none did is a hard link to the file of the
-checkpoint before, or a copy of it where the volume has no links.
+Few rows change between two checkpoints. A chunk without a changed row is a hard link to the file of the
+previous checkpoint, or a copy of it if the volume does not support hard links.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def write(buffer: ValidReplayBuffer, folder: Path, before: SavedCheckpoint | Non
 
 
 def read(buffer: ValidReplayBuffer, found: SavedCheckpoint) -> None:
-    """Put the rows of a checkpoint into an equal buffer that stands where it stood when they were written.
+    """Load the rows of a checkpoint into an equal buffer with the same positions as when they were written.
 
-    Rows of chunks that are lost are left out.
+    Rows of lost chunks are omitted.
 
     Raises:
-        ValueError: they are of another shape, or pickled.
+        ValueError: the rows have another shape, or are pickled.
     """
     names = sorted(name for name in found.manifest.files if name.startswith(EXPERIENCE))
     kept = np.ones(buffer.buffer_size, dtype=bool)
@@ -77,12 +77,12 @@ def _write_chunk(buffer: ValidReplayBuffer, chunk: int, path: Path) -> None:
 
 
 def _share(old: Path, new: Path) -> bool:
-    """Let `new` be the same file as `old`, or a copy; return False if `old` is gone."""
+    """Make `new` a hard link to `old`, or a copy; return False if `old` is missing."""
     try:
         os.link(old, new)
     except FileNotFoundError:
         return False
-    except OSError:  # the volume has no links, or no more of them
+    except OSError:  # the volume does not support hard links, or the file has too many
         shutil.copyfile(old, new)
         sync(new)
     return True

@@ -1,4 +1,4 @@
-"""The random generators that training draws from: where they stand, as plain data."""
+"""The states of the random generators that training draws from, as plain data."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gymnasium import spaces
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Generators:
-    """Where Python's, NumPy's, PyTorch's and the action space's generator stand.
+    """The states of the generators of Python, NumPy, PyTorch and the action space.
 
     Attributes:
-        gpu: PyTorch's other one, of the GPU that the model lives on; None: it lives on the CPU.
+        gpu: state of PyTorch's generator on the GPU of the model; None: the model is on the CPU.
     """
 
     python: tuple[Any, ...]
@@ -27,7 +27,7 @@ class Generators:
 
     @classmethod
     def now(cls, action_space: spaces.Space[Any], device: torch.device) -> Generators:
-        """Return where they stand now."""
+        """Return the current states."""
         return cls(
             python=random.getstate(),
             numpy=np.random.get_state(legacy=False),
@@ -37,7 +37,7 @@ class Generators:
         )
 
     def put_back(self, action_space: spaces.Space[Any], device: torch.device) -> None:
-        """Let them go on from here; that of a GPU only if the model lives on one still."""
+        """Set the generators to these states; that of a GPU only if the model is on a GPU now."""
         random.setstate(self.python)
         np.random.set_state(self.numpy)
         torch.set_rng_state(self.pytorch)
@@ -58,7 +58,7 @@ class Generators:
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> Generators:
-        """Return what `to_json` wrote."""
+        """Return the states that `to_json` wrote."""
         version, words, gauss = content["python"]
         numpy = content["numpy"]
         key = np.array(numpy["state"]["key"], dtype=np.uint32)

@@ -1,7 +1,7 @@
-"""Everything that the next step of a run depends on and that is neither a saved tensor nor experience.
+"""The state that the next step of a run depends on, except for saved tensors and experience.
 
-It is taken at each rollout boundary, which off policy is every few steps, so taking it costs some ten
-microseconds: references to what nobody writes to any more, and copies of what is small.
+It is taken at each rollout boundary, which off policy is every few steps. So it must be cheap, and costs some
+ten microseconds: it holds references to objects that are not changed later, and copies of small ones.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from palaestra_trainer.episodes.episode_state import EpisodeState
 
 STATE = "state.json"
 ARRAYS = "state.npz"
-# The counts of every algorithm; `algorithms.beside` has those of some.
+# These are the counts of every algorithm; `algorithms.rollout_state` lists the others of each.
 _NUMBERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 _NOISE = ("exploration_mat", "exploration_matrices")
 
@@ -39,21 +39,21 @@ class TrainingState:
     """A run at a rollout boundary.
 
     Attributes:
-        numbers: what the algorithm counts, by attribute.
-        generators: where the random generators stand.
-        observation: the last one, a row for each member, as the environments returned it.
-        episode_starts: which rows of it are the first of an episode.
+        numbers: the counts of the algorithm, by attribute.
+        generators: states of the random generators.
+        observation: the last observation, a row for each member, as the environments returned it.
+        episode_starts: for each row of `observation`, whether it is the first of an episode.
         episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
         successes: whether the last episodes succeeded.
-        positions: where the replay buffer stands; None without one.
-        members: how far each collecting simulator is.
-        rollout: what else is counted amid an episode, as JSON data; the conductor's own.
-        noise: matrices of state-dependent exploration, which are drawn before a boundary; none without it.
-        networks: what a rollout changes of the networks, copied; not written, since the model has it.
+        positions: positions of the replay buffer; None without one.
+        members: state of each collecting simulator's episode.
+        rollout: other counts during an episode, as JSON data; the training callback defines them.
+        noise: matrices of state-dependent exploration, drawn before the boundary; empty without it.
+        networks: copies of the networks' tensors that a rollout changes; not written, as the model has them.
         memories: states of recurrent networks, each of shape (layers, members, units).
-        action_noise: where the noise on each member's actions is, if that lasts longer than a step.
-        scales: statistics of observations and rewards, if they are normalized; never written, as above.
-        running_returns: for each member the discounted reward of its episode so far, where that is needed.
+        action_noise: state of the noise on each member's actions, if it lasts longer than a step.
+        scales: statistics of observations and rewards, if they are normalized; not written, as `networks`.
+        running_returns: for each member the discounted reward of its episode so far, if rewards need it.
     """
 
     numbers: dict[str, float]
@@ -98,7 +98,7 @@ class TrainingState:
         )
 
     def put_back(self, model: BaseAlgorithm) -> None:
-        """Let the model go on from here; its other tensors and its experience are as they were here."""
+        """Set the state of the model; its other tensors and its experience must be from this boundary."""
         for name, value in self.numbers.items():
             setattr(model, name, value)
         self.generators.put_back(model.action_space, model.device)
@@ -120,7 +120,7 @@ class TrainingState:
             action_noise.put_back(model.action_noise, self.action_noise)
 
     def _show_observation(self, model: BaseAlgorithm) -> None:
-        """Let the last observation be the model's, as it sees it and as it is."""
+        """Set the model's last observation, both normalized and original."""
         original = seen = as_seen(model, self.observation)
         if (normalizer := normalizer_of(model)) and self.running_returns is not None:
             if self.scales is not None:
@@ -130,7 +130,7 @@ class TrainingState:
         model._last_original_obs = original
 
     def write(self, folder: Path) -> None:
-        """Write it into a folder, but for what is part of the model."""
+        """Write it into a folder, without the parts that belong to the model."""
         arrays = by_name(self.observation, "observation") | {"episode_starts": self.episode_starts}
         if self.action_noise is not None:
             arrays["action_noise"] = self.action_noise
@@ -157,10 +157,10 @@ class TrainingState:
 
     @classmethod
     def read(cls, folder: Path) -> TrainingState:
-        """Return what `write` wrote there.
+        """Return the state that `write` wrote into a folder.
 
         Raises:
-            OSError, ValueError, TypeError, KeyError: it is damaged.
+            OSError, ValueError, TypeError, KeyError: a file is damaged.
         """
         content = json.loads((folder / STATE).read_text(encoding="utf-8"))
         with np.load(folder / ARRAYS, allow_pickle=False) as file:
@@ -202,5 +202,5 @@ def _noise_of(model: BaseAlgorithm) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a number of NumPy's as one of Python's."""
+    """Return a NumPy number as a Python number."""
     return value.item()

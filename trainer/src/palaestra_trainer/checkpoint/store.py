@@ -1,4 +1,4 @@
-"""The folder of a run's checkpoints: which is the newest, and how another one comes to it."""
+"""The folder of a run's checkpoints: find the newest one, and add another."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from palaestra_trainer.run_directory import sync
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
-_NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})  # as of object stores
+_NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})  # e.g. of object stores
 _NUMBER = re.compile(r"[0-9]{1,18}")
 
 
@@ -30,9 +30,9 @@ class Saver:
     """Writes the checkpoints of one attempt.
 
     Args:
-        folder: where they are; it need not be there yet.
-        keep: how many of the newest stay.
-        resumed: the checkpoint that the attempt went on from.
+        folder: the folder of the checkpoints; it may be missing.
+        keep: number of newest checkpoints to keep.
+        resumed: the checkpoint that the attempt resumed from.
     """
 
     def __init__(self, folder: Path, keep: int, resumed: SavedCheckpoint | None = None) -> None:
@@ -41,13 +41,12 @@ class Saver:
         self._before = resumed
 
     def save(self, model: BaseAlgorithm, state: TrainingState, described: Manifest) -> bool:
-        """Write a checkpoint of the model, which is put back to `state`; remove all but the newest.
+        """Set the model back to `state`, write a checkpoint, and remove all but the newest ones.
 
-        Returns whether it was written: a full disk is logged, and leaves those that
-        were there as they were.
+        Returns whether it was written: a full disk is logged, and the older checkpoints then stay.
 
         Raises:
-            ConfigurationError: the file system has no way to put it in place as a whole.
+            ConfigurationError: the file system cannot rename folders.
             OSError: it cannot be written for another reason than a full disk.
         """
         state.put_back(model)
@@ -71,9 +70,9 @@ class Saver:
         return True
 
     def size_bytes(self) -> int:
-        """Return the size of the newest checkpoint, with the files that others share.
+        """Return the size of the newest checkpoint, with the files that it shares with others.
 
-        0: there is none, or it cannot be looked at; no run ends for that.
+        It is 0 before the first checkpoint, or if its files cannot be read: that must not end a run.
         """
         newest = self._before
         if newest is None:
@@ -103,21 +102,21 @@ class Saver:
         return complete
 
     def _prune(self, step: int) -> None:
-        """Remove all but the newest; those beyond `step` are damaged, or of a way that was not gone on."""
+        """Remove all but the newest; those beyond `step` are damaged, or of a run that was not continued."""
         reached = sorted((path for path in _steps(self._folder) if _step(path) <= step), key=_step)
         for path in set(_steps(self._folder)).difference(reached[-self._keep :]):
             shutil.rmtree(path, ignore_errors=True)
 
 
 def newest(folder: Path) -> SavedCheckpoint | None:
-    """Return the newest checkpoint that is undamaged; None if the folder has none. Nothing is changed.
+    """Return the newest undamaged checkpoint; None if the folder has no checkpoints. Nothing is changed.
 
-    Where chunks of experience are shared, damage to one may be damage to all: then the
-    newest is returned whose other files are whole.
+    Checkpoints share chunks of experience, so a damaged chunk may affect all of them. If all are affected,
+    return the newest one whose other files are undamaged.
 
     Raises:
-        ConfigurationError: it is of a format that this release does not read, or none can be read: a run
-            that began anew would replace them.
+        ConfigurationError: a checkpoint has a format that this release does not read, or all are damaged: a
+            run from the beginning would replace them.
     """
     rest, damage = None, ""
     for path in sorted(_steps(folder), key=_step, reverse=True):
@@ -136,7 +135,7 @@ def newest(folder: Path) -> SavedCheckpoint | None:
         )
         rest = rest or found
     if rest:
-        log.warning("no checkpoint is whole: going on without the lost experience", path=str(rest.path))
+        log.warning("all checkpoints are damaged: resuming without the lost experience", path=str(rest.path))
     elif damage:
         raise ConfigurationError(
             f"{folder}: no checkpoint in it can be read ({damage}); restore one from a copy, or move the run "
@@ -146,9 +145,9 @@ def newest(folder: Path) -> SavedCheckpoint | None:
 
 
 def restore(checkpoint: SavedCheckpoint, model: BaseAlgorithm) -> TrainingState:
-    """Put tensors and experience of a checkpoint into a new model of the same configuration.
+    """Load tensors and experience of a checkpoint into a new model of the same configuration.
 
-    Returns the rest, which is to be put back last, when nothing is left to do before learning.
+    Returns the rest of the state; call its `put_back` last, directly before learning.
 
     Raises:
         ConfigurationError: the tensors are of another kind of model.
@@ -165,7 +164,7 @@ def restore(checkpoint: SavedCheckpoint, model: BaseAlgorithm) -> TrainingState:
 
 
 def _put_in_place(draft: Path) -> Path:
-    """Give a finished draft its name; an older one of the same step is there until then."""
+    """Rename a complete draft to its final name; an older checkpoint of the same step stays until then."""
     name = draft.name.removeprefix(".").removesuffix(".draft")
     target, replaced = draft.with_name(name), draft.with_name(f".{name}.replaced")
     try:

@@ -1,4 +1,4 @@
-"""A model's tensors, in the zip of Stable-Baselines3, of which nothing is unpickled.
+"""A model's tensors in a zip of Stable-Baselines3, which is read without unpickling.
 
 If a model normalizes, the zip has one more member: the statistics of observations and rewards, as JSON. So
 the file alone is a usable policy. Stable-Baselines3 reads such a zip like any other.
@@ -26,11 +26,11 @@ NORMALIZE = "normalize.json"
 
 @dataclass(frozen=True, slots=True)
 class Tensors:
-    """A copy of all tensors that an update changes, to go back to from its middle.
+    """A copy of all tensors that an update changes; an interrupted update is undone with it.
 
     Attributes:
-        parameters: those of networks and optimizers, as Stable-Baselines3 names them.
-        variables: those that are learned besides.
+        parameters: tensors of networks and optimizers, by their names in Stable-Baselines3.
+        variables: other learned tensors.
     """
 
     parameters: dict[str, Any]
@@ -44,16 +44,16 @@ class Tensors:
         return cls(deepcopy(model.get_parameters()), variables)
 
     def put_back(self, model: BaseAlgorithm) -> None:
-        """Let the model's tensors be those that were copied."""
+        """Set the model's tensors to the copied ones."""
         model.set_parameters(self.parameters, exact_match=True, device=model.device)
         _set_variables(model, self.variables)
 
 
 def save_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Write the zip of a model, with all that its policy needs.
+    """Write the zip of a model, with the statistics that its policy needs.
 
     Raises:
-        OSError: it could not be written.
+        OSError: the file could not be written.
     """
     model.save(path)
     if normalizer := normalizer_of(model):
@@ -62,10 +62,10 @@ def save_tensors(path: Path, model: BaseAlgorithm) -> None:
 
 
 def load_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Put what `save_tensors` wrote into `model`; nothing is unpickled.
+    """Load the file that `save_tensors` wrote into `model`; nothing is unpickled.
 
     Raises:
-        ConfigurationError: it is of another kind of model, or of one that normalized something else.
+        ConfigurationError: the file is of another kind of model, or of one with other normalization.
     """
     try:
         _, parameters, variables = load_from_zip_file(path, device=model.device, load_data=False)

@@ -33,8 +33,8 @@ __all__ = [
     "SeeTargetEnv",
 ]
 
-# As text, since the entry point finds simulators, which this package does not know.
-# No max_episode_steps: the environments count their steps themselves, since Sparse rewards the last.
+# Entry points are text, because they import simulators, and this package must not import those.
+# max_episode_steps is not set: the environments count their steps themselves, as Sparse rewards the last one.
 gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
 gymnasium.register(

@@ -1,7 +1,7 @@
 """Policies without learning, as a baseline that a trained policy must beat.
 
 Each is a function of the environment, not of the observation, so that it works with
-every choice of parts; `make bench` prints their success beside the trained policy's.
+every choice of parts. `make bench` prints their success next to that of the trained policy.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def random_movement(env: MoveToTargetEnv) -> Any:
 
 
 def straight_to_target(env: MoveToTargetEnv) -> Any:
-    """Return the action whose direction is nearest to the target's; on the target, stop.
+    """Return the action whose direction is nearest to that of the target, or a stop near the target.
 
     It uses no sensor, so a cylinder in the way ends the episode.
     """

@@ -1,7 +1,7 @@
-"""What gymnasium's API promises of each reset and each step, in facts for messages.
+"""Check the results of resets and steps against gymnasium's API; return each mistake as text for a message.
 
-`mismatch` is complete. The checks of every reset and step ask less, since they are made thousands of times a
-second: a number beyond the bounds of a Box passes them.
+`mismatch` is a complete check. The checks of every reset and step are weaker, because they run thousands of
+times a second: they accept a number beyond the bounds of a Box.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ _LENGTHS = {"reset": 2, "step": 5}
 
 
 def broken_by_reset(space: spaces.Space[Any], result: Any) -> str:
-    """Return which promise the result of a reset breaks; "" if none."""
+    """Return the mistake in the result of a reset; "" if it is right."""
     if not isinstance(result, tuple) or len(result) != _LENGTHS["reset"]:
         return kind_of(result)
     return _unlike(space, result[0]) or _no_info(result[1])
 
 
 def broken_by_step(space: spaces.Space[Any], result: Any) -> str:
-    """Return which promise the result of a step breaks; "" if none."""
+    """Return the mistake in the result of a step; "" if it is right."""
     if not isinstance(result, tuple) or len(result) != _LENGTHS["step"]:
         return kind_of(result)
     observation, reward, *ends, info = result
@@ -37,7 +37,7 @@ def broken_by_step(space: spaces.Space[Any], result: Any) -> str:
 
 
 def kind_of(result: Any) -> str:
-    """Return the class of a value in words; for a tuple, those of its parts too."""
+    """Return the class of a value as text; for a tuple, the classes of its parts too."""
     if isinstance(result, tuple):
         return f"a tuple of {len(result)}: ({', '.join(type(part).__name__ for part in result)})"
     return f"a {type(result).__name__}"
@@ -48,7 +48,7 @@ def _no_info(info: Any) -> str:
 
 
 def _unlike(space: spaces.Space[Any], observation: Any) -> str:
-    """Return why an observation is not of the kind of its space, whatever its numbers; "" if it is."""
+    """Return the difference in type, shape or keys of an observation from its space; "" if they are equal."""
     fact = _mismatch_of_kind(space, observation)
     return fact and f"an observation of another kind ({fact})"
 
@@ -62,7 +62,7 @@ def _mismatch_of_kind(space: spaces.Space[Any], observation: Any) -> str:
 
 
 def mismatch(space: spaces.Space[Any], observation: Any) -> str:
-    """Return why an observation does not belong to its space, as text; "" if it does."""
+    """Return the reason why an observation is not in its space, as text; "" if it is."""
     if isinstance(space, spaces.Dict):
         return _mismatch_of_dict(space, observation, mismatch)
     if isinstance(space, spaces.Box):
@@ -82,13 +82,13 @@ def _mismatch_of_dict(space: spaces.Dict, observation: Any, check: Mismatch) -> 
 
 
 def _mismatch_of_shape(space: spaces.Space[Any], observation: Any) -> str:
-    """Return how the shape differs; "" if it does not, or if there is none."""
+    """Return the difference in shape; "" if the shapes are equal, or if the observation has no shape."""
     shape = getattr(observation, "shape", space.shape)
     return "" if shape == space.shape else f"shape {shape}, not {space.shape}"
 
 
 def _mismatch_of_array(space: spaces.Box, observation: Any) -> str:
-    """Return how class, shape or dtype differ; "" if they do not."""
+    """Return the difference in class, shape or dtype; "" if they are equal."""
     if not isinstance(observation, np.ndarray | np.generic):
         return kind_of(observation)
     if observation.dtype == space.dtype and observation.shape == space.shape:

@@ -1,6 +1,6 @@
 """The task: drive to three targets in turn, and stand on each.
 
-World, robot, observations and rewards are those of `MoveToTargetEnv`: one world serves tasks of different
+World, robot, observations and rewards are those of `MoveToTargetEnv`, so one world has tasks of different
 difficulty.
 """
 
@@ -18,14 +18,14 @@ from palaestra_trainer.robots.geometry import Point
 class DeliverEnv(MoveToTargetEnv):
     """Drive to three targets in turn and stand on each: within 0.20 m, slower than 0.05 m/s.
 
-    As `MoveToTargetEnv`, except for this:
+    It differs from `MoveToTargetEnv` in these points:
 
     - The mark shows one target. When the robot stands on it, the mark moves to the next one, at least 1 m
-      away, and the episode goes on. `options.targets` is how many there are.
-    - `target` of an observation is the target of the moment; `to_reach` is the share of the targets that are
+      away, and the episode continues. `options.targets` is the number of targets.
+    - `target` of an observation is the current target; `to_reach` is the share of the targets that are
       left: 1, 2/3, 1/3. It is observed by default.
-    - `success` is paid for each target. `info["outcome"]` of such a step is `delivered`, of the last one
-      `reached`; `info["is_success"]` is true for the last one only.
+    - `success` is paid for each target. `info["outcome"]` of such a step is `delivered`, for the last target
+      `reached`; `info["is_success"]` is true only for the last target.
     - Time is up after 300 steps.
 
     `reset(options={"start": (x, y, heading), "target": (x, y)})` sets the start and the first target.
@@ -37,7 +37,7 @@ class DeliverEnv(MoveToTargetEnv):
         on_close: called by `close`.
 
     Raises:
-        MissingCapability: the robot is no Robotino.
+        MissingCapability: the robot is not a Robotino.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
-"""Check what an environment returns against gymnasium's API.
+"""Check the results of an environment against gymnasium's API.
 
 gymnasium's own wrapper only warns, and training would continue with wrong rows. Here its checks of the first
 reset and the first step raise an error that names the expected and the actual value. Types and shapes of
-later ones are checked too, as `contract` says. Numbers that are not finite are not checked here: the learner
+later results are checked too, see `contract`. NaN and infinity are not checked here, because the learner
 reports them as divergence.
 """
 
@@ -31,13 +31,13 @@ from palaestra_trainer.errors import ConfigurationError
 
 RESET = "reset(self, *, seed=None, options=None) that returns (observation, info)"
 STEP = "step(self, action) that returns (observation, reward, terminated, truncated, info)"
-_one_at_a_time = threading.Lock()  # warnings are caught for the whole process
+_one_at_a_time = threading.Lock()  # because warnings are caught for the whole process
 
 
 def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
     """Return the environment in a wrapper that raises ConfigurationError if its first reset or step is wrong.
 
-    It is checked twice: around and inside the wrappers of `gymnasium.make`, which unpack a step.
+    There are two checks: outside and inside the wrappers of `gymnasium.make`, which unpack a step's result.
 
     Raises:
         ConfigurationError: its spaces, or the signatures of its methods, are wrong.
@@ -52,10 +52,10 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
 
 
 def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
-    """Refuse wrappers with statistics of their own: no model keeps them, and each simulator has others.
+    """Refuse wrappers with statistics: a model does not keep them, and each simulator has other ones.
 
     Raises:
-        ConfigurationError: there is one.
+        ConfigurationError: the environment has such a wrapper.
     """
     while isinstance(env, gymnasium.Wrapper):
         if isinstance(env, NormalizeObservation | NormalizeReward):
@@ -67,7 +67,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment whose resets and steps are checked, the first ones most; its results are not changed.
+    """An environment whose resets and steps are checked, the first ones more; results are not changed.
 
     Args:
         env: the environment.
@@ -88,7 +88,7 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return the result of the environment's reset.
 
         Raises:
-            ConfigurationError: it is wrong.
+            ConfigurationError: the result is wrong.
         """
         result = self.env.reset(seed=seed, options=options)
         self._episodes, self._steps = self._episodes + 1, 0
@@ -103,7 +103,7 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return the result of the environment's step.
 
         Raises:
-            ConfigurationError: it is wrong.
+            ConfigurationError: the result is wrong.
         """
         result = self.env.step(action)
         self._steps += 1

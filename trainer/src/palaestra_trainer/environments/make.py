@@ -1,7 +1,7 @@
 """Create the environment of a job, of any class.
 
-The environment gets robot, scene and reward as far as its signature accepts them. Mismatches are found here,
-before a simulator starts.
+The environment gets those of robot, scene and reward that its signature accepts. This module reports
+mismatches before a simulator starts.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
     require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
     try:
-        # `held` replaces gymnasium's wrapper, whose warnings would not end the run.
+        # `held` replaces gymnasium's checker, because warnings would not end the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
     except TrainerError:
         raise
-    except Exception as error:  # the constructor is the user's code, which may raise anything
+    except Exception as error:  # the constructor is code of the user, which may raise anything
         raise ConfigurationError(
             f"environment.id: {wanted.id} cannot be created ({fact_of(error)}); "
             "fix it, or change environment.options"

@@ -1,8 +1,8 @@
-"""Masks of actions, which an environment returns by its method `action_masks`, as sb3-contrib calls it.
+"""Masks of actions; an environment returns them from its method `action_masks`, the name in sb3-contrib.
 
-A mask has one truth value for each choice. Of a Discrete, each action is a choice. Of a MultiDiscrete, the
-values of its first number come first, then those of its second, and so on. Of a MultiBinary, each number has
-two choices: 0, then 1.
+A mask has one truth value for each choice. In a Discrete space each action is a choice. In a MultiDiscrete
+space the choices of the first number come first, then those of the second, and so on. In a MultiBinary space
+each number has two choices: 0, then 1.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def masks_in(given: Any, space: spaces.Space[Any], *, count: int | None = None) 
 
     Args:
         given: one mask or several, of any shape.
-        space: of the actions.
-        count: the number of masks; None: any.
+        space: the space of the actions.
+        count: the number of masks; None: any number.
 
     Raises:
-        ValueError: they are no masks, or one of them allows nothing.
+        ValueError: a value is not a mask of this space, or one of the masks allows nothing.
     """
     choices = choices_of(space)
     expected = f"expected {sum(choices)} truth values, one for each choice of {space}; got"
@@ -79,7 +79,7 @@ def mask_of(env: gymnasium.Env[Any, Any]) -> np.ndarray:
     """Return a copy of the mask that the environment returns now; shape (choices,), bool.
 
     Raises:
-        ConfigurationError: it is no mask of the environment's actions, or allows none.
+        ConfigurationError: the value is not a mask of the environment's actions, or allows no action.
     """
     given = env.get_wrapper_attr(ACTION_MASKS)()
     try:
@@ -104,6 +104,6 @@ def _parts(mask: np.ndarray, choices: list[int]) -> list[np.ndarray]:
 
 
 def _odd(mask: np.ndarray) -> Any:
-    """Return the first value that is no truth value."""
+    """Return the first value that is not a truth value."""
     values = mask.ravel().tolist()
     return next((value for value in values if value not in (0, 1)), values[0])

@@ -38,7 +38,7 @@ Info = dict[str, Any]
 class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     """Drive to the target and stand there: within 0.20 m, slower than 0.05 m/s.
 
-    A Robotino in a walled floor of 4 x 4 m with four cylinders; start, heading and
+    A Robotino drives on a walled floor of 4 x 4 m with four cylinders; start, heading and
     target differ in every episode. A step is one control period of the robot (0.192 s
     in simulation): at 0.5 m/s it drives 0.1 m, and it stands within two steps of STOP.
 
@@ -67,14 +67,14 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Observation
 
-    `Box(float32)`, the parts named by `observe` one after the other, each number cut
-    off at its bounds. The index counts within its part. Of the sensors, 0 looks forward and
-    the others follow counter-clockwise every 40 degrees.
+    `Box(float32)`: the parts named by `observe` one after the other, each number clipped
+    to its bounds. The index counts within its part. Sensor 0 points forward, and the others
+    follow counter-clockwise every 40 degrees.
 
     | part      | index | meaning                                       | unit      | min  | max |
     |-----------|-------|-----------------------------------------------|-----------|------|-----|
-    | sensors   | 0-8   | nearness to what is 0.40 m away or closer     | 0.37 m    | 0    | 1   |
-    | sensors   | 9     | bumper touches something                      | 0 or 1    | 0    | 1   |
+    | sensors   | 0-8   | nearness of the nearest object within 0.40 m  | 0.37 m    | 0    | 1   |
+    | sensors   | 9     | the bumper touches something                  | 0 or 1    | 0    | 1   |
     | velocity  | 0     | forward, mean over the step                   | 0.5 m/s   | -1.5 | 1.5 |
     | velocity  | 1     | to the left, mean over the step               | 0.5 m/s   | -1.5 | 1.5 |
     | velocity  | 2     | turning, mean over the step                   | 1.0 rad/s | -1.5 | 1.5 |
@@ -84,7 +84,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
-    By default everything but `position` and `to_reach`: see docs/explain/tasks.md for what that costs.
+    The default is all parts except `position` and `to_reach`; docs/explain/tasks.md describes its cost.
 
     ## Reward
 
@@ -96,22 +96,23 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | progress  | 1     |        | -0.1 | 0.1 | meters gained toward the target, by one movement    |
     | success   | 1     | 1      | 0    | 1   | 1 when the robot came to stand on it                |
     | collision | -1    | -1     | 0    | 1   | 1 when it ran into something                        |
-    | proximity | -0.1  |        | 0    | 1   | grows in a line as things come from 0.18 to 0.03 m  |
-    | time_up   |       | -0.5   | 0    | 1   | 1 when the last step was taken without that         |
+    | proximity | -0.1  |        | 0    | 1   | rises linearly as objects come from 0.18 to 0.03 m  |
+    | time_up   |       | -0.5   | 0    | 1   | 1 when time is up without success or collision      |
     | duration  | -0.01 |        | 1    | 1   | 1 for every step                                    |
 
     ## Start
 
-    `reset(seed=s)` alone decides the episode. Start and target are drawn uniformly from the
-    places where the robot has 0.1 m to spare, at least 1 m apart, and the heading from all
-    directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
+    Only the seed of `reset(seed=s)` decides the episode. Start and target are drawn uniformly
+    from the positions where the robot has 0.1 m of free space around it, at least 1 m apart,
+    and the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}`
+    sets one or both.
 
     ## End of an episode
 
     Terminated: the robot stands on the target (`info["is_success"]`), or it bumped into
     something. After `max_steps` steps, `time_up` decides: with `"truncated"` (the default for
     Dense) a learner estimates the value of later steps; with `"terminated"` (the default for
-    Sparse) it counts no later step.
+    Sparse) it ignores them.
 
     ## Info
 
@@ -129,7 +130,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         on_close: called by `close`.
 
     Raises:
-        MissingCapability: the robot is no Robotino.
+        MissingCapability: the robot is not a Robotino.
     """
 
     needs: ClassVar[tuple[type, ...]] = (RobotinoAbc,)
@@ -170,11 +171,11 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         """Begin an episode; return its first observation, and an info with its start and target.
 
         Args:
-            seed: decides the episode; without one, the seed is derived from the last.
+            seed: decides the episode; without one, the episode follows from the previous seed.
             options: `start` (x, y, heading) and `target` (x, y), in meters and radians.
 
         Raises:
-            ConfigurationError: an option is unknown, or is in an obstacle.
+            ConfigurationError: an option is unknown, or its position is in an obstacle.
             SimulatorFault: as the robot raised it.
         """
         super().reset(seed=seed)
@@ -232,12 +233,12 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _more_targets(self, places: FreePlaces, first: Point) -> Iterable[Point]:
-        """Return the targets after the first; here there are none."""
+        """Return the targets after the first; this task has only one, and a subclass may have more."""
         del places, first
         return ()
 
     def _next_target(self, seen: StepState) -> StepState:
-        """Let the robot drive to the next target; return what it sees then."""
+        """Move the mark to the next target; return the state with that target."""
         self._at += 1
         target = self._targets[self._at]
         self._scene.mark(target)

@@ -1,8 +1,8 @@
 """The task with its goal in the observation: drive to the target and stay there.
 
-For algorithms that learn from other goals than the wanted one, such as hindsight experience replay. The
-interface is that of gymnasium-robotics: a Dict with `achieved_goal` and `desired_goal`, and rewards that are
-a function of both. Robot, scene and faults are as in `MoveToTargetEnv`, which plays the episodes.
+It is for algorithms that learn from other goals than the desired one, such as hindsight experience replay.
+The interface is that of gymnasium-robotics: a Dict with `achieved_goal` and `desired_goal`, and rewards that
+are a function of both. Robot, scene and faults are as in `MoveToTargetEnv`, which plays the episodes.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## Observation
 
-    `Dict`, with the numbers of `observation` as on the sheet of `MoveToTargetEnv`: by default its parts
-    sensors, velocity, position and time_left. `target` is refused there.
+    `Dict`; the tables of `MoveToTargetEnv` describe the numbers of `observation`: by default its parts
+    sensors, velocity, position and time_left. The part `target` is refused.
 
     | key           | index | meaning                                      | unit | min | max |
     |---------------|-------|----------------------------------------------|------|-----|-----|
@@ -54,10 +54,10 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     | reward | min | max | is                                                            |
     |--------|-----|-----|---------------------------------------------------------------|
     | Sparse | 0   | 1   | 1 within 0.20 m of the desired goal                           |
-    | Dense  | 0   | 1   | 1 at the desired goal, falling in a line to 0 at 5.66 m        |
+    | Dense  | 0   | 1   | 1 at the desired goal, falling linearly to 0 at 5.66 m         |
 
-    No reward is negative, unlike in gymnasium-robotics: a collision ends the episode, and an end must not
-    be worth more than going on.
+    Rewards are never negative, unlike in gymnasium-robotics: a collision ends the episode, and an early end
+    must not be worth more than further steps.
 
     ## Start
 
@@ -65,9 +65,10 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## End of an episode
 
-    Terminated: the robot bumped into something (`compute_terminated`). Arriving ends no episode, so the
-    value of a goal does not depend on whose goal it was. After `max_steps` steps the episode is truncated
-    (`compute_truncated`), or terminated with `time_up="terminated"`.
+    Terminated: the robot bumped into something (`compute_terminated`). An episode continues after the robot
+    reaches the target, so the value of a goal is the same whether the goal was desired or achieved. After
+    `max_steps` steps the episode is truncated (`compute_truncated`), or terminated with
+    `time_up="terminated"`.
 
     ## Info
 
@@ -145,7 +146,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     def compute_terminated(
         self, achieved_goal: Numbers, desired_goal: Numbers, info: Mapping[str, Any]
     ) -> bool:
-        """Return whether a step with this info ends the episode for good."""
+        """Return whether a step with this info terminates the episode."""
         del achieved_goal, desired_goal
         time_up = self._is_time_up(info) and time_up_terminates(self.options)
         return info["outcome"] == EpisodeOutcome.COLLIDED.value or time_up
@@ -153,7 +154,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
     def compute_truncated(
         self, achieved_goal: Numbers, desired_goal: Numbers, info: Mapping[str, Any]
     ) -> bool:
-        """Return whether a step with this info is the last one that there is time for."""
+        """Return whether a step with this info truncates the episode, because time is up."""
         del achieved_goal, desired_goal
         return self._is_time_up(info) and not time_up_terminates(self.options)
 

@@ -1,6 +1,6 @@
-"""The task: drive to the target between things that a laser scanner sees.
+"""The task: drive to the target between obstacles that a laser scanner detects.
 
-The environment is built from any robot that steers, scans and knows where it is, and a scene; it depends on
+The environment is built from a scene and any robot that steers, scans and knows its pose; it depends on
 neither ROS nor Webots. A `SimulatorFault` of the robot passes through it unchanged.
 """
 
@@ -26,7 +26,7 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-BUMPED_M = 0.05  # from the robot's outline, where what comes nearer may be too near for a scanner
+BUMPED_M = 0.05  # from the robot's outline; an object that is nearer may be too near for a scanner
 SECTORS = 24
 SEEN_M = 0.8  # beyond it, a sector counts as empty
 TARGET_M = 2.0  # the unit of the distance to the target
@@ -38,11 +38,12 @@ Info = dict[str, Any]
 
 
 class NavigateEnv(gymnasium.Env[Observation, Any]):
-    """Drive to the target, to within 0.15 m, between things that the scanner sees.
+    """Drive to the target, to within 0.15 m, between obstacles that the scanner detects.
 
-    Made for a TurtleBot3 Burger in the world `court`: 3 x 3 m with two boxes and two cylinders. Any robot
-    with `Steering`, `Scanner` and `Localization` will do. Start, heading and target differ in every
-    episode. A step is one control period of the robot (0.192 s in simulation), in which a Burger drives 4 cm.
+    It was made for a TurtleBot3 Burger in the world `court`: 3 x 3 m with two boxes and two cylinders. It
+    works with any robot that has `Steering`, `Scanner` and `Localization`. Start, heading and target differ
+    in every episode. A step is one control period of the robot (0.192 s in simulation), in which a Burger
+    drives 4 cm.
 
     ## Actions
 
@@ -70,7 +71,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     | index | meaning                                         | unit     | min  | max |
     |-------|-------------------------------------------------|----------|------|-----|
-    | 0-23  | nearness of the nearest thing in a sector       | 0.8 m    | 0    | 1   |
+    | 0-23  | nearness of the nearest object in a sector      | 0.8 m    | 0    | 1   |
     | 24    | velocity forward, mean over the step            | greatest | -1.5 | 1.5 |
     | 25    | turning, mean over the step                     | greatest | -1.5 | 1.5 |
     | 26    | distance to the target                          | 2 m      | 0    | 3   |
@@ -79,14 +80,14 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
 
     ## Reward
 
-    The terms and weights of `MoveToTargetEnv`, each also in `info["reward_terms"]`. The distance of
-    `proximity` is from the robot's outline to what the scanner sees.
+    The terms and weights are those of `MoveToTargetEnv`, each also in `info["reward_terms"]`. The distance of
+    `proximity` is from the robot's outline to the nearest scanned point.
 
     ## Start
 
-    `reset(seed=s)` alone decides the episode. Start and target are drawn uniformly from the free places of
-    the scene's layout where the robot has 0.1 m to spare, at least 1 m apart, and the heading from all
-    directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
+    Only the seed of `reset(seed=s)` decides the episode. Start and target are drawn uniformly from the
+    positions of the scene's layout where the robot has 0.1 m of free space around it, at least 1 m apart, and
+    the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
 
     ## End of an episode
 
@@ -129,7 +130,7 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
             if self.options.actions == "continuous"
             else spaces.Discrete(len(MOVES))
         )
-        # Views of one robot: Python has no type for a class with several capabilities.
+        # These four are the same robot, because Python has no type for a class with several capabilities.
         self._robot: RobotAbc = robot
         self._wheels: Steering = robot
         self._scanner: Scanner = robot

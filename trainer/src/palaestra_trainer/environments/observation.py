@@ -1,8 +1,7 @@
 """The observation of an environment, in parts that can be chosen.
 
-A `StepState` is the complete state after a step. A `ObservationPart` turns some of it into
-numbers near [-1, 1], with bounds for each. A list defines which parts exist, and
-in which order.
+A `StepState` is the complete state after a step. An `ObservationPart` converts a part of it
+to numbers near [-1, 1], with bounds for each. The table `PARTS` defines all parts.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose, Twist
 
-UNIT_M = 2.0  # of positions in an observation: half of the arena
+UNIT_M = 2.0  # the unit of positions in an observation: half of the arena
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +27,11 @@ class StepState:
     Attributes:
         distances_m: shape (9,), see `RobotinoAbc`.
         bumped: whether the bumper touches something.
-        pose: in the world's frame.
+        pose: pose of the robot in the world's frame.
         velocity: forward, left (m/s), counter-clockwise (rad/s): means over the last step.
         target: x, y in meters, in the world's frame.
-        time_left: of the episode, from 1 to 0.
-        to_reach: share of the episode's targets that are left, with this one: from 1 down.
+        time_left: share of the episode's steps that are left, from 1 to 0.
+        to_reach: share of the episode's targets that are left, including the current one: from 1 down.
     """
 
     distances_m: NDArray[np.float32]
@@ -61,7 +60,7 @@ class StepState:
 
 @dataclass(frozen=True, slots=True)
 class ObservationPart:
-    """Some numbers of an observation: their source, and their bounds."""
+    """A part of an observation: the function that measures its numbers, and their bounds."""
 
     measure: Callable[[StepState], Sequence[float]]
     low: tuple[float, ...]
@@ -69,7 +68,7 @@ class ObservationPart:
 
 
 def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
-    """Return a vector of the world in the frame of a robot with this heading: forward, left."""
+    """Convert a vector in the world's frame to the frame of a robot with this heading: forward, left."""
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return x_m * c + y_m * s, y_m * c - x_m * s
 
@@ -84,8 +83,8 @@ def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
 
 
 def _sensors(seen: StepState) -> Sequence[float]:
-    # Nearness, not distance, because it is 0 in the usual case of nothing in range. A policy learned as much
-    # from it in 10,000 steps as in 40,000 from distances, which are 1 most of the time.
+    # The numbers are nearness, because it is 0 in the usual case that nothing is in range, while a distance
+    # would be 1. In 10,000 steps, a policy learned as much from nearness as in 40,000 from distances.
     least, most = SENSOR_RANGE_M
     nearness = (most - seen.distances_m) / (most - least)
     return [*nearness.tolist(), float(seen.bumped)]
@@ -134,7 +133,7 @@ def space(parts: Sequence[str]) -> spaces.Box:
 def observe(seen: StepState, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
     """Return the numbers of these parts, clipped to the bounds of `within`."""
     numbers = [number for name in parts for number in PARTS[name].measure(seen)]
-    # The same as np.clip, in half its time.
+    # This is the same as np.clip, in half the time.
     wanted = np.array(numbers, np.float32)
     cut_off: NDArray[np.float32] = np.minimum(np.maximum(wanted, within.low), within.high)
     return cut_off

@@ -1,4 +1,4 @@
-"""The options of the tasks, which vary them without changes to their code."""
+"""The options of the tasks; they vary a task without changes to its code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` has a reward for time-up, so its episode ends there. `Dense` does not: see docs/explain/tasks.md.
+# `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has no such reward, so its
+# episodes are truncated: see docs/explain/tasks.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
@@ -40,7 +41,7 @@ class Episodes(Protocol):
 
     @property
     def time_up(self) -> str | None:
-        """How an episode then ends; None: `TIME_UP_OF` the reward."""
+        """The end of an episode when time is up, see `TIME_UP`; None: `TIME_UP_OF` the reward."""
         ...
 
 
@@ -63,7 +64,7 @@ class MoveToTargetOptions:
         movements: the choices of a discrete action, in this order.
         actions: `discrete` (one of `movements`) or `continuous` (a twist).
         max_steps: steps until time is up.
-        time_up: how an episode then ends, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
+        time_up: the end of an episode then, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -105,7 +106,7 @@ class DeliverOptions(MoveToTargetOptions):
     """The options of `DeliverEnv`, checked: those of `MoveToTargetOptions`, with defaults for more targets.
 
     Args:
-        targets: how many targets an episode has.
+        targets: number of targets in an episode.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -130,7 +131,7 @@ class SeeOptions:
         actions: see `MoveToTargetOptions`.
         max_steps: see `MoveToTargetOptions`.
         time_up: see `MoveToTargetOptions`.
-        frames: the newest images in an observation, 1 or 3.
+        frames: number of newest images in an observation, 1 or 3.
         cylinders: whether the arena's four cylinders stand on the floor.
 
     Raises:
@@ -173,7 +174,7 @@ class NavigateOptions:
 
 
 def time_up_terminates(options: Episodes) -> bool:
-    """Return whether time-up ends an episode as terminated: a learner then estimates no value beyond it."""
+    """Return whether time-up terminates an episode, so that a learner estimates no value after it."""
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 
@@ -190,7 +191,7 @@ _Chosen = TypeVar("_Chosen", bound=MoveToTargetOptions | SeeOptions | NavigateOp
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
-    """Return options from the values in a job file, which has movements and parts by name.
+    """Return options from the values in a job file, where movements and parts are names.
 
     Raises:
         ConfigurationError: one line for every mistake.

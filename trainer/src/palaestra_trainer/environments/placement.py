@@ -1,7 +1,7 @@
-"""Tasks on a floor: from a start to a target, at free places of a layout.
+"""Tasks on a floor: from a start to a target, at free positions of a layout.
 
-The layout comes from the scene, so nothing here knows a world. A place is free for a robot if its outline
-keeps `CLEARANCE_M` from everything that stands there.
+The layout comes from the scene, so this module depends on no world. A position is free for a robot if its
+outline keeps `CLEARANCE_M` from every obstacle.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout
 
 CLEARANCE_M = 0.10  # between the robot's outline and any obstacle, at the start and on the target
-OF_THE_RUN = ("training_progress", "episode")  # options of every reset of a run, which change nothing here
-APART_M = 1.0  # least distance from start to target
-MOST_DRAWS = 10_000  # a layout in which so many points are not free has no room
+OF_THE_RUN = ("training_progress", "episode")  # options of every reset of a run; these tasks ignore them
+APART_M = 1.0  # smallest distance from start to target
+MOST_DRAWS = 10_000  # if so many random points are not free, the layout has no free position
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +34,12 @@ class EpisodeTask:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreePlaces:
-    """The free places of a layout for a robot.
+    """The free positions of a layout for a robot.
 
     Attributes:
-        layout: the floor and what stands on it.
-        radius_m: of the robot's outline.
-        apart_m: least distance from start to target.
+        layout: the floor and the obstacles on it.
+        radius_m: radius of the robot's outline.
+        apart_m: smallest distance from start to target.
     """
 
     layout: FloorLayout
@@ -47,14 +47,14 @@ class FreePlaces:
     apart_m: float = APART_M
 
     def free(self, x_m: float, y_m: float) -> bool:
-        """Return whether the robot keeps at least `CLEARANCE_M` from every obstacle at this place."""
+        """Return whether the robot keeps at least `CLEARANCE_M` from every obstacle at this position."""
         return self.layout.gap(x_m, y_m) >= self.radius_m + CLEARANCE_M
 
     def draw(self, random: np.random.Generator) -> Point:
-        """Return x, y in meters of a random free place; all free places are equally likely.
+        """Return x, y in meters of a random free position; all free positions are equally likely.
 
         Raises:
-            ConfigurationError: the floor has none.
+            ConfigurationError: the floor has no free position.
         """
         low, high = self.layout.low, self.layout.high
         for _ in range(MOST_DRAWS):
@@ -64,10 +64,10 @@ class FreePlaces:
         raise self._full()
 
     def draw_from(self, random: np.random.Generator, start: Point) -> Point:
-        """Return a random free place that is `apart_m` from `start`.
+        """Return a random free position at least `apart_m` from `start`.
 
         Raises:
-            ConfigurationError: the floor has none.
+            ConfigurationError: the floor has no such position.
         """
         for _ in range(MOST_DRAWS):
             target = self.draw(random)
@@ -78,10 +78,10 @@ class FreePlaces:
     def draw_task(
         self, random: np.random.Generator, start: Pose | None = None, target: Point | None = None
     ) -> EpisodeTask:
-        """Return a task with free places `apart_m` apart and a random heading; given values are kept.
+        """Return a task with free positions at least `apart_m` apart and a random heading; keep given values.
 
         Raises:
-            ConfigurationError: the floor has no such places.
+            ConfigurationError: the floor has no such positions.
         """
         heading_rad = float(random.uniform(-math.pi, math.pi))
         if start and target:
@@ -97,11 +97,11 @@ class FreePlaces:
         raise self._full()
 
     def chosen_task(self, random: np.random.Generator, chosen: Mapping[str, Any]) -> EpisodeTask:
-        """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
+        """Return a task; `chosen` may set `start` (x, y, heading; or a Pose) and `target` (x, y).
 
         Raises:
-            ConfigurationError: an unknown name, a wrong number of values, a target inside an obstacle, a
-                start at which the robot would touch one, or no free place.
+            ConfigurationError: a name is unknown, the number of values is wrong, the target is in an
+                obstacle, the robot would touch one at the start, or the floor has no free position.
         """
         if unknown := sorted(set(chosen) - {"start", "target", *OF_THE_RUN}):
             raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
@@ -117,7 +117,7 @@ class FreePlaces:
         return self.draw_task(random, start, target)
 
     def _check(self, name: str, x_m: float, y_m: float, radius_m: float) -> None:
-        """Refuse a place without `radius_m` of free floor; the simulator would push the robot away."""
+        """Refuse a position without `radius_m` of free floor; the simulator would push the robot away."""
         if self.layout.gap(x_m, y_m) > radius_m:  # false for NaN too
             return
         fact = "puts the robot in an obstacle" if radius_m else "is in an obstacle"

@@ -1,8 +1,8 @@
-"""What a step is worth: small named terms, and their weights in one place.
+"""The reward of a step: small named terms, and their weights in one place.
 
-A term is a pure function of one transition, with a range of its own; its weight says
-what it is worth. An environment reports every weighted term by name, so that a curve
-in TensorBoard shows which term a policy lives on.
+A term is a pure function of one transition, with its own range, and has a weight. An
+environment reports every weighted term by name, so that a curve in TensorBoard shows
+from which terms a policy gets its reward.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from enum import Enum
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M
 
-MARGIN_M = 0.18  # what should be kept free around the robot: it drives half of it in a step
+MARGIN_M = 0.18  # the space that should stay free around the robot, which drives half of it in a step
 
 
 class EpisodeOutcome(Enum):
-    """How an episode ended, or that it goes on; also with the next of several targets."""
+    """The way in which an episode ended, or that it continues, possibly with the next of several targets."""
 
     RUNNING = "running"
     DELIVERED = "delivered"
@@ -33,13 +33,13 @@ class EpisodeOutcome(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transition:
-    """One step, as far as rewards look at it.
+    """The facts of one step that rewards use.
 
     Attributes:
         before_m: meters to the target before the step.
-        after_m: meters to the target after it.
-        nearest_m: meters to the nearest thing after it, as far as sensors see it.
-        outcome: what the step led to.
+        after_m: meters to the target after the step.
+        nearest_m: meters to the nearest object after the step, as the sensors measure it.
+        outcome: the outcome after the step.
     """
 
     before_m: float
@@ -60,7 +60,7 @@ def progress(step: Transition) -> float:
 
 
 def success(step: Transition) -> float:
-    """Return 1 when the robot came to stand on the target, or on one of several, else 0."""
+    """Return 1 when the robot came to stand on the target, or on the current one of several, else 0."""
     return float(step.outcome in (EpisodeOutcome.REACHED, EpisodeOutcome.DELIVERED))
 
 
@@ -70,7 +70,7 @@ def collision(step: Transition) -> float:
 
 
 def proximity(step: Transition) -> float:
-    """Return how far the margin around the robot is used up, from 0 to 1 (as near as is measured)."""
+    """Return the used share of the margin around the robot, from 0 to 1 (the nearest measurable distance)."""
     used_m = MARGIN_M - step.nearest_m
     return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
 
@@ -81,7 +81,7 @@ def time_up(step: Transition) -> float:
 
 
 def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form
-    """Return 1 for every step: what waiting costs."""
+    """Return 1 for every step, as the cost of time."""
     return 1.0
 
 

@@ -37,22 +37,23 @@ Info = dict[str, Any]
 class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     """See the red pole and drive to it, to within 0.45 m of its middle.
 
-    A Robotino with a camera of 64 x 48 pixels in a walled floor of 4 x 4 m, and a red pole,
-    0.5 m high, that is seen and never felt. Start, heading and place of the pole differ in
-    every episode, so the pole is often out of sight at the start. The pole counts as reached
-    at 0.45 m, where its top and its foot leave the image. A step is one control period of the
-    robot (0.192 s in simulation): at 0.5 m/s it drives 0.1 m, at 1 rad/s it turns 11 degrees.
+    A Robotino with a camera of 64 x 48 pixels drives on a walled floor of 4 x 4 m with a red
+    pole, 0.5 m high, that is visible but cannot be touched. Start, heading and position of the
+    pole differ in every episode, so the pole is often out of sight at the start. The pole
+    counts as reached at 0.45 m, where its top and its foot leave the image. A step is one
+    control period of the robot (0.192 s in simulation): at 0.5 m/s it drives 0.1 m, at 1 rad/s
+    it turns 11 degrees.
 
     ## Actions
 
-    As in `MoveToTargetEnv`: with `actions="discrete"` one of the `movements`, all seven by
+    They are as in `MoveToTargetEnv`: with `actions="discrete"` one of the `movements`, all seven by
     default; with `actions="continuous"` forward, left and turning, `Box(-1, 1, (3,), float32)`.
     Three movements are enough: FORWARD, TURN_LEFT and TURN_RIGHT.
 
     ## Observation
 
-    `Box(uint8)`, the image of the camera, and nothing else. With `frames=3` it has the newest
-    three images, the oldest first; the first observation of an episode has one image three times.
+    `Box(uint8)`: only the image of the camera. With `frames=3` it has the newest three images,
+    the oldest first; the first observation of an episode has the same image three times.
 
     | axis | frames=1 | frames=3 | min | max | meaning                                   |
     |------|----------|----------|-----|-----|-------------------------------------------|
@@ -62,23 +63,24 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Reward
 
-    The terms and weights of `MoveToTargetEnv`, each also in `info["reward_terms"]`.
+    The terms and weights are those of `MoveToTargetEnv`, each also in `info["reward_terms"]`.
 
     | term      | Dense | Sparse | min  | max | is                                                  |
     |-----------|-------|--------|------|-----|-----------------------------------------------------|
     | progress  | 1     |        | -0.1 | 0.1 | meters gained toward the pole, by one movement      |
     | success   | 1     | 1      | 0    | 1   | 1 when the robot came within 0.45 m                 |
     | collision | -1    | -1     | 0    | 1   | 1 when it ran into something                        |
-    | proximity | -0.1  |        | 0    | 1   | grows in a line as things come from 0.18 to 0.03 m  |
-    | time_up   |       | -0.5   | 0    | 1   | 1 when the last step was taken without that         |
+    | proximity | -0.1  |        | 0    | 1   | rises linearly as objects come from 0.18 to 0.03 m  |
+    | time_up   |       | -0.5   | 0    | 1   | 1 when time is up without success or collision      |
     | duration  | -0.01 |        | 1    | 1   | 1 for every step                                    |
 
     ## Start
 
-    `reset(seed=s)` alone decides the episode. Start and pole are drawn uniformly from the
-    places where the robot has 0.1 m to spare, at least 1 m apart, and the heading from all
-    directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
-    With `cylinders=True` the world's four cylinders stand on the floor and hide the pole.
+    Only the seed of `reset(seed=s)` decides the episode. Start and pole are drawn uniformly
+    from the positions where the robot has 0.1 m of free space around it, at least 1 m apart,
+    and the heading from all directions. `options={"start": (x, y, heading), "target": (x, y)}`
+    sets one or both. With `cylinders=True` the world's four cylinders stand on the floor and
+    can hide the pole.
 
     ## End of an episode
 
@@ -97,7 +99,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         on_close: called by `close`.
 
     Raises:
-        MissingCapability: the robot is no Robotino with cameras.
+        MissingCapability: the robot is not a Robotino with cameras.
         NoSuchSensor: the robot is connected and lacks the color camera.
     """
 
@@ -116,7 +118,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         shape = (rows, columns, colors * self.options.frames)
         self.observation_space = gymnasium.spaces.Box(0, 255, shape, np.uint8)
         self.action_space = action_space(self.options)
-        # Two views of one robot: Python has no type for a class with two capabilities.
+        # Both are the same robot, because Python has no type for a class with two capabilities.
         self._robot: RobotinoAbc = robot
         self._eyes: Cameras = robot
         self._scene = scene
@@ -182,7 +184,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
             self._on_close()
 
     def _raise_cylinders(self) -> None:
-        """Put the things that the world stores under its floor on top of it."""
+        """Put the objects that the world stores under its floor on the floor."""
         for thing in self._scene.layout().obstacles:
             if thing.top_m < 0.0:
                 self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))
@@ -195,7 +197,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         return EpisodeOutcome.TIME_UP if self._steps >= self.options.max_steps else EpisodeOutcome.RUNNING
 
     def _image(self) -> Observation:
-        """Return a copy of the camera's image, which is valid until the next step only."""
+        """Return a copy of the camera's image, because the original is valid only until the next step."""
         image = self._eyes.color_image()
         if image.shape != IMAGE:
             raise ConfigurationError(

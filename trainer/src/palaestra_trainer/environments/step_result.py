@@ -16,7 +16,7 @@ def result(step: Transition, options: Episodes, extra_steps: int) -> Result:
 
     Args:
         step: the step.
-        options: of the task.
+        options: options of the task.
         extra_steps: control periods that a late sensor made necessary.
     """
     outcome, terms = step.outcome, reward_terms(options.reward, step)

@@ -1,7 +1,7 @@
-"""The wrappers that a job puts around its environment, and the newest observations as one.
+"""The wrappers that a job puts around its environment, and the stacking of the newest observations.
 
-They are inside the environment of every simulator, so training, evaluations, resumes and programs of users
-have the same ones. The statistics of some wrappers are refused in `checking`.
+They are part of the environment of every simulator, so training, evaluations, resumes and programs of users
+have the same wrappers. `env_checker` refuses wrappers with statistics.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def mistakes(wanted: Environment) -> Iterator[str]:
 
 
 def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[Any, Any]:
-    """Return the environment in the wrappers of a job, the first one innermost, and stacked last.
+    """Return the environment in the wrappers of a job, the first one innermost; stack observations last.
 
     Raises:
         ConfigurationError: a wrapper cannot be created, or the observations cannot be stacked.
@@ -61,12 +61,12 @@ def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[
 class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
     """The newest observations of an episode as one, in the layout of Stable-Baselines3's VecFrameStack.
 
-    The oldest comes first, along the channels of an image and else along the last axis. At the beginning of
-    an episode, zeros stand for the observations before it.
+    The oldest comes first: along the channels of an image, or along the last axis of other observations. At
+    the beginning of an episode, zeros replace the observations before it.
 
     Args:
         env: the environment; its observation is a Box.
-        frames: how many observations.
+        frames: number of observations.
 
     Raises:
         ConfigurationError: the observation is not a Box with an axis.
@@ -98,7 +98,7 @@ class StackedFrames(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._with(observation), *others
 
     def _with(self, observation: Any) -> np.ndarray:
-        """Return a new array, since an environment may return the same one at every step."""
+        """Return a new array, because an environment may return the same one at every step."""
         older = np.moveaxis(self._stacked, self._axis, 0)[self._width :]
         newest = np.moveaxis(np.asarray(observation, self._stacked.dtype), self._axis, 0)
         self._stacked = np.moveaxis(np.concatenate((older, newest)), 0, self._axis)

@@ -1,1 +1,1 @@
-"""Plays episodes on a run's simulators, to collect rows that the policy learns from, or to evaluate it."""
+"""Play episodes on a run's simulators, to collect rows for learning or to evaluate the policy."""

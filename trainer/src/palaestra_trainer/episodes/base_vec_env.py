@@ -1,4 +1,4 @@
-"""The part of a Stable-Baselines3 VecEnv that every vector of members has: access to their environments."""
+"""The base of all Stable-Baselines3 VecEnvs of members: access to their environments."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from palaestra_trainer.simulators.restarter import Restarter
 
 
 class MembersVecEnv(VecEnv):
-    """A VecEnv of members; how they step is up to the subclass.
+    """A VecEnv of members; a subclass defines how they step.
 
     Args:
-        keepers: one for each member; rows are in their order.
+        restarters: the restarter of each member; rows are in their order.
     """
 
-    def __init__(self, keepers: Sequence[Restarter]) -> None:
-        self._keepers = list(keepers)
-        env = keepers[0].member.env
-        super().__init__(len(keepers), env.observation_space, env.action_space)
+    def __init__(self, restarters: Sequence[Restarter]) -> None:
+        self._restarters = list(restarters)
+        env = restarters[0].member.env
+        super().__init__(len(restarters), env.observation_space, env.action_space)
         self._actions = np.empty(0)
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -35,22 +35,22 @@ class MembersVecEnv(VecEnv):
         self._actions = actions
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments, also one behind wrappers."""
+        """Return an attribute of the chosen environments, even if an inner wrapper defines it."""
         return [env.get_wrapper_attr(attr_name) for env in self._targets(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the chosen environments, in the wrapper that defines it or behind all of them.
+        """Set an attribute on the wrapper that defines it, else on the environment itself.
 
-        Stable-Baselines3's own vectors set it in the outermost wrapper, where no environment sees it. A
-        restarted simulator keeps it, and a standby gets it.
+        Stable-Baselines3's own vectors set it on the outermost wrapper, where the environment cannot read it.
+        A restarted simulator keeps it, and a standby gets it.
         """
         for index in self._get_indices(indices):
-            self._keepers[index].set_attribute(attr_name, value)
+            self._restarters[index].set_attribute(attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Return what a method of the chosen environments returns."""
+        """Return the result of a method of each chosen environment."""
         return [
             env.get_wrapper_attr(method_name)(*method_args, **method_kwargs) for env in self._targets(indices)
         ]
@@ -62,14 +62,14 @@ class MembersVecEnv(VecEnv):
         return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return an image of each environment; None of all, and a warning, if they do not draw arrays."""
+        """Return an image of each environment; warn and return None for each if they render no arrays."""
         if self.render_mode != "rgb_array":
             warnings.warn(f"render_mode: is {self.render_mode}; only rgb_array gives images", stacklevel=2)
             return [None] * self.num_envs
         return [cast("np.ndarray | None", env.render()) for env in self._targets(None)]
 
     def _targets(self, indices: VecEnvIndices) -> list[Environment]:
-        return [self._keepers[index].member.env for index in self._get_indices(indices)]
+        return [self._restarters[index].member.env for index in self._get_indices(indices)]
 
     def _stack(self, observations: list[Any]) -> VecEnvObs:
         if isinstance(self.observation_space, spaces.Dict):

@@ -1,13 +1,13 @@
-"""One row of a vector step: a member that plays episode after episode.
+"""One member that plays episode after episode, and its row in each vector step.
 
-Translates gymnasium's step into the row that Stable-Baselines3 expects: reset in the same step,
+It converts gymnasium's step into the row that Stable-Baselines3 expects: reset in the same step,
 `terminal_observation`, `TimeLimit.truncated`, Monitor's `episode`.
 
-Translates a fault into invalid rows (`valid` is False), so that the others need not wait for the broken
-member. The row of the fault ends the episode (done, truncated, `sim_fault`). In the rows after it
-`recovering` is True. The last of them has `done=True` and the first observation of the next episode. After a
-member was given up, `recovering` is False, and no last row follows. `palaestra_trainer.infos` says where
-these words are.
+It converts a fault into invalid rows (`valid` is False), so that the other members need not wait for the
+broken one. The row of the fault ends the episode (done, truncated, `sim_fault`). In the rows after it
+`recovering` is True. The last recovering row has `done=True` and the first observation of the next episode.
+After a member was given up, `recovering` is False, and no last row follows. `palaestra_trainer.infos`
+describes these keys.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ log = structlog.get_logger(__name__)
 
 
 class CollectedRow(NamedTuple):
-    """What one member contributes to a vector step.
+    """The row of one member in a vector step.
 
     Attributes:
-        observation: the next one; the first of the next episode where `done`, if it has begun.
-        reward: of this step; 0 in an invalid row.
-        done: an episode ended, by its own end, by a time limit, or by a fault; or, in an invalid row,
-            another begins.
-        info: what the environment reported, and the words named in this module's docstring.
+        observation: the next observation; if `done`, the first of the next episode if that has begun.
+        reward: reward of this step; 0 in an invalid row.
+        done: whether an episode ended: terminated, truncated by a time limit, or truncated by a fault. In a
+            recovering row: whether the next episode has begun.
+        info: the environment's info, with the keys in this module's docstring.
     """
 
     observation: Any
@@ -52,19 +52,19 @@ class CollectedRow(NamedTuple):
 
 
 class Collector:
-    """Plays the episodes of one member, each with the seed that its number gives it.
+    """Plays the episodes of one member; the seed of each follows from its number.
 
     Attributes:
-        keeper: looks after the member.
+        restarter: the restarter of the member.
         run_seed: the replica's seed.
         index: the member's position among the collecting ones.
         episode: number of the next episode.
-        training_progress: share of training, 0 to 1, that the next episode begins with.
-        reset_info: what the environment reported at the last reset; not `valid` if no episode began.
+        training_progress: share of training, 0 to 1, that is complete when the next episode begins.
+        reset_info: the environment's info of the last reset; not `valid` if no episode began.
     """
 
-    def __init__(self, keeper: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
-        self.keeper = keeper
+    def __init__(self, restarter: Restarter, run_seed: int, index: int, check: Check = go_on) -> None:
+        self.restarter = restarter
         self.run_seed = run_seed
         self.index = index
         self.episode = 0
@@ -72,7 +72,7 @@ class Collector:
         self.reset_info: dict[str, Any] = {}
         self._check = check
         self._started = time.monotonic()
-        # Shown before anything has been seen, if the member has yet to come up.
+        # This observation is returned before the first reset, if the member is not up yet.
         self._observation: Any = blank(self.env.observation_space)
         self._return, self._length = 0.0, 0
         self._actions: ActionLog | None = None
@@ -83,11 +83,11 @@ class Collector:
     @property
     def env(self) -> Environment:
         """The member's environment."""
-        return self.keeper.member.env
+        return self.restarter.member.env
 
     @property
     def state(self) -> EpisodeState:
-        """How far the member is now."""
+        """The current state of the member's episode."""
         if self._actions is None:
             return EpisodeState(self.episode, None)
         return EpisodeState(self.episode - 1, self._actions.taken(), self._began_at)
@@ -97,7 +97,7 @@ class Collector:
         return episode_seed(self.run_seed, COLLECT, self.index, self.episode)
 
     def begin(self, options: dict[str, Any] | None = None) -> Any:
-        """Return the first observation of the next episode; the last one seen while the member is mended.
+        """Return the first observation of the next episode; while the member restarts, the last observation.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -105,7 +105,7 @@ class Collector:
         self._actions = self._found_broken = None
         self.reset_info = {OURS: {"valid": False}}
         self._return, self._length = 0.0, 0
-        if self.keeper.up():
+        if self.restarter.up():
             try:
                 self._reset(options)
             except SimulatorFault as fault:
@@ -113,22 +113,23 @@ class Collector:
         return self._observation
 
     def action_mask(self) -> np.ndarray:
-        """Return which actions the next step may take; all while the member is mended: it takes none then.
+        """Return a mask of the actions that are allowed in the next step.
 
-        A fault meanwhile is that of the next step.
+        While the member restarts, all are allowed, because no action is taken. If the request for the mask
+        fails, the next step reports the fault.
         """
         if self._actions is not None and self._found_broken is None:
             try:
-                return self.keeper.action_mask()
+                return self.restarter.action_mask()
             except SimulatorFault as fault:
                 self._found_broken = fault
         return all_allowed(self.env.action_space)
 
     def resume(self, state: EpisodeState, *, masked: bool = False) -> Any:
-        """Return the observation after the actions of `state`, taken again; nothing of it is counted.
+        """Take the actions of `state` again and return the observation after them; nothing is counted.
 
-        A member that breaks meanwhile begins the next episode instead. So does one whose episode ends earlier
-        than it did or, if `masked`, whose mask forbids such an action: its environment does not repeat.
+        If the member breaks meanwhile, it begins the next episode instead. It also does so if its environment
+        does not repeat: the episode ends earlier than before or, if `masked`, the mask forbids an action.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -140,7 +141,7 @@ class Collector:
         for action in () if state.actions is None or self._actions is None else state.actions:
             self._check()
             try:
-                if masked and not allows(self.keeper.action_mask(), self.env.action_space, action):
+                if masked and not allows(self.restarter.action_mask(), self.env.action_space, action):
                     return self.begin()
                 _, _, terminated, truncated, _ = self._advance(action)
             except SimulatorFault as fault:
@@ -153,8 +154,8 @@ class Collector:
     def step(self, action: Any) -> CollectedRow:
         """Return the row of one step.
 
-        A fault ends the episode; the member is mended in the background, and until it is up again every
-        step has an invalid row.
+        A fault ends the episode. The member is restarted in the background, and every row is invalid until it
+        is up again.
 
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
@@ -179,7 +180,7 @@ class Collector:
         self._began_at = self.training_progress
         self.episode += 1
         try:
-            self._observation, self.reset_info = self.keeper.reset(
+            self._observation, self.reset_info = self.restarter.reset(
                 seed, position | (options or {}), self._check
             )
         except Diverged as error:
@@ -191,7 +192,7 @@ class Collector:
         if self._found_broken is not None:
             raise self._found_broken
         try:
-            step = self.keeper.step(action)
+            step = self.restarter.step(action)
         except Diverged as error:
             raise Diverged(f"episode {self.episode - 1}, step {self._length + 1}: {error}") from error
         self._observation = step[0]
@@ -206,7 +207,7 @@ class Collector:
         for word in said[OURS].get(HIDDEN, {}).keys() - self._hidden:
             self._hidden.add(word)
             log.warning(
-                "word of the environment moved: it has a meaning of its own",
+                "info key of the environment moved: Stable-Baselines3 or Palaestra uses it",
                 word=word,
                 now=f'info["{OURS}"]["{HIDDEN}"]["{word}"]',
             )
@@ -216,23 +217,23 @@ class Collector:
         self._news = {
             "sim_fault": {
                 "kind": fault.kind,
-                "simulator": self.keeper.name,
+                "simulator": self.restarter.name,
                 "fact": str(fault),
                 "episode": self.episode - 1,
                 "step": self._length,
             }
         }
         self._actions = self._found_broken = None
-        self.keeper.begin_mending(fault, self._length)
+        self.restarter.begin_mending(fault, self._length)
 
     def _recover(self) -> CollectedRow:
-        """Return the row of a step that no episode is under way for."""
+        """Return the row of a step without a running episode."""
         seen = self._observation
         self.begin()
-        return self._invalid(seen, done=self._actions is not None, recovering=not self.keeper.lost)
+        return self._invalid(seen, done=self._actions is not None, recovering=not self.restarter.lost)
 
     def _invalid(self, seen: Any, *, done: bool, **words: Any) -> CollectedRow:
-        """Return a row that nothing is learned from; the first one after a fault has its `sim_fault`."""
+        """Return a row that must not be learned from; the first one after a fault has its `sim_fault`."""
         words = {"valid": False} | words | self._news
         self._news = {}
         info = {OURS: words, TRUNCATED: done, "terminal_observation": copied(seen)}
@@ -244,6 +245,6 @@ class Collector:
 
 
 def blank(space: spaces.Space[Any]) -> Any:
-    """Return an observation of nothing but zeros."""
+    """Return an observation of zeros."""
     one: Any = create_empty_array(space, n=1)
     return {name: part[0] for name, part in one.items()} if isinstance(space, spaces.Dict) else one[0]

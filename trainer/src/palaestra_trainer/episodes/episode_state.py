@@ -1,4 +1,4 @@
-"""The state of an episode as what reproduces it: its number, and the actions taken in it."""
+"""The state of an episode, as its number and the actions taken in it; these reproduce the episode."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeState:
-    """The position of a member in its episodes, from which the environment can be brought back there.
+    """The position of a member in its episodes; the environment can be brought back to it.
 
     Attributes:
         episode: number of the current episode, or of the next one to begin.
@@ -25,7 +25,7 @@ class EpisodeState:
 
 
 class ActionLog:
-    """The actions of one episode; reading them is cheap at any time."""
+    """The actions of one episode; reading them is always cheap."""
 
     def __init__(self) -> None:
         self._rows = np.empty((0,))

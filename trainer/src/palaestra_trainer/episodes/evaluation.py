@@ -1,6 +1,6 @@
 """Evaluate a policy: play whole episodes with given seeds and return their results.
 
-If a fault cuts an episode, a free simulator plays it again with the same seed.
+If a fault truncates an episode, a free simulator plays it again with the same seed.
 So an evaluation always has all of its episodes, and two policies are compared
 on the same ones.
 """
@@ -30,7 +30,7 @@ from palaestra_trainer.waiting.signals import Check, go_on
 
 
 class ActingPolicy(Protocol):
-    """Anything that chooses an action for an observation; every Stable-Baselines3 model does."""
+    """An object that chooses an action for an observation, such as every Stable-Baselines3 model."""
 
     def predict(
         self,
@@ -52,7 +52,7 @@ class Episode:
         total_reward: undiscounted sum of its rewards.
         length: number of environment steps.
         success: the last step's `info["is_success"]`; None: the environment did not report it.
-        outcome: the last step's `info["outcome"]`, a word of the environment; None: it did not report one.
+        outcome: the last step's `info["outcome"]`, a text; None: the environment did not report it.
     """
 
     seed: int
@@ -75,7 +75,7 @@ class EvaluationResult:
 
     Attributes:
         episodes: in the order of their seeds.
-        faults: episodes that a fault cut and that were played again.
+        faults: number of episodes that a fault truncated and that were played again.
         seconds: wall time of the whole evaluation.
     """
 
@@ -95,7 +95,10 @@ class EvaluationResult:
         return wilson(sum(map(bool, successes)), len(successes)) if successes else None
 
     def _successes(self) -> list[bool | None]:
-        """Return the success of each episode; an environment may report success and never failure."""
+        """Return the success of each episode, or [] if no episode reported it.
+
+        An environment may report success and never failure, so None then counts as failure.
+        """
         successes = [episode.success for episode in self.episodes]
         return [] if all(success is None for success in successes) else successes
 
@@ -138,32 +141,35 @@ class EvaluationResult:
 def evaluate(
     policy: ActingPolicy, member: Member | Restarter, seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Return the evaluation of `policy`, deterministic, in one episode for each of `seeds`.
+    """Evaluate `policy`, with deterministic actions, in one episode for each of `seeds`.
 
     Args:
         policy: chooses the actions.
-        member: the simulator for the episodes, or the keeper of one.
-        seeds: at least one; an episode that a fault cut is played again with its seed.
-        check: called before each step and during waits for a simulator; raises to cancel the evaluation.
+        member: the simulator for the episodes, or its restarter.
+        seeds: at least one; an episode that a fault truncated is played again with its seed.
+        check: called before each step and during waits for a simulator; it raises to cancel the evaluation.
 
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
     """
-    keeper = member if isinstance(member, Restarter) else Restarter(member)
-    return evaluate_on_all(policy, [keeper], seeds, check)
+    restarter = member if isinstance(member, Restarter) else Restarter(member)
+    return evaluate_on_all(policy, [restarter], seeds, check)
 
 
 def evaluate_on_all(
-    policy: ActingPolicy, keepers: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
+    policy: ActingPolicy, restarters: Sequence[Restarter], seeds: Iterable[int], check: Check = go_on
 ) -> EvaluationResult:
-    """Return the same as `evaluate`, with the episodes distributed over several simulators at once.
+    """Evaluate as `evaluate` does, with the episodes distributed over several simulators at once.
 
-    If a simulator breaks, another one plays its episode, during the repair and if the simulator is given up.
+    If a simulator breaks, another one plays its episode. The broken one is restarted or given up meanwhile.
     """
     started = time.monotonic()
     games = _Games(policy, seeds)
     while games.missing:
-        left = sorted((keeper for keeper in keepers if not keeper.lost), key=lambda keeper: keeper.busy)
+        left = sorted(
+            (restarter for restarter in restarters if not restarter.lost),
+            key=lambda restarter: restarter.busy,
+        )
         if not left:
             raise FaultBudgetSpent("every evaluating simulator was given up; read the simulators' logs")
         if len(left) == 1:
@@ -180,11 +186,11 @@ def evaluate_on_all(
 class _Games:
     """The episodes of one evaluation: those still to play, and those that are complete.
 
-    One thread plays an episode at a time and puts it back if a fault cuts it. So an idle thread stays until
-    the last episode is complete, because it may have to play that one again.
+    Each thread plays one episode at a time and puts it back if a fault truncates it. So an idle thread stays
+    until the last episode is complete, because it may have to play that one again.
 
     Attributes:
-        faults: number of episodes that were cut.
+        faults: number of episodes that a fault truncated.
     """
 
     def __init__(self, policy: ActingPolicy, seeds: Iterable[int]) -> None:
@@ -204,16 +210,16 @@ class _Games:
         """Return the episodes in the order of their seeds."""
         return tuple(self._played[place] for place in sorted(self._played))
 
-    def play_on(self, keeper: Restarter, check: Check) -> None:
+    def play_on(self, restarter: Restarter, check: Check) -> None:
         """Play until all episodes are complete, or the simulator is given up."""
-        while self.missing and not keeper.lost:
+        while self.missing and not restarter.lost:
             check()
-            if work := keeper.under_way:
+            if work := restarter.under_way:
                 wait([work], LOOK_EVERY_S)
-            elif keeper.up():
-                self._play_next(keeper, check)
+            elif restarter.up():
+                self._play_next(restarter, check)
 
-    def _play_next(self, keeper: Restarter, check: Check) -> None:
+    def _play_next(self, restarter: Restarter, check: Check) -> None:
         with self._changed:
             if not self._waiting:
                 self._changed.wait(LOOK_EVERY_S)
@@ -221,9 +227,9 @@ class _Games:
             place, seed = self._waiting.popleft()
         rewards: list[float] = []
         try:
-            episode = _play(self._policy, keeper, (place, seed), check, rewards)
+            episode = _play(self._policy, restarter, (place, seed), check, rewards)
         except SimulatorFault as fault:
-            keeper.begin_mending(fault, len(rewards))
+            restarter.begin_mending(fault, len(rewards))
             with self._changed:
                 self.faults += 1
                 self._waiting.appendleft((place, seed))
@@ -234,15 +240,15 @@ class _Games:
                 self._changed.notify_all()
 
 
-def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> None:
+def _play_at_once(games: _Games, restarters: Sequence[Restarter], check: Check) -> None:
     over = threading.Event()
 
     def check_all() -> None:
         if over.is_set():
             raise CancelledError
 
-    with ThreadPoolExecutor(len(keepers), "evaluate") as pool:
-        playing = [pool.submit(games.play_on, keeper, check_all) for keeper in keepers]
+    with ThreadPoolExecutor(len(restarters), "evaluate") as pool:
+        playing = [pool.submit(games.play_on, restarter, check_all) for restarter in restarters]
         try:
             while playing:
                 done, left = wait(playing, LOOK_EVERY_S, FIRST_EXCEPTION)
@@ -255,14 +261,14 @@ def _play_at_once(games: _Games, keepers: Sequence[Restarter], check: Check) -> 
 
 
 def _play(
-    policy: ActingPolicy, keeper: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
+    policy: ActingPolicy, restarter: Restarter, game: tuple[int, int], check: Check, rewards: list[float]
 ) -> Episode:
-    """Play an episode, number and seed, to its end.
+    """Play one episode to its end; `game` is its number and seed.
 
-    If an error cuts it, `rewards` holds the reward of each step until then.
+    If an error ends it, `rewards` holds the reward of each step before the error.
     """
     number, seed = game
-    observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)
+    observation, _ = restarter.reset(seed, reset_options(EVALUATING, number), check)
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
     over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
@@ -271,11 +277,11 @@ def _play(
         end.not_after(len(rewards))
         seen = (observation, memory, np.array([not rewards]))
         if masked:
-            action, memory = predict_allowed(policy, keeper.action_mask(), *seen)
+            action, memory = predict_allowed(policy, restarter.action_mask(), *seen)
         else:
             action, memory = policy.predict(*seen, deterministic=True)
-        observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
-        keeper.watcher.stepped(1)
+        observation, reward, terminated, truncated, info = restarter.step(np.asarray(action)[()])
+        restarter.watcher.stepped(1)
         rewards.append(float(reward))
         over = terminated or truncated
     return Episode(

@@ -1,10 +1,10 @@
 """Many simulators as one Stable-Baselines3 VecEnv that tolerates faults.
 
 All members step at the same time, in turns of the caller's thread: each sends
-its simulator the step before the first answer is awaited. A broken member is
-restarted in the background. Its rows are invalid until it is up again, see
-`palaestra_trainer.episodes.collector`, and the other members continue. Only
-if no member can step does the thread wait for one.
+the step to its simulator before the thread waits for the first response. A
+broken member is restarted in the background. Its rows are invalid until it is
+up again, see `palaestra_trainer.episodes.collector`, and the other members
+continue. The thread waits for a restart only if no member can step.
 """
 
 from __future__ import annotations
@@ -39,37 +39,39 @@ class SimulatorsVecEnv(MembersVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:
-        keepers: one for each member; rows are in their order.
+        restarters: the restarter of each member; rows are in their order.
         run_seed: the replica's seed; each episode's seed is derived from it.
-        check: called every tenth of a second during waits for members; raises to stop the wait.
-        judge: an environment without a simulator that computes rewards of goals; None: members do it.
+        check: called every tenth of a second during waits for members; it raises to end the wait.
+        judge: an environment without a simulator that computes rewards of goals; None: members compute them.
     """
 
     def __init__(
         self,
-        keepers: Sequence[Restarter],
+        restarters: Sequence[Restarter],
         run_seed: int,
         *,
         check: Check = go_on,
         judge: Environment | None = None,
     ) -> None:
-        super().__init__(keepers)
+        super().__init__(restarters)
         self._check = check
         self._judge = judge
-        self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
-        self._watcher = keepers[0].watcher
+        self._collectors = [
+            Collector(restarter, run_seed, index, check) for index, restarter in enumerate(restarters)
+        ]
+        self._watcher = restarters[0].watcher
         self._seeds = [None] * self.num_envs
-        self._gives_masks = all(gives_masks(keeper.member.env) for keeper in keepers)
+        self._gives_masks = all(gives_masks(restarter.member.env) for restarter in restarters)
 
     def pause(self) -> None:
-        """Pause all members until `run`."""
-        for keeper in self._keepers:
-            keeper.pause()
+        """Pause all members until `unpause`."""
+        for restarter in self._restarters:
+            restarter.pause()
 
     def unpause(self) -> None:
         """End the pause of all members."""
-        for keeper in self._keepers:
-            keeper.unpause()
+        for restarter in self._restarters:
+            restarter.unpause()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Set the run's seed, if one is given; return the seeds of the next episodes."""
@@ -89,19 +91,19 @@ class SimulatorsVecEnv(MembersVecEnv):
         return self._stack(observations)
 
     def set_training_progress(self, training_progress: float) -> None:
-        """Set the share of training, 0 to 1, with which the next episodes begin."""
+        """Set the share of training, 0 to 1, that is complete when the next episodes begin."""
         for collector in self._collectors:
             collector.training_progress = training_progress
 
     def snapshot(self) -> list[EpisodeState]:
-        """Return the position of each member in its episodes; cheap, and not changed by later steps."""
+        """Return the position of each member in its episodes; cheap. Later steps do not change the result."""
         return [collector.state for collector in self._collectors]
 
     def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
         """Bring all members back to their states, at once; return their observations.
 
-        The steps for it are not counted; returns and lengths of the episodes continue as they were. If
-        `masked`, no member takes an action that its mask forbids now.
+        The steps for it are not counted; returns and lengths of the episodes continue from their old values.
+        If `masked`, no member takes an action that its mask forbids now.
         """
         observations = take_turns(
             partial(collector.resume, state, masked=masked)
@@ -140,18 +142,18 @@ class SimulatorsVecEnv(MembersVecEnv):
 
         An environment that raises an error is logged, and the others are closed too.
         """
-        settle(self._keepers)
-        for keeper in self._keepers:
-            if not keeper.busy:
-                _close(keeper)
+        settle(self._restarters)
+        for restarter in self._restarters:
+            if not restarter.busy:
+                _close(restarter)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Return what a method of the chosen environments returns.
+        """Return the result of a method of each chosen environment.
 
-        `compute_reward` is called on the judge, because members may be restarting, with copies: the goals
-        are learned from afterwards. `action_masks` is called on no member that is being mended or lost.
+        `compute_reward` is called on the judge, because members may be restarting. It gets copies, because
+        the goals are learned from later. `action_masks` is not called on a member that restarts or is lost.
         """
         if method_name == ACTION_MASKS and self._gives_masks:
             return self._action_masks(indices)
@@ -160,7 +162,7 @@ class SimulatorsVecEnv(MembersVecEnv):
         return [self._judge.get_wrapper_attr(method_name)(*copied(method_args), **copied(method_kwargs))]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments; of `action_masks`, what `env_method` calls."""
+        """Return an attribute of the chosen environments; for `action_masks`, the method of the collector."""
         if attr_name == ACTION_MASKS and self._gives_masks:
             return [self._collectors[index].action_mask for index in self._get_indices(indices)]
         return super().get_attr(attr_name, indices)
@@ -170,17 +172,17 @@ class SimulatorsVecEnv(MembersVecEnv):
             return take_turns(self._collectors[index].action_mask for index in self._get_indices(indices))
 
     def _await_somebody(self) -> None:
-        """Return when a member can step or has become ready; a vector of only invalid rows is useless."""
-        if all(keeper.busy or keeper.lost for keeper in self._keepers):
+        """If no member can step, wait for the end of a restart; a vector of only invalid rows is useless."""
+        if all(restarter.busy or restarter.lost for restarter in self._restarters):
             with self._watcher.spending(Cause.RECOVERING):
-                await_one(self._keepers, self._check)
+                await_one(self._restarters, self._check)
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]
 
 
-def _close(keeper: Restarter) -> None:
+def _close(restarter: Restarter) -> None:
     try:
-        keeper.member.env.close()
+        restarter.member.env.close()
     except (Exception, SystemExit) as error:  # code of the job's author may raise anything
-        log.warning("environment not closed", simulator=keeper.name, fact=fact_of(error), exc_info=error)
+        log.warning("environment not closed", simulator=restarter.name, fact=fact_of(error), exc_info=error)

@@ -17,7 +17,7 @@ def wilson(successes: int, episodes: int) -> SuccessInterval:
     succeed. Source: Wilson (1927), Journal of the American Statistical Association 22.
 
     Raises:
-        ValueError: there are no episodes, or more successes than episodes.
+        ValueError: `episodes` is 0, or `successes` is not within 0 and `episodes`.
     """
     if not 0 <= successes <= episodes or episodes == 0:
         raise ValueError(f"{successes} of {episodes} episodes: not a share")

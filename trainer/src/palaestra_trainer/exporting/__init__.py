@@ -1,7 +1,7 @@
 """A trained policy as one file, for programs without Palaestra, Stable-Baselines3 or PyTorch.
 
-The file takes observations as the environment returned them, and returns actions that the environment takes.
-It is compared with the policy before it is written, and never written if it acts differently.
+The file takes observations as the environment returns them, and returns actions that the environment accepts.
+It is compared with the policy before it is written. It is not written if it acts differently.
 """
 
 from palaestra_trainer.exporting.exporter import FORMATS, Exported, export

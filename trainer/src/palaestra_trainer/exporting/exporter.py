@@ -20,14 +20,14 @@ FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_f
 
 
 class Format(Protocol):
-    """A module of this package that knows one format."""
+    """The interface of a module of this package that writes one format."""
 
     def content(self, acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
         """Return the bytes of a file."""
         ...
 
     def runner(self, file: bytes, acting: PolicyModule) -> Run:
-        """Return a function that acts as the file says."""
+        """Return a function that runs the policy in the file."""
         ...
 
 
@@ -37,8 +37,9 @@ class Exported:
 
     Attributes:
         path: the file.
-        observations: on which it was compared with the policy.
-        largest_difference: of an action's number there; of a continuous one as a share of its range.
+        observations: number of observations on which the file was compared with the policy.
+        largest_difference: of a number of an action in that comparison; a continuous one as a share of its
+            range.
     """
 
     path: Path
@@ -50,9 +51,9 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     """Write the best policy of a run directory in the format `to`; by default to `policy.<to>` in it.
 
     Raises:
-        ConfigurationError: there is no model, or a library of the extra `export` is missing.
+        ConfigurationError: the model is missing, or a library of the extra `export` is.
         ExportError: the file would act differently; nothing was written.
-        OSError: it could not be written.
+        OSError: the file could not be written.
     """
     known = _format(to)
     directory = RunDirectory(run)

@@ -1,7 +1,7 @@
-"""The data sheet in an exported file: its inputs, its actions, and the run that it is from.
+"""The data sheet in an exported file: its inputs, its actions, and the run that trained it.
 
-Meanings and units are the tables of the environment's docstring, below the headings of actions and
-observations. An environment whose docstring has none still has its spaces on the sheet.
+Meanings and units are copied from the tables in the environment's docstring, under the headings for actions
+and observations. If the docstring has no tables, the sheet has only the spaces.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
 from palaestra_trainer.run.summary import measured
 from palaestra_trainer.run_directory import RunDirectory
 
-KEY = "palaestra"  # of the sheet in a file's metadata
-MOST_BOUNDS = 1_000  # numbers of a space whose bounds are listed one by one
+KEY = "palaestra"  # the key of the sheet in a file's metadata
+MOST_BOUNDS = 1_000  # for a space with more numbers, bounds are not listed one by one
 
 Table = list[dict[str, str]]
 
@@ -81,7 +81,7 @@ def describe(space: spaces.Space[Any]) -> dict[str, Any]:
 
 
 def _bounds(values: np.ndarray) -> Any:
-    """Return one number if all are equal, else each; infinite ones as text, since JSON has none."""
+    """Return one number if all are equal, else each; infinite ones as text, because JSON has no infinity."""
     if values.size and (values == values.flat[0]).all():
         return _number(values.flat[0])
     if values.size > MOST_BOUNDS:
@@ -97,7 +97,7 @@ def _number(value: Any) -> float | str:
 def _tables(environment: Environment) -> dict[str, list[Table]]:
     """Return the tables of an environment's docstring about observations and actions.
 
-    Wrappers may change both, so with them there are none.
+    Wrappers may change both, so an environment with wrappers gets no tables.
     """
     found: dict[str, list[Table]] = {"observation": [], "action": []}
     if environment.wrappers or environment.frame_stack:
@@ -110,7 +110,7 @@ def _tables(environment: Environment) -> dict[str, list[Table]]:
 
 
 def _docstring(name: str) -> str:
-    """Return the docstring of the environment's class, if its module can be imported here."""
+    """Return the docstring of the environment's class; "" if its module cannot be imported here."""
     with suppress(ConfigurationError):
         creator: Any = creator_of(name)
         if not inspect.isclass(creator):
@@ -130,7 +130,7 @@ def _chapters(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _read(text: str) -> Iterator[Table]:
-    """Yield the tables of a text: a dictionary for each row."""
+    """Yield the tables of a text; a table has a dictionary for each row."""
     lines = [line.strip() for line in text.splitlines()]
     for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
         if is_table:

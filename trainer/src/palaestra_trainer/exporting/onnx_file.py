@@ -1,4 +1,4 @@
-"""A policy as an ONNX file, which any runtime of ONNX runs by itself."""
+"""A policy as an ONNX file, which any ONNX runtime can run without other code."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from palaestra_trainer.exporting.policy_module import STATE, PolicyModule
 from palaestra_trainer.exporting.sample_observations import drawn, drawn_masks
 from palaestra_trainer.exporting.verify import Arrays, Run
 
-OPSET = 17  # of ONNX 1.12, of 2022
-# Types that PyTorch's exporter does not take, and a larger one that it takes.
+OPSET = 17  # of ONNX 1.12, released in 2022
+# PyTorch's exporter does not accept these types; each has a larger type that it accepts.
 _UNTAKEN = {"uint16": "int32", "uint32": "int64", "uint64": "int64"}
-_BATCH = 3  # not 1, which the exporter could take for a constant
+_BATCH = 3  # larger than 1, because the exporter could treat 1 as a constant
 
 
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
-    """Return the file with the data sheet in its metadata; any number of observations is one batch.
+    """Return the file with the data sheet in its metadata; its batches may have any size.
 
-    PyTorch leaves inputs out that do not reach an output. The sheet names them as `unused`.
+    PyTorch omits inputs that do not affect an output. The sheet names them as `unused`.
 
     Raises:
         ExportError: PyTorch's exporter cannot convert the policy.
@@ -64,7 +64,8 @@ def _converted(acting: PolicyModule) -> onnx.ModelProto:
     axes |= {prefix + name: {1: "batch"} for name in STATE for prefix in ("", "next_")}
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         written = Path(folder) / "policy.onnx"
-        # The exporter warns of Python values in policies that it takes for constants. The comparison decides.
+        # The exporter warns about Python values that it treats as constants. The comparison with the policy
+        # shows whether they are.
         warnings.simplefilter("ignore")
         torch.onnx.export(
             acting,
@@ -80,7 +81,7 @@ def _converted(acting: PolicyModule) -> onnx.ModelProto:
 
 
 def runner(file: bytes, acting: PolicyModule) -> Run:
-    """Return a function that runs the file; it takes unused inputs too."""
+    """Return a function that runs the file; the function accepts unused inputs too."""
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
     used = {value.name for value in session.get_inputs()}
 

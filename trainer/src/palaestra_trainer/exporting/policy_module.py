@@ -1,9 +1,8 @@
-"""A policy as one PyTorch module, from the environment's observation to an action without chance.
+"""A policy as one PyTorch module, from the environment's observation to a deterministic action.
 
-It does everything that `TrainedPolicy.predict` does around the network: channels of images, normalization,
-and the bounds of actions. A recurrent policy takes its state as inputs and returns the next; zeros begin an
-episode. A policy of MaskablePPO takes masks as a further input, as `palaestra_trainer.environments.masks`
-says.
+Like `TrainedPolicy.predict`, it also handles channels of images, normalization, and the bounds of actions. A
+recurrent policy takes its state as inputs and returns the next state; an episode begins with zeros. A policy
+of MaskablePPO takes masks as a further input; `palaestra_trainer.environments.masks` describes them.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ from palaestra_trainer.errors import ExportError
 from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATION = "observation"
-STATE = ("hidden", "cell")  # of a recurrent policy; shape (layers, observations, units)
+STATE = ("hidden", "cell")  # the state of a recurrent policy; shape (layers, observations, units)
 
 
 class Normalizer(nn.Module):
-    """What `TrainedPolicy.predict` does to a part of an observation, in its precision.
+    """Normalizes a part of an observation as `TrainedPolicy.predict` does, with the same precision.
 
     Args:
-        mean: of each number.
-        variance: of each number.
+        mean: mean of each number.
+        variance: variance of each number.
         clip: largest absolute value of a result.
         epsilon: added to the variance.
     """
@@ -54,17 +53,17 @@ class PolicyModule(nn.Module):
     """The deterministic policy, with its normalizer.
 
     Args:
-        loaded: the policy; it is left in evaluation mode on the CPU.
+        loaded: the policy; it is set to evaluation mode, and stays on the CPU.
 
     Raises:
         ExportError: an observation has the name of the input for masks.
 
     Attributes:
-        spaces: the space of each input, as the environment returns it.
+        spaces: the space of each input, in the layout of the environment.
         action_space: the space of an action.
         choices: the number of choices of each number of an action; empty: the policy takes no masks.
         state_shape: layers and units of the state; None: the policy has no state.
-        normalizers: one for each input, in their order; that of an input that is not normalized does nothing.
+        normalizers: one for each input, in their order; `Identity` for an input that is not normalized.
     """
 
     def __init__(self, loaded: TrainedPolicy) -> None:
@@ -116,24 +115,24 @@ class PolicyModule(nn.Module):
         return (self._bounded(action), *state)
 
     def seen(self, inputs: tuple[torch.Tensor, ...]) -> Any:
-        """Return the observations of a batch as the networks take them."""
+        """Return the observations of a batch in the form that the networks take."""
         parts = zip(self.spaces, self.normalizers, inputs, strict=False)
         seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
         return seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
 
     def memory(self, inputs: tuple[torch.Tensor, ...]) -> tuple[Any, ...]:
-        """Return the state in the inputs, and which episodes begin; empty if the policy has no state."""
+        """Return the state in the inputs, and flags of new episodes; empty if the policy has no state."""
         if self.state_shape is None:
             return ()
         hidden, cell = inputs[len(self.spaces) :]
-        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])  # none begins: its state would be zeros
+        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])  # the flags are 0, as zeros begin an episode
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
         """Return a batch of images with channels first; anything else unchanged."""
         return part.permute(0, 3, 1, 2) if self.spaces[name].shape != self._seen[name].shape else part
 
     def _bounded(self, action: torch.Tensor) -> torch.Tensor:
-        """Return actions as the environment takes them."""
+        """Return actions within the bounds of the environment's space."""
         space = self.action_space
         if not isinstance(space, spaces.Box):
             return action
@@ -145,9 +144,9 @@ class PolicyModule(nn.Module):
 
 
 class Scoring(PolicyModule):
-    """The scores of discrete actions, of which the policy takes the best; for a comparison, never for a file.
+    """The scores of discrete actions; the policy takes the best. Only for a comparison, never for a file.
 
-    Its one output has the name of the action. Masks change no score.
+    Its only output has the name of the action. Masks do not change the scores.
     """
 
     @property
@@ -159,7 +158,7 @@ class Scoring(PolicyModule):
         """Return the scores for a batch.
 
         Raises:
-            AttributeError: the policy has none of the networks and distributions of Stable-Baselines3's.
+            AttributeError: the policy lacks the networks and distributions of Stable-Baselines3's policies.
         """
         observation = self.seen(inputs)
         if hasattr(self.policy, "q_net"):
@@ -173,7 +172,7 @@ class Scoring(PolicyModule):
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
-    """Return the space of each key of a Dict, in its order; any other space is one part."""
+    """Return the space of each key of a Dict, in its order; any other space is a single part."""
     return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
 
 

@@ -1,7 +1,7 @@
 """A policy's tensors as a safetensors file, for a network that a person builds.
 
-The names are those of Stable-Baselines3's policy below `policy.`. The normalizer of the n-th input has its
-statistics below `normalizers.<n>.`; the data sheet says where it clips.
+The names begin with `policy.`, followed by the name in Stable-Baselines3's policy. The statistics of the n-th
+input's normalizer begin with `normalizers.<n>.`; the data sheet has its clip value.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from palaestra_trainer.exporting.verify import Arrays, Run
 
 def content(acting: PolicyModule, sheet: Mapping[str, Any]) -> bytes:
     """Return the file with the data sheet in its metadata."""
-    # Some policies have one network under two names, and the format refuses shared memory.
+    # Some policies have one network under two names, but the format does not allow shared memory.
     tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
     return safetensors.torch.save(tensors, {KEY: json.dumps(sheet)})
 
 
 def runner(file: bytes, acting: PolicyModule) -> Run:
-    """Return a function that runs a copy of the policy, all of whose tensors are the file's."""
+    """Return a function that runs a copy of the policy with all tensors of the file."""
     copy = deepcopy(acting)
     with torch.no_grad():
         for tensor in copy.state_dict().values():

@@ -1,9 +1,9 @@
-"""Observations to compare a file with its policy on: like those of episodes, always the same.
+"""Observations for the comparison of a file with its policy: similar to those of episodes, always the same.
 
-The bounds of a space say little about its episodes: they may be infinite, or the largest number of a type.
-Drawn evenly from there, every number would drive a network to its limits, where all actions are the same.
-So the numbers of a Box have several scales, from a hundredth to as far as the bounds allow. Noise looks the
-same to a network everywhere, so images have areas, of different brightness and contrast.
+The bounds of a space do not show the usual numbers: bounds may be infinite, or the largest number of a type.
+Numbers drawn evenly between them would drive a network to its limits, where all actions are the same. So the
+numbers of a Box have several scales, from a hundredth up to the bounds. A network cannot tell images of noise
+apart, so images have areas of different brightness and contrast.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from stable_baselines3.common.preprocessing import is_image_space
 
 from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
 
-EPISODE = 100  # observations of one scale; after them a recurrent policy begins anew
-_FARTHEST = 1e4  # from the middle of a space, where its bounds allow more
+EPISODE = 100  # number of observations of one scale; then a recurrent policy begins a new episode
+_FARTHEST = 1e4  # greatest distance from the middle of a space, if its bounds allow more
 _NEAREST = 1e-2
-_DEVIATIONS = 5.0  # the same where statistics of observations are known
-_AREAS = 6  # along each side of an image
-_LARGEST_WHOLE = 2.0**62  # float64 has no number for the largest of 64 bits
+_DEVIATIONS = 5.0  # greatest distance in deviations, if statistics of observations are known
+_AREAS = 6  # number of areas along each side of an image
+_LARGEST_WHOLE = 2.0**62  # float64 cannot hold the largest whole number of 64 bits
 
 
 def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
-    """Return observations of each part."""
+    """Return `count` observations of each part."""
     observations = {}
     for number, (name, space) in enumerate(acting.spaces.items()):
         if isinstance(space, spaces.Box) and is_image_space(space):
@@ -39,7 +39,7 @@ def drawn(acting: PolicyModule, count: int) -> dict[str, np.ndarray]:
 
 
 def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
-    """Return masks that allow half of the choices and at least one of each number; shape (count, choices)."""
+    """Return masks that allow about half of the choices, at least one per number; shape (count, choices)."""
     generator = np.random.default_rng(0)
     parts = []
     for choices in acting.choices:
@@ -52,7 +52,7 @@ def drawn_masks(acting: PolicyModule, count: int) -> np.ndarray:
 def magnitudes(acting: PolicyModule, observations: dict[str, np.ndarray]) -> np.ndarray:
     """Return for each observation the largest number that a network gets, at least 1.
 
-    It computes with 24 bits, so the errors of its actions grow with that number.
+    A network computes with 24 bits of precision, so the errors of its actions grow with that number.
     """
     found = np.ones(len(next(iter(observations.values()))))
     for (name, space), normalize in zip(acting.spaces.items(), acting.normalizers, strict=True):
@@ -88,7 +88,7 @@ def _numbers(box: spaces.Box, normalize: Any, count: int, seed: int) -> np.ndarr
 
 
 def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of a Box, and how far from there numbers are drawn."""
+    """Return the middle of a Box, and the greatest distance of drawn numbers from it."""
     if isinstance(normalize, Normalizer):
         return normalize.mean.numpy(), _DEVIATIONS * np.sqrt(normalize.variance.numpy() + normalize.epsilon)
     half = high / 2 - low / 2
@@ -98,7 +98,7 @@ def _middle(low: np.ndarray, high: np.ndarray, normalize: Any) -> tuple[np.ndarr
 
 
 def _scales(farthest: np.ndarray, count: int) -> np.ndarray:
-    """Return the scale of each observation: the largest for every other episode, fewer and fewer between."""
+    """Return the scale of each observation: the largest in every other episode, smaller ones between."""
     episodes = np.arange(count) // EPISODE
     ladder = np.where(episodes % 2, (episodes // 2 % EPISODE) / max(1, episodes.max() // 2), 0.0)
     nearest = np.minimum(1.0, _NEAREST / np.maximum(farthest, _NEAREST))

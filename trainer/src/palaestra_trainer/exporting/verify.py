@@ -1,4 +1,4 @@
-"""Compare an exported file with the policy that it came from."""
+"""Compare an exported file with its policy."""
 
 from __future__ import annotations
 
@@ -15,33 +15,34 @@ from palaestra_trainer.exporting.sample_observations import EPISODE, drawn, draw
 from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATIONS = 1_000
-TOLERANCE = 1e-5  # of a continuous action, as a share of its range
-_TELLING = 10  # observations between the bounds, and scores apart by as many tolerances, at least
+TOLERANCE = 1e-5  # allowed difference of a continuous action, as a share of its range
+# At least so many actions must be between the bounds, or scores must differ by so many tolerances.
+_TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]
-Run = Callable[..., Arrays]  # inputs of a batch to its outputs
+Run = Callable[..., Arrays]  # takes the inputs of a batch and returns its outputs
 Convert = Callable[[PolicyModule], Run]
 
 
 def compare(convert: Convert, acting: PolicyModule, policy: TrainedPolicy) -> float:
     """Return the largest difference of an action on 1,000 observations, as a share of its range.
 
-    A policy that takes masks is compared with masks drawn, and with masks that allow everything.
+    A policy that takes masks is compared twice: with random masks, and with masks that allow everything.
 
     Args:
-        convert: returns a function that runs a file made of such a module.
-        acting: the module of the file that is to be written.
-        policy: the policy that the file must act as.
+        convert: converts a module to a file, and returns a function that runs the file.
+        acting: the module of the file that will be written.
+        policy: the policy that the file must reproduce.
 
     Raises:
-        ExportError: discrete actions differ, or continuous ones by more than the tolerance; or any file could
-            have the same actions on these observations.
+        ExportError: discrete actions differ, or continuous ones by more than the tolerance; or the comparison
+            shows nothing, because a wrong file could have the same actions on these observations.
     """
     observations = drawn(acting, OBSERVATIONS)
     run = convert(acting)
     played = [_played(run, acting, policy, observations, masks) for masks in _masks(acting)]
     difference = max(_difference(*actions, acting, observations) for actions in played)
-    # Masks alone may make actions differ, so the last ones allow everything.
+    # Random masks alone can make actions differ between observations, so the last masks allow everything.
     _, expected = played[-1]
     _refuse_what_shows_nothing(convert, acting, policy, observations, expected)
     return difference
@@ -99,7 +100,7 @@ def _refuse_what_shows_nothing(
     observations: dict[str, np.ndarray],
     taken: np.ndarray,
 ) -> None:
-    """Refuse actions at their bounds, and a single action unless its scores show that the file is right."""
+    """Refuse actions at their bounds, and equal actions unless their scores show that the file is right."""
     rows = taken.reshape(len(taken), -1)
     same = bool((rows == rows[0]).all())
     if isinstance(acting.action_space, spaces.Box):
@@ -117,13 +118,13 @@ def _refuse_what_shows_nothing(
 
 
 def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.ndarray]) -> bool:
-    """Return whether the scores of actions depend on the observations, and a file has them too."""
+    """Return whether the scores of actions depend on the observations, and are the same in a file."""
     masks = map(torch.from_numpy, _masks(scoring)[-1])
     inputs = [*map(torch.from_numpy, observations.values()), *masks, *scoring.begin(OBSERVATIONS)]
     try:
         with torch.no_grad():
             expected = scoring(*inputs)[0].numpy()
-    except AttributeError:  # a policy of the job's author scores in its own way
+    except AttributeError:  # a policy of the job's author may compute scores in its own way
         return False
     (ours,) = convert(scoring)(*(part.numpy() for part in inputs))
     allowed = TOLERANCE * max(1.0, float(np.abs(expected).max()))
@@ -135,10 +136,10 @@ def _scores_show(convert: Convert, scoring: Scoring, observations: dict[str, np.
 def _span_and_tolerance(
     acting: PolicyModule, expected: np.ndarray, magnitude: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the range of each number of an action, and the difference that is allowed to each.
+    """Return the range of each number of an action, and its allowed difference.
 
-    An action that is only clipped may use a small part of the range; then its own range counts. Its network
-    may compute with numbers around 1, however small the range is.
+    An action that is only clipped may use a small part of the range; then the range of its values counts. Its
+    network may compute with numbers around 1, even if the range is small.
     """
     space = acting.action_space
     if not isinstance(space, spaces.Box):
@@ -150,7 +151,7 @@ def _span_and_tolerance(
     if not acting.policy.squash_output:
         largest = np.maximum(0.5, np.abs(expected).max(axis=0))
         span = np.minimum(span, np.maximum(1.0, np.ptp(expected, axis=0)))
-    if acting.state_shape is not None:  # a state remembers the errors of its episode
+    if acting.state_shape is not None:  # a state accumulates the errors of its episode
         magnitude = np.maximum.accumulate(magnitude.reshape(-1, EPISODE), axis=1).ravel()
     rounding = 2 * np.spacing(largest.astype(np.float32)).astype(np.float64)
     rough = magnitude.reshape(-1, *[1] * span.ndim)
@@ -168,7 +169,7 @@ def _played_at_once(
 def _played_in_turn(
     run: Run, acting: PolicyModule, policy: TrainedPolicy, observations: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Play observation after observation, with the state of the one before."""
+    """Return the actions of file and policy, each observation with the state after the previous one."""
     ours, expected = [], []
     state: Arrays = ()
     other: Any = None

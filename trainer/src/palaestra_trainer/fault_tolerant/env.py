@@ -12,13 +12,13 @@ from palaestra_trainer.simulators.interface import Step
 
 
 class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """The environment of one simulator; a fault truncates an episode, and the next reset waits for it.
+    """The environment of one simulator; a fault truncates the episode, the next reset waits for the restart.
 
-    As behind other wrappers of gymnasium, `unwrapped` is the environment itself, and `get_wrapper_attr` finds
+    As with other wrappers of gymnasium, `unwrapped` is the environment itself, and `get_wrapper_attr` finds
     its attributes and methods.
 
     Args:
-        players: a single one.
+        players: a group of one member.
 
     Attributes:
         env: the environment of the episode; another object after a standby took over.
@@ -32,9 +32,9 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """None unless it was set, since no second environment can be made from a spec with this robot.
+        """None unless it was set, because a second environment with this robot cannot be created from a spec.
 
-        The environment's own is `unwrapped.spec`.
+        The spec of the environment itself is `unwrapped.spec`.
         """
         return self._spec
 
@@ -45,17 +45,17 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
         """Set an attribute where it is defined, else in this wrapper if `force`; return whether it was set.
 
-        One of the environment is set again after a restart and after a standby took over.
+        An attribute of the environment is set again after a restart and after a standby took over.
         """
         if hasattr(self, name) or not self.env.has_wrapper_attr(name):
             return super().set_wrapper_attr(name, value, force=force)
-        self._player.keeper.set_attribute(name, value)
+        self._player.restarter.set_attribute(name, value)
         return True
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode; return its first observation and info. Waits until the simulator is mended.
+        """Begin an episode; return its first observation and info. Waits until the simulator is restarted.
 
         Raises:
             As `EnvGroup.begin`.
@@ -65,7 +65,7 @@ class FaultTolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._player.observation, self._player.reset_info
 
     def step(self, action: Any) -> Step:
-        """Return what the environment's step returns; or, after a fault, the last observation as truncated.
+        """Return the result of the environment's step; after a fault, the last observation, truncated.
 
         Raises:
             As `EnvGroup.step`.

@@ -1,4 +1,4 @@
-"""Players that begin and step together, and the simulators that they have until they are closed."""
+"""A group of environments that begin and step together, each in its own simulator."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ def _nothing(rows: Sequence[StepResult]) -> None:
 
 
 class EnvGroup:
-    """One player for each member.
+    """One `EpisodeRunner` for each member.
 
-    They release their simulators by `close`, or at the end of the process.
+    `close` releases the simulators; otherwise they are released at the end of the process.
 
     Args:
-        keepers: one for each member, which is up or is being started.
-        release: stops the simulators and gives them back.
-        deadline_s: the longest wait for a simulator that is being mended.
-        mend_at_once: whether a step waits for the mending itself, and not only the next reset.
+        restarters: the restarter of each member; the members are up or being started.
+        release: stops and releases the simulators.
+        deadline_s: the longest wait for a simulator that restarts.
+        mend_at_once: whether the step with the fault waits for the restart; False: the next reset waits.
         played: called with the rows of each step.
 
     Attributes:
-        all: in the order of `keepers`.
+        all: the runners, in the order of `restarters`.
     """
 
     def __init__(
         self,
-        keepers: Sequence[Restarter],
+        restarters: Sequence[Restarter],
         release: Callable[[], None],
         deadline_s: float = 600.0,
         *,
         mend_at_once: bool = False,
         played: Callable[[Sequence[StepResult]], None] = _nothing,
     ) -> None:
-        self.all = [EpisodeRunner(keeper) for keeper in keepers]
+        self.all = [EpisodeRunner(restarter) for restarter in restarters]
         self._release = release
         self._deadline_s = deadline_s
         self._mend_at_once = mend_at_once
@@ -58,22 +58,23 @@ class EnvGroup:
         """Begin an episode in each member at once; wait until all are up.
 
         Raises:
-            FaultBudgetSpent: the restart budget of a member is used up.
-            SimulatorHung: a member was not mended within the deadline.
-            ConfigurationError: a world lacks what the environment needs, or an option is wrong.
-            MasterLost: no ROS master answers.
+            FaultBudgetSpent: the restart budget of a member is spent.
+            SimulatorHung: a member was not restarted within the deadline.
+            ConfigurationError: a world lacks a device or node that the environment needs, or an option is
+                wrong.
+            MasterLost: no ROS master responds.
         """
         for player, seed, own in zip(self.all, seeds, options, strict=True):
             player.prepare(seed, own)
         self._begin_prepared()
 
     def step(self, action: Any) -> StepResult:
-        """Return the row of a step of the only player; where its episode ended, none is under way.
+        """Step the only member and return its row; if its episode ended, no new one begins.
 
         Raises:
-            ResetNeeded: no episode is under way.
+            ResetNeeded: no episode is running.
             Diverged: observation or reward is not finite.
-            FaultBudgetSpent: as `begin`, if it mends at once.
+            FaultBudgetSpent: as `begin`, if `mend_at_once`.
         """
         [player] = self.all
         row = player.step(action)
@@ -83,10 +84,10 @@ class EnvGroup:
         return row
 
     def step_all(self, actions: Sequence[Any]) -> list[StepResult]:
-        """Return the rows of a step of all players at once; where an episode ended, the next one has begun.
+        """Step all members at once and return their rows; if an episode ended, the next one has begun.
 
         Raises:
-            ResetNeeded: an episode is not under way.
+            ResetNeeded: a member has no running episode.
             Diverged: observation or reward is not finite.
             As `begin`.
         """
@@ -108,20 +109,20 @@ class EnvGroup:
         give_up = time.monotonic() + self._deadline_s
         while waiting := [player for player in self.all if not player.playing]:
             take_turns(player.begin for player in waiting)
-            self._await_one([player.keeper for player in waiting if not player.playing], give_up)
+            self._await_one([player.restarter for player in waiting if not player.playing], give_up)
 
     def _await_up(self) -> None:
         give_up = time.monotonic() + self._deadline_s
-        while waiting := [player.keeper for player in self.all if not player.keeper.up()]:
+        while waiting := [player.restarter for player in self.all if not player.restarter.up()]:
             self._await_one(waiting, give_up)
 
-    def _await_one(self, keepers: Sequence[Restarter], give_up: float) -> None:
-        await_one(keepers, partial(self._check, keepers, give_up))
+    def _await_one(self, restarters: Sequence[Restarter], give_up: float) -> None:
+        await_one(restarters, partial(self._check, restarters, give_up))
 
-    def _check(self, keepers: Sequence[Restarter], give_up: float) -> None:
+    def _check(self, restarters: Sequence[Restarter], give_up: float) -> None:
         if time.monotonic() > give_up:
             fact = f"not mended within {self._deadline_s:g} s; read the simulator's log"
-            raise SimulatorHung(", ".join(keeper.name for keeper in keepers), fact)
+            raise SimulatorHung(", ".join(restarter.name for restarter in restarters), fact)
 
 
 def _step(player: EpisodeRunner, action: Any) -> StepResult:

@@ -1,8 +1,8 @@
-"""One member that plays episodes for a loop that knows nothing of faults.
+"""One member that plays episodes for a training loop that cannot handle faults.
 
 Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
-reward 0 and `sim_fault` (`palaestra_trainer.infos`). The member is mended in the background, and the next
-episode begins once it is up.
+reward 0 and `sim_fault` (`palaestra_trainer.infos`). The member is restarted in the background, and the next
+episode begins when it is up.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class StepResult(NamedTuple):
     """The result of one step.
 
     Attributes:
-        step: as gymnasium's `step` returns it.
-        episode: return, length and seconds of the episode, as Stable-Baselines3's Monitor names them, if this
-            is its last step and no fault cut it; else None.
+        step: the result of gymnasium's `step`.
+        episode: return, length and seconds of the episode, under the names of Stable-Baselines3's Monitor.
+            None except in the last step of an episode without a fault.
     """
 
     step: Step
@@ -39,12 +39,12 @@ class StepResult(NamedTuple):
 
     @property
     def ended(self) -> bool:
-        """Whether it is the last one of its episode."""
+        """Whether this step is the last one of its episode."""
         return self.step[2] or self.step[3]
 
     @property
     def marked(self) -> dict[str, Any]:
-        """The info for Stable-Baselines3; the row of a fault has only our words."""
+        """The info for Stable-Baselines3; the row of a fault has only Palaestra's keys."""
         cut = self.ended and self.episode is None
         return self.info if cut else of_environment(self.info)
 
@@ -53,17 +53,17 @@ class EpisodeRunner:
     """Plays the episodes of one member.
 
     Attributes:
-        keeper: looks after the member.
-        playing: whether an episode is under way.
-        observation: the last one of the member.
+        restarter: the restarter of the member.
+        playing: whether an episode is running.
+        observation: the last observation of the member.
         reset_info: info of the last reset.
     """
 
-    def __init__(self, keeper: Restarter) -> None:
-        self.keeper = keeper
+    def __init__(self, restarter: Restarter) -> None:
+        self.restarter = restarter
         self.playing = False
         self.observation: Any = None
-        self._last: Any = None  # a copy, since the training loop may write into the original
+        self._last: Any = None  # a copy, because the training loop may write into the original
         self.reset_info: dict[str, Any] = {}
         self._return, self._length, self._began = 0.0, 0, 0.0
         self._random, _ = np_random()
@@ -72,12 +72,12 @@ class EpisodeRunner:
     @property
     def env(self) -> Environment:
         """The member's environment; another object after a standby took over."""
-        return self.keeper.member.env
+        return self.restarter.member.env
 
     def prepare(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Choose the next episode. Without `seed`, its seed is the next one of the sequence of the last.
+        """Choose the next episode. Without `seed`, its seed is the next one in the sequence of the last seed.
 
-        An episode keeps its seed if a fault makes it begin twice.
+        If a fault makes an episode begin twice, its seed stays the same.
         """
         if seed is not None:
             self._random, _ = np_random(seed)
@@ -85,21 +85,22 @@ class EpisodeRunner:
         self.playing = False
 
     def begin(self) -> None:
-        """Begin the chosen episode if the member is up; a fault begins to mend it, and none is under way.
+        """Begin the chosen episode if the member is up; after a fault, begin to restart the member instead.
 
         Raises:
-            FaultBudgetSpent: its restart budget is used up.
-            ConfigurationError: its world lacks what the environment needs, or it cannot be restarted.
-            MasterLost: no ROS master answers.
+            FaultBudgetSpent: its restart budget is spent.
+            ConfigurationError: its world lacks a device or node that the environment needs, or it cannot be
+                restarted.
+            MasterLost: no ROS master responds.
             Diverged: the observation is not finite.
         """
-        if not self.keeper.up():
+        if not self.restarter.up():
             return
         seed, options = self._next
         try:
-            self.observation, self.reset_info = self.keeper.reset(seed, options)
+            self.observation, self.reset_info = self.restarter.reset(seed, options)
         except SimulatorFault as fault:
-            self.keeper.begin_mending(fault)
+            self.restarter.begin_mending(fault)
             return
         self._last = copied(self.observation)
         self._return, self._length, self._began = 0.0, 0, time.monotonic()
@@ -109,14 +110,14 @@ class EpisodeRunner:
         """Return the row of one step.
 
         Raises:
-            ResetNeeded: no episode is under way.
+            ResetNeeded: no episode is running.
             Diverged: observation or reward is not finite.
         """
         if not self.playing:
-            raise ResetNeeded(f"{self.keeper.name}: no episode is under way; call reset() first")
-        self.playing = False  # also after an interrupt amid the step
+            raise ResetNeeded(f"{self.restarter.name}: no episode is under way; call reset() first")
+        self.playing = False  # stays False if an interrupt ends the step
         try:
-            step = self.keeper.step(action)
+            step = self.restarter.step(action)
         except SimulatorFault as fault:
             return self._cut(fault)
         self.observation, reward, terminated, truncated, _ = step
@@ -127,8 +128,13 @@ class EpisodeRunner:
         return StepResult(step, None if self.playing else self._summary())
 
     def _cut(self, fault: SimulatorFault) -> StepResult:
-        self.keeper.begin_mending(fault, self._length)
-        report = {"kind": fault.kind, "simulator": self.keeper.name, "fact": str(fault), "step": self._length}
+        self.restarter.begin_mending(fault, self._length)
+        report = {
+            "kind": fault.kind,
+            "simulator": self.restarter.name,
+            "fact": str(fault),
+            "step": self._length,
+        }
         return StepResult((self._last, 0.0, False, True, {OURS: {"sim_fault": report}}))
 
     def _summary(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The players of tolerant environments: in a facade, in a job, or in simulators of their own."""
+"""Create the members of fault-tolerant environments: in a facade, in a job, or in new simulators."""
 
 from __future__ import annotations
 
@@ -39,22 +39,22 @@ from palaestra_trainer.telemetry.progress_sources import follow
 
 
 def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:
-    """Return the players of one environment, whose simulators are up.
+    """Return a group of environments of one class, each in its own simulator, which is up.
 
-    The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
-    none, or more than one is wanted, simulators of PALAESTRA_CONFIG are used. If that is not set, new ones
+    The simulator is that of the newest `Webots` facade of this process that no environment uses. Without such
+    a facade, or for more than one simulator, those of PALAESTRA_CONFIG are used. If that is not set, new ones
     are started: stubs, or MuJoCo for `SeeTarget-v0`.
 
     Args:
         wanted: the environment; None: that of PALAESTRA_CONFIG.
-        number: how many simulators; None: that of the facade, or all of the role, or one.
+        number: number of simulators; None: that of the facade, else all of the role, else a new one.
         role: the role of the simulators in PALAESTRA_CONFIG.
 
     Raises:
         ConfigurationError: the environment is missing or wrong, too few simulators with the role are free, or
             MuJoCo is not installed.
         FaultBudgetSpent: a simulator did not start.
-        MasterLost: no ROS master answers.
+        MasterLost: no ROS master responds.
     """
     if number is not None and number < 1:
         raise ConfigurationError(f"num_envs: {number} is no number of environments; give 1 or more")
@@ -76,12 +76,12 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
 
 def _in_facade(place: NotebookSimulator, environment: Environment) -> EnvGroup:
     try:
-        keeper = Restarter(NotebookMember(place, environment))
+        restarter = Restarter(NotebookMember(place, environment))
     except BaseException:
         place.release()
         raise
-    # The program may pause the simulator after any step, so none may end amid a restart.
-    return EnvGroup([keeper], keeper.stop, mend_at_once=True)
+    # The program may pause the simulator after any step, so `step` must not return during a restart.
+    return EnvGroup([restarter], restarter.stop, mend_at_once=True)
 
 
 def _in_job(configuration: Configuration, number: int | None, role: Role) -> EnvGroup:
@@ -93,10 +93,10 @@ def _in_job(configuration: Configuration, number: int | None, role: Role) -> Env
         for entry in entries:
             progress.add(entry.name, role)
         follow(progress, members)
-        keepers = _started(stack, chosen, members, progress)
-        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in keepers}}
+        restarters = _started(stack, chosen, members, progress)
+        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in restarters}}
         return EnvGroup(
-            keepers,
+            restarters,
             stack.pop_all().close,
             configuration.stall_deadline_seconds,
             played=partial(_count, progress, role),
@@ -121,7 +121,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
     with ExitStack() as stack:
         members = []
         for entry in entries:
-            # A stub leaves six such digits out of the seed of its faults, so that they repeat.
+            # A stub ignores six such digits when it seeds its faults, so that the faults are repeatable.
             launcher = ProcessLauncher(world, driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
             stack.callback(launcher.close)
             members.append(simulator_at(launcher, configuration, entry))
@@ -131,7 +131,7 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
 def _allocated(
     stack: ExitStack, configuration: Configuration, number: int | None, role: Role
 ) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators that are reserved until `stack` closes; none may be given up."""
+    """Return simulators that are reserved until `stack` closes; no simulator may be given up."""
     every = max(1, len(configuration.with_role(role)))
     entries = []
     for _ in range(number or every):
@@ -144,7 +144,7 @@ def _allocated(
 def _started(
     stack: ExitStack, configuration: Configuration, members: Sequence[Member], watcher: Watcher
 ) -> list[Restarter]:
-    """Return the keepers of members that are up until `stack` closes."""
+    """Start the members and return their restarters; closing `stack` stops the members."""
     fleet = Fleet(configuration, members, watcher)
     stack.callback(fleet.stop)
     fleet.start()

@@ -15,24 +15,24 @@ from palaestra_trainer.infos import TRUNCATED
 
 
 class FaultTolerantVecEnv(MembersVecEnv):
-    """All members step at the same time, as in `TolerantVectorEnv`.
+    """All members step at the same time, as in `FaultTolerantVectorEnv`.
 
     The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
-    that Stable-Baselines3's Monitor would add. If a fault cut the episode, it has `sim_fault`
-    (`palaestra_trainer.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count it.
+    that Stable-Baselines3's Monitor would add. If a fault truncated the episode, the info has `sim_fault`
+    (`palaestra_trainer.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count the episode.
 
     Args:
-        players: in the order of the rows.
+        players: the members, in the order of the rows.
 
     Raises:
-        ConfigurationError: Stable-Baselines3 would take the environment's observations or actions wrongly.
+        ConfigurationError: Stable-Baselines3 would misread the environment's observations or actions.
     """
 
     def __init__(self, players: EnvGroup) -> None:
         self._players = players
         task = players.all[0].env
         refuse_flaws(task.observation_space, task.action_space)
-        super().__init__([player.keeper for player in players.all])
+        super().__init__([player.restarter for player in players.all])
 
     def reset(self) -> VecEnvObs:
         """Begin an episode in each member at once; return the first observations.

@@ -21,10 +21,10 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
 
     The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
     ended it, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until that simulator
-    is mended, and the others wait with it: this interface has no row for a simulator that does not step.
+    is restarted, and the others wait with it: this interface has no row for a simulator that does not step.
 
     Args:
-        players: in the order of the rows.
+        players: the members, in the order of the rows.
     """
 
     def __init__(self, players: EnvGroup) -> None:
@@ -43,11 +43,11 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         """Begin an episode in each member at once; return the first observations and infos.
 
         Args:
-            seed: of the first member; the next ones have `seed + 1` and so on. Or one for each.
-            options: of the environment's reset, for each member.
+            seed: seed of the first member; the next ones get `seed + 1` and so on. Or one seed for each.
+            options: options of the environment's reset, the same for each member.
 
         Raises:
-            ValueError: the number of seeds is not that of members.
+            ValueError: the numbers of seeds and members differ.
             As `EnvGroup.begin`.
         """
         self._players.begin(self._seeds(seed), [options] * self.num_envs)
@@ -77,28 +77,28 @@ class FaultTolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
         )
 
     def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
-        """Return what a method of each environment returns, or an attribute, as `SyncVectorEnv` does."""
+        """Return the result of a method of each environment, or an attribute, as `SyncVectorEnv` does."""
         found = [player.env.get_wrapper_attr(name) for player in self._players.all]
         return tuple(each(*arguments, **options) if callable(each) else each for each in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each environment, also one behind wrappers."""
+        """Return an attribute of each environment, even if an inner wrapper defines it."""
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of each environment; `values` are one for all, or a list or tuple of one for each.
+        """Set an attribute of each environment; `values` is one for all, or a list or tuple of one for each.
 
         Raises:
-            ValueError: the number of values is not that of environments.
+            ValueError: the numbers of values and environments differ.
         """
         each = values if isinstance(values, list | tuple) else [values] * self.num_envs
         if len(each) != self.num_envs:
             raise ValueError(f"values: {len(each)} for {self.num_envs} environments; give one for each")
         for player, value in zip(self._players.all, each, strict=True):
-            player.keeper.set_attribute(name, value)
+            player.restarter.set_attribute(name, value)
 
     def render(self) -> tuple[Any, ...]:
-        """Return what each environment's `render` returns."""
+        """Return the result of each environment's `render`."""
         return self.call("render")
 
     def close_extras(self, **kwargs: Any) -> None:

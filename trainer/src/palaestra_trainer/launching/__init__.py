@@ -1,1 +1,1 @@
-"""Starts and ends the processes around a simulator: its sidecar, the simulator itself, and a ROS master."""
+"""Start and stop the processes around a simulator: its sidecar, the simulator itself, and a ROS master."""

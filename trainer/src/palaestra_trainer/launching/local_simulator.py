@@ -23,7 +23,7 @@ _ADDRESSES = re.compile(r"control=(\S+)")
 
 
 class ProcessLauncher(Sidecar):
-    """Starts a sidecar of its own, and a ROS master if none answers at ROS_MASTER_URI.
+    """Starts a new sidecar, and a ROS master if none responds at ROS_MASTER_URI.
 
     Args:
         world: path of the world, or the name of one that ships.
@@ -72,7 +72,7 @@ class ProcessLauncher(Sidecar):
         """Return a launcher that keeps the world's ROS names, or appends `_2`, `_3`, ... if those are in use.
 
         Raises:
-            ConfigurationError: as the class, or all names are in use.
+            ConfigurationError: the sidecar refused the world or the driver, or all names are in use.
         """
         for number in range(1, _MOST_BESIDE + 1):
             launcher = cls(world, driver, options, suffix="" if number == 1 else f"_{number}")
@@ -88,10 +88,10 @@ class ProcessLauncher(Sidecar):
         )
 
     def reserve(self) -> bool:
-        """Reserve the ROS names of this simulator until `close`; False: one is in use.
+        """Reserve the ROS names of this simulator until `close`; return False if one is in use.
 
         Raises:
-            MasterLost: no ROS master answers.
+            MasterLost: no ROS master responds.
         """
         return self._reservation.take(robot.ros_name for robot in self.state().robots)
 
@@ -102,6 +102,6 @@ class ProcessLauncher(Sidecar):
 
 
 def _program(name: str) -> list[str]:
-    """Return the program beside this interpreter, else the one that PATH finds."""
+    """Return the program in the folder of this interpreter, else the one that PATH finds."""
     beside = Path(sys.executable).with_name(name)
     return [str(beside) if beside.exists() else name]

@@ -12,9 +12,9 @@ from palaestra_trainer.ros import Master
 
 
 def ensure_master() -> None:
-    """Start a ROS master on a free port if none answers.
+    """Start a ROS master on a free port if none responds.
 
-    Sets ROS_MASTER_URI and ROS_HOSTNAME of this process to the one it starts.
+    Sets ROS_MASTER_URI and ROS_HOSTNAME of this process to the new master.
     """
     try:
         Master("/palaestra").ping()

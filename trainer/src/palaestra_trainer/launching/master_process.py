@@ -18,7 +18,7 @@ def main() -> None:
     """Serve on loopback until standard input closes."""
     logging.basicConfig(level=logging.ERROR)
     os.environ["ROS_HOSTNAME"] = "localhost"
-    # Watched from the start: rosmaster waits for its own server without a timeout.
+    # The thread starts before the master, because rosmaster waits for its own server without a timeout.
     owned = threading.Thread(target=_end_with_owner)
     owned.start()
     master = Master(0)

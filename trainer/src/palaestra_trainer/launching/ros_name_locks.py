@@ -24,11 +24,11 @@ class Reservation:
         self._locks: list[FileLock] = []
 
     def take(self, names: Iterable[str]) -> bool:
-        """Reserve all of `names`; False: one is in use, and none is reserved.
+        """Reserve all of `names`; if one is in use, reserve nothing and return False.
 
         Raises:
-            MasterLost: no ROS master answers.
-            ConfigurationError: the folder for temporary files cannot be written, or has no locks.
+            MasterLost: no ROS master responds.
+            ConfigurationError: the folder for temporary files cannot be written, or does not support locks.
         """
         master = Master("/palaestra")
         for name in names:

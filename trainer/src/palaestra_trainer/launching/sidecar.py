@@ -1,4 +1,4 @@
-"""A client of a sidecar's control port; serves the Webots facade as its launcher."""
+"""A client of a sidecar's control port; the Webots facade uses it as its launcher."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _CONFLICT = 409
 class Sidecar:
     """One simulator behind the control port of its sidecar.
 
-    Every method raises SimulatorDead when the sidecar is gone and SimulatorHung when it does not answer.
+    Every method raises SimulatorDead if the sidecar is gone, and SimulatorHung if it does not respond.
 
     Attributes:
         address: e.g. http://127.0.0.1:7100
-        left_out: what the simulator left out of its world at its last start, in lines for people.
+        left_out: the parts that the simulator left out of its world at its last start, in lines for people.
 
     Args:
         address: see Attributes.
@@ -60,7 +60,7 @@ class Sidecar:
         """Return the state; wait if the sidecar does not listen yet.
 
         Raises:
-            SimulatorDead, SimulatorHung: it did not answer within `deadline_s` seconds.
+            SimulatorDead, SimulatorHung: it did not respond within `deadline_s` seconds.
         """
         give_up = time.monotonic() + deadline_s
         while True:
@@ -69,14 +69,14 @@ class Sidecar:
             except SimulatorDead:
                 if time.monotonic() > give_up:
                     raise
-            time.sleep(_POLL_S)  # the sidecar is starting, and there is no call that would wait for it
+            time.sleep(_POLL_S)  # the sidecar is still starting, and no call can wait for that
 
     def start(self) -> None:
-        """Start the simulator without waiting for it; one that already starts is left alone."""
+        """Start the simulator without waiting for it; do nothing if it is already starting."""
         self._ask("POST", "/start", {})
 
     def confirm_ready(self) -> None:
-        """Report to the sidecar that the simulator has answered a real round trip."""
+        """Report to the sidecar that the simulator has responded to a real request."""
         self.left_out = self._ask("POST", "/ready", {}).left_out
 
     def ready(self) -> bool:
@@ -88,19 +88,19 @@ class Sidecar:
         self._ask("POST", "/stop", StopRequest(deadline_s=deadline_s).to_json())
 
     def failure(self) -> str | None:
-        """Return why the simulator is not running; None while it runs or starts."""
+        """Return the reason why the simulator is not running; None while it runs or starts."""
         state = self.state()
         if state.state in {SidecarState.STARTING, SidecarState.READY}:
             return None
         return state.detail or f"its state is {state.state.value}"
 
     def refused(self) -> bool:
-        """Return whether it ended with the exit code 2, by which a program refuses what it is given."""
+        """Return whether it ended with exit code 2, by which a program refuses its input."""
         last = self.state().last_exit
         return last is not None and last.code == _REFUSED
 
     def wait_stopped(self, deadline_s: float) -> None:
-        """Return when the simulator has ended.
+        """Wait until the simulator has ended.
 
         Raises:
             SimulatorHung: it did not end within `deadline_s` seconds.
@@ -109,7 +109,7 @@ class Sidecar:
         while self.state().state not in {SidecarState.IDLE, SidecarState.FAILED}:
             if time.monotonic() > give_up:
                 raise SimulatorHung(self._name, f"did not end within {deadline_s:g} s")
-            time.sleep(_POLL_S)  # between two requests; the control port has no call that would wait
+            time.sleep(_POLL_S)  # the control port has no request that waits
 
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
         connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)

@@ -1,7 +1,7 @@
-"""Child processes that end with this program: each reads from a pipe to its standard input.
+"""Child processes that end with this program, because each reads from a pipe at its standard input.
 
-The kernel closes our end of the pipe when this program ends, even by a kill. The child stops at the end of
-file.
+The kernel closes our end of the pipe when this program ends, even by a kill. The child stops when it reads
+the end of the file.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ def end_child(process: subprocess.Popen[bytes]) -> None:
 
 
 def drain(process: subprocess.Popen[bytes]) -> None:
-    """Read and drop what the process prints from now on; a full pipe would block it forever."""
+    """Read and drop the later output of the process, because a full pipe would block it forever."""
     for pipe in (process.stdout, process.stderr):
         if pipe is not None:
             threading.Thread(target=_drop, args=(pipe,), daemon=True).start()
 
 
 def _drop(pipe: IO[bytes]) -> None:
-    # `end_child` closes the pipe while this thread reads.
+    # `end_child` may close the pipe while this thread reads.
     with contextlib.suppress(OSError, ValueError):
         while pipe.read1(65536):  # type: ignore[attr-defined]  # Popen's pipes are buffered
             pass

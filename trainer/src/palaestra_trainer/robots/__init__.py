@@ -1,4 +1,4 @@
-"""Robots as an environment sees them: what they sense, how they drive, when time passes."""
+"""The interface of robots for environments: sensors, motion, and the passing of time."""
 
 from palaestra_trainer.robots.base import RobotAbc, RobotinoAbc, Scene, SceneWrapper
 from palaestra_trainer.robots.capabilities import (

@@ -1,8 +1,8 @@
-"""The interface of all robots, of the Robotino among them, and of the scene around a simulated one.
+"""The interfaces of all robots, of the Robotino, and of the scene around a simulated robot.
 
-An environment is written against `RobotAbc` and the capabilities that it needs. What only a simulation can
-do, putting things where an episode wants them, is apart in `Scene`: a real robot
-has none. Nothing here knows how a robot is reached.
+An environment uses only `RobotAbc` and the capabilities that it needs. Only a simulation can move objects to
+the positions that an episode needs. So `Scene` is a separate interface, which a real robot lacks. This module
+does not depend on the connection to a robot.
 """
 
 from __future__ import annotations
@@ -15,19 +15,18 @@ from palaestra_trainer.robots.capabilities import Bumper, Distances, Localizatio
 from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout
 
-RADIUS_M = 0.2266  # of the body's cylinder, as in Webots' model of the Robotino 3
-OUTLINE_M = 0.2286  # of the body with its bumper
-SENSORS = 9  # infrared, one every 40 degrees
-# Both ends are what it says beyond them. Source: lookup table of the GP2Y0A41 in that model.
+RADIUS_M = 0.2266  # radius of the body's cylinder, as in Webots' model of the Robotino 3
+OUTLINE_M = 0.2286  # radius of the body with its bumper
+SENSORS = 9  # infrared sensors, one every 40 degrees
+# Beyond an end of the range the sensor measures that end. Source: lookup table of the GP2Y0A41 in that model.
 SENSOR_RANGE_M = (0.03, 0.40)
 
 
 class RobotAbc(ABC):
     """A robot. Its capabilities are the classes of `capabilities` that it inherits.
 
-    Any call may raise `SimulatorFault` where a simulator is behind it. Readings change in `advance` only:
-    between two calls all of them describe the same moment. Before the first there are none: they raise
-    `NoReading`.
+    Any call may raise `SimulatorFault` if the robot is simulated. Readings change only in `advance`: between
+    two calls of it, all readings describe the same moment. Before the first call they raise `NoReading`.
     """
 
     @property
@@ -37,10 +36,10 @@ class RobotAbc(ABC):
 
     @abstractmethod
     def advance(self) -> int:
-        """Let one control period pass; return how many extra ones had to (0 when all is well)."""
+        """Let one control period pass; return the number of extra periods, normally 0."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return itself: a copy would drive the same robot.
+        """Return the robot itself, because a copy would drive the same robot.
 
         gymnasium copies the arguments of an environment.
         """
@@ -49,9 +48,9 @@ class RobotAbc(ABC):
 
 
 class RobotinoAbc(RobotAbc, Omnidrive, Localization, Distances, Bumper):
-    """A Robotino, whether it is simulated, faked or stands in a laboratory.
+    """A Robotino: a simulated one, a fake, or a real one.
 
-    `distances` has shape (9,): the first looks forward, the others follow counter-clockwise every 40
+    `distances` has shape (9,): the first sensor points forward, the others follow counter-clockwise every 40
     degrees.
     """
 
@@ -63,26 +62,26 @@ class RobotinoAbc(RobotAbc, Omnidrive, Localization, Distances, Bumper):
 
 
 class Scene(ABC):
-    """Arranges episodes, which is possible in a simulation only.
+    """Arranges episodes, which is possible only in a simulation.
 
-    An episode begins in three steps: `begin` puts everything back to its place, `layout` returns where that
-    is, and `place` puts the robot on a free place.
+    An episode begins in three steps: `begin` restores the initial positions of all objects, `layout` returns
+    these positions, and `place` puts the robot on a free position.
     """
 
     @abstractmethod
     def begin(self, seed: int) -> None:
-        """Begin anew: everything is at its first place and at rest.
+        """Begin an episode: all objects are at their initial positions and at rest.
 
-        All chance until the next `begin` follows from `seed`, in [0, 2**31).
+        All random values until the next `begin` follow from `seed`, in [0, 2**31).
         """
 
     @abstractmethod
     def layout(self) -> FloorLayout:
-        """Return the floor, and what stands on it now; what `put` moved is at its new place."""
+        """Return the floor and the objects on it; objects that `put` has moved are at their new positions."""
 
     @abstractmethod
     def place(self, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); fresh readings."""
+        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); update all readings."""
 
     @abstractmethod
     def mark(self, target: Point) -> None:
@@ -93,12 +92,12 @@ class Scene(ABC):
         """Put the node with DEF `name` to x, y, z (meters) with the next period; `begin` undoes it."""
 
     def reset(self, seed: int, start: Pose, target: Point) -> None:
-        """Begin anew, with the robot and the mark at places that were chosen without the layout."""
+        """Begin an episode with the robot and the mark at positions that were chosen without the layout."""
         self.begin(seed)
         self.place(start, target)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return itself: a copy would arrange the same simulation.
+        """Return the scene itself, because a copy would arrange the same simulation.
 
         gymnasium copies the arguments of an environment.
         """
@@ -107,7 +106,7 @@ class Scene(ABC):
 
 
 class SceneWrapper(Scene):
-    """A scene around another one; override the methods that should do something else.
+    """A scene around another one; override the methods that should behave differently.
 
     Args:
         scene: the scene inside.
@@ -117,7 +116,7 @@ class SceneWrapper(Scene):
         self.scene = scene
 
     def begin(self, seed: int) -> None:
-        """Begin anew; override it to change the world in every episode."""
+        """Begin an episode; override this method to change the world in every episode."""
         self.scene.begin(seed)
 
     def layout(self) -> FloorLayout:
@@ -142,4 +141,4 @@ class JointScene(ABC):
 
     @abstractmethod
     def set_joint(self, name: str, position: float) -> None:
-        """Put the joint with DEF `name` to radians or meters, at rest; `Scene.begin` undoes it."""
+        """Move the joint with DEF `name` to radians or meters, at rest; `Scene.begin` undoes it."""

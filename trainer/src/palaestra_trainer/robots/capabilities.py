@@ -1,9 +1,9 @@
-"""The abilities of robots, one class each, and the refusal of a robot that lacks one.
+"""The capabilities of robots, one class each, and a check that a robot has those that a task needs.
 
-A robot inherits each capability that it has. An environment lists in `needs` those without which its task
-makes no sense. So a task names no robot and a robot names no task, and a pair that does not fit is refused
-before a simulator starts. Readings change in `RobotAbc.advance` only: between two calls all of them describe
-the same moment. Nothing here knows how a robot is reached.
+A robot inherits each capability that it has. An environment lists in `needs` the capabilities that its task
+needs. So a task names no robot and a robot names no task, and a pair that does not fit is refused before a
+simulator starts. Readings change only in `RobotAbc.advance`: between two calls of it, all readings describe
+the same moment. This module does not depend on the connection to a robot.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from palaestra_trainer.robots.geometry import Movement, Pose
 
 
 class Steering(ABC):
-    """Driving forward and turning.
+    """A robot that drives forward and turns.
 
     Attributes:
-        radius_m: from its center to the farthest point of its outline.
+        radius_m: meters from its center to the farthest point of its outline.
         speed_m_s: its greatest speed.
         turn_rad_s: its greatest rate of turning.
     """
@@ -38,14 +38,14 @@ class Steering(ABC):
 
 
 class Omnidrive(Steering):
-    """Driving in every direction of the floor, and turning."""
+    """A robot that drives in every direction on the floor, and turns."""
 
     @abstractmethod
     def drive(self, vx: float, vy: float, omega: float) -> None:
         """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
 
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity, without motion to the side."""
+        """Set the wanted velocity, without motion to the side, until changed."""
         self.drive(forward, 0.0, turn)
 
     def move(self, movement: Movement) -> None:
@@ -54,7 +54,7 @@ class Omnidrive(Steering):
 
 
 class Localization(ABC):
-    """Knowing where it is."""
+    """A robot that knows its pose."""
 
     @abstractmethod
     def pose(self) -> Pose:
@@ -62,11 +62,11 @@ class Localization(ABC):
 
 
 class Distances(ABC):
-    """Distance sensors on its outline.
+    """A robot with distance sensors on its outline.
 
     Attributes:
         bearings_rad: the direction of each sensor, counter-clockwise from forward.
-        distance_range_m: least and most that they measure; what is beyond counts as the nearer end.
+        distance_range_m: smallest and greatest distance that they measure; others count as the nearer end.
     """
 
     bearings_rad: ClassVar[tuple[float, ...]]
@@ -78,7 +78,7 @@ class Distances(ABC):
 
 
 class Bumper(ABC):
-    """Feeling a contact."""
+    """A robot with a bumper."""
 
     @abstractmethod
     def bumped(self) -> bool:
@@ -86,13 +86,13 @@ class Bumper(ABC):
 
 
 class Cameras(ABC):
-    """A color camera, a depth camera, or both."""
+    """A robot with a color camera, a depth camera, or both."""
 
     @abstractmethod
     def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
-        """Let the chosen cameras have an image from the next `advance` on; they stay in use.
+        """Make the chosen cameras render an image in each later `advance`; they stay in use.
 
-        A camera that is not in use costs nothing.
+        A camera that is not in use costs no time.
 
         Raises:
             NoSuchSensor: the robot lacks one of them. A simulated robot that is not connected yet raises
@@ -101,7 +101,7 @@ class Cameras(ABC):
 
     @abstractmethod
     def color_image(self) -> NDArray[np.uint8]:
-        """Return what the camera sees, shape (height, width, 3), RGB; valid until the next `advance`.
+        """Return the image of the camera, shape (height, width, 3), RGB; valid until the next `advance`.
 
         Raises:
             NoSuchSensor: no color camera is in use.
@@ -112,7 +112,7 @@ class Cameras(ABC):
     def depth_image(self) -> NDArray[np.float32]:
         """Return meters for each pixel, shape (height, width); valid until the next `advance`.
 
-        Meters are along the line of sight of the image's middle; infinite where nothing is in range.
+        Meters are measured parallel to the optical axis; pixels without an object in range are infinite.
 
         Raises:
             NoSuchSensor: no depth camera is in use.
@@ -121,11 +121,11 @@ class Cameras(ABC):
 
 
 class Scanner(ABC):
-    """A laser scanner of one layer.
+    """A robot with a laser scanner of one layer.
 
     Attributes:
         scan_view_rad: the angle that it covers, half of it on either side of forward.
-        scan_range_m: least and most that it measures; what is beyond counts as the nearer end.
+        scan_range_m: smallest and greatest distance that it measures; others count as the nearer end.
     """
 
     scan_view_rad: ClassVar[float]
@@ -133,9 +133,9 @@ class Scanner(ABC):
 
     @abstractmethod
     def use_scanner(self) -> None:
-        """Let the scanner have a scan from the next `advance` on; it stays in use.
+        """Make the scanner measure in each later `advance`; it stays in use.
 
-        A scanner that is not in use costs nothing.
+        A scanner that is not in use costs no time.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -143,7 +143,7 @@ class Scanner(ABC):
 
     @abstractmethod
     def scan(self) -> NDArray[np.float32]:
-        """Return meters from the scanner, shape (rays,), from the rightmost ray counter-clockwise.
+        """Return meters from the scanner, shape (rays,), counter-clockwise from the rightmost ray.
 
         Raises:
             NoSuchSensor: the scanner is not in use.
@@ -152,7 +152,7 @@ class Scanner(ABC):
 
 
 class Joints(ABC):
-    """Joints that it moves and measures.
+    """A robot with joints that it moves and measures.
 
     Attributes:
         motors: names of its motors.
@@ -174,11 +174,11 @@ class Joints(ABC):
 
 
 class Gripper(ABC):
-    """Holding something."""
+    """A robot with a gripper."""
 
     @abstractmethod
     def use_gripper(self) -> None:
-        """Take hold of the gripper's motors; without it they cost nothing.
+        """Start to use the gripper's motors; before that they cost no time.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -190,7 +190,7 @@ class Gripper(ABC):
 
 
 class Forklift(ABC):
-    """Lifting something.
+    """A robot with a fork that lifts.
 
     Attributes:
         lift_range_m: least and greatest height of the fork.
@@ -200,7 +200,7 @@ class Forklift(ABC):
 
     @abstractmethod
     def use_forklift(self) -> None:
-        """Take hold of the fork's motor; without it the fork costs nothing.
+        """Start to use the fork's motor; before that it costs no time.
 
         Raises:
             NoSuchSensor: as `Cameras.use_cameras`.
@@ -226,7 +226,7 @@ CAPABILITIES: tuple[type, ...] = (
 
 
 def require(robot: object, needs: Iterable[type], by: str) -> None:
-    """Return if a robot has every capability in `needs`; `by` is the name of the task in the error.
+    """Check that a robot has every capability in `needs`; `by` is the name of the task in the error.
 
     Raises:
         MissingCapability: it lacks some.

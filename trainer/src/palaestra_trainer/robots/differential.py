@@ -17,12 +17,12 @@ from palaestra_trainer.webots import DistanceSensor, Lidar, Motor, set_velocitie
 class DifferentialDrive(MobileRobot, Steering):
     """A robot that drives by two wheels on one axle. The arguments are those of `SimulatedRobot`.
 
-    A subclass names the DEF name and the wheels of its robot, with their sizes.
+    A subclass sets the DEF name of its robot, and the names and sizes of its wheels.
 
     Attributes:
         wheels: names of the motors of the left and the right wheel.
-        wheel_radius_m: of each wheel.
-        axle_m: from one wheel to the other.
+        wheel_radius_m: radius of each wheel.
+        axle_m: distance between the wheels.
         wheel_rad_s: the greatest speed of a wheel.
     """
 
@@ -39,7 +39,7 @@ class DifferentialDrive(MobileRobot, Steering):
     def steer(self, forward: float, turn: float) -> None:
         """Set the wanted velocity: forward in m/s, counter-clockwise in rad/s, until changed.
 
-        If a wheel would have to run faster than it can, both run slower, so the curve stays the same.
+        If a wheel would have to turn faster than it can, both turn slower, so that the curve stays the same.
         """
         side = 0.5 * turn * self.axle_m
         wanted = (forward - side) / self.wheel_radius_m, (forward + side) / self.wheel_radius_m
@@ -59,7 +59,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     wheel_radius_m = 0.033
     axle_m = 0.16
     wheel_rad_s = 6.67
-    radius_m = 0.111  # from between the wheels to the corners at the rear
+    radius_m = 0.111  # from the center between the wheels to the corners at the rear
     speed_m_s = 0.22
     turn_rad_s = 2.75
     laser: ClassVar[str] = "LDS-01"
@@ -76,9 +76,9 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
         self._use(self._laser)
 
     def scan(self) -> NDArray[np.float32]:
-        """Return meters, shape (360,), from behind counter-clockwise; a new array.
+        """Return meters, shape (360,), counter-clockwise from behind; a new array.
 
-        A thing nearer than 0.12 m is not seen: its ray measures the greatest distance.
+        An object nearer than 0.12 m is not detected: its ray measures the greatest distance.
         """
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:
@@ -114,7 +114,7 @@ class EPuck(DifferentialDrive, Distances):
         self.simulation.add(self._infrared, ())
 
     def distances(self) -> NDArray[np.float32]:
-        """Return meters to the nearest obstacle, shape (8,), from the left of the front counter-clockwise."""
+        """Return meters to the nearest obstacle, shape (8,), counter-clockwise from the front left."""
         counts = [sensor.value for sensor in self._infrared]
         if None in counts:
             raise self._no_reading()

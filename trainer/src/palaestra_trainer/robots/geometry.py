@@ -14,7 +14,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a robot is: meters in the world's frame, heading in (-pi, pi], 0 along x."""
+    """A position and heading of a robot: meters in the world's frame, heading in (-pi, pi], 0 along x."""
 
     x_m: float
     y_m: float
@@ -34,7 +34,7 @@ class Movement(IntEnum):
 
     @property
     def twist(self) -> Twist:
-        """Forward and left in m/s, counter-clockwise in rad/s, as `Omnidrive.drive` takes it."""
+        """Forward and left in m/s, counter-clockwise in rad/s, as arguments of `Omnidrive.drive`."""
         return _TWISTS[self]
 
 

@@ -1,4 +1,4 @@
-"""Simulated robots of joints: arms, cart-poles, models of MuJoCo."""
+"""Simulated robots with joints: arms, cart-poles, models of MuJoCo."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from palaestra_trainer.webots import Command, JointMotor, PositionSensor
 
 
 class JointRobot(SimulatedRobot, Joints):
-    """A robot that is moved by its joints. The arguments are those of `SimulatedRobot`.
+    """A robot that moves by its joints. The arguments are those of `SimulatedRobot`.
 
-    A subclass names the motors and sensors of its robot. In a model of MuJoCo every sensor of one number is
-    a PositionSensor, so a sensor may measure a rate too.
+    A subclass names the motors and sensors of its robot. In a model of MuJoCo every sensor with one number is
+    a PositionSensor, so `sensors` may contain rates too.
 
     Attributes:
         motors: names of its motors.
         sensors: names of its PositionSensors.
         greatest: the greatest command of each motor.
-        commanded: what `command` sets: position (rad, m), velocity, force (N) or torque (N m); control is
-            for actuators of MuJoCo that Webots has no motor for, with names such as "mujoco/biceps".
+        commanded: the quantity that `command` sets: position (rad, m), velocity, force (N) or torque (N m).
+            "control" is for actuators of MuJoCo without a motor in Webots, such as "mujoco/biceps".
 
     Raises:
-        ConfigurationError: the class names no motors, or not one greatest command for each.
+        ConfigurationError: the class names no motors, or `greatest` does not have one number for each motor.
     """
 
     target = None

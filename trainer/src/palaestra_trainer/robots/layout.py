@@ -1,7 +1,7 @@
-"""What stands on a floor, as a task needs it to draw free places.
+"""The floor and the obstacles on it; a task needs them to choose free positions.
 
-A layout is a value: the scene makes it anew from the world whenever it is asked. So a task is drawn
-around the things where they are, also if an episode or a person has moved them.
+A layout is a value: each call of `Scene.layout` reads a new one from the world. So a task chooses positions
+around the current positions of the objects, even if an episode or a person has moved them.
 """
 
 from __future__ import annotations
@@ -11,23 +11,23 @@ from dataclasses import dataclass, replace
 
 from palaestra_trainer.robots.geometry import Point
 
-REACH_M = 0.5  # robots are lower, and pass below a thing that hangs higher
-SUNKEN_M = 0.001  # what rises less above the floor is a part of it
+REACH_M = 0.5  # robots are lower than this, and pass below an object that hangs higher
+SUNKEN_M = 0.001  # an object that rises less above the floor counts as a part of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
-    """An upright thing: a rectangle with rounded corners on the floor, or a circle.
+    """An upright object: its outline on the floor is a rectangle with rounded corners, or a circle.
 
     Attributes:
         name: its DEF name in the world; "" without one.
-        x_m: of its center, as `y_m`.
-        y_m: see above.
+        x_m: x of its center.
+        y_m: y of its center.
         bottom_m: height of its lower side.
         top_m: height of its upper side.
         half_m: half its length along its own axes x and y, without the rounding; zeros for a circle.
-        radius_m: of the rounding, or of the circle.
-        heading_rad: of its x axis in the world.
+        radius_m: radius of the rounding, or of the circle.
+        heading_rad: direction of its own x axis in the world.
     """
 
     name: str
@@ -41,11 +41,11 @@ class Obstacle:
 
     @property
     def standing(self) -> bool:
-        """Whether a robot can touch it: not if it is stored under the floor or hangs above robots."""
+        """Whether a robot can touch it; False if it is stored under the floor or hangs above robots."""
         return self.top_m > SUNKEN_M and self.bottom_m < REACH_M
 
     def moved(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
-        """Return it with its center at another place."""
+        """Return a copy with its center at another position."""
         half = 0.5 * (self.top_m - self.bottom_m)
         return replace(self, x_m=x_m, y_m=y_m, bottom_m=z_m - half, top_m=z_m + half)
 
@@ -59,7 +59,7 @@ class Obstacle:
         return outside + min(max(beyond_x, beyond_y), 0.0) - self.radius_m
 
     def away(self, x_m: float, y_m: float) -> Point:
-        """Return the direction that leads out of it, or away from it, the shortest way from a point."""
+        """Return the direction of the shortest way from a point out of it, or away from it if outside."""
         small = 1e-4
         gx = self.gap(x_m + small, y_m) - self.gap(x_m - small, y_m)
         gy = self.gap(x_m, y_m + small) - self.gap(x_m, y_m - small)
@@ -69,12 +69,12 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FloorLayout:
-    """A floor and the things on it.
+    """A floor and the objects on it.
 
     Attributes:
-        low: x, y in meters of one corner of the floor, whose sides lie along x and y.
-        high: of the opposite corner, with the greater numbers.
-        obstacles: everything that is not the floor, a robot or a mark; also what is stored under the floor.
+        low: smallest x and y of the floor in meters; its sides are parallel to x and y.
+        high: greatest x and y of the floor in meters.
+        obstacles: all objects except the floor, robots and marks; includes objects stored under the floor.
     """
 
     low: Point
@@ -82,6 +82,6 @@ class FloorLayout:
     obstacles: tuple[Obstacle, ...] = ()
 
     def gap(self, x_m: float, y_m: float) -> float:
-        """Return meters from a point to the nearest thing or edge of the floor; negative inside or beyond."""
+        """Return meters from a point to the nearest obstacle or floor edge; negative inside or beyond it."""
         edge = min(x_m - self.low[0], self.high[0] - x_m, y_m - self.low[1], self.high[1] - y_m)
         return min(edge, *(thing.gap(x_m, y_m) for thing in self.obstacles if thing.standing), math.inf)

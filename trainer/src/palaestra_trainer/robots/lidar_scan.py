@@ -1,4 +1,4 @@
-"""Ranges of a Lidar as a scan."""
+"""Convert the ranges of a Lidar to a scan."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 
 def scan_of(ranges: NDArray[np.float32], within: tuple[float, float]) -> NDArray[np.float32]:
-    """Return the first layer of a Lidar's ranges in meters, within bounds, from the right counter-clockwise.
+    """Return the first layer of a Lidar's ranges in meters, clipped, counter-clockwise from the right.
 
-    A Lidar's rays go from left to right, and what it does not see is infinite.
+    A Lidar orders its rays from left to right, and a ray that hits nothing is infinite.
     """
     scan: NDArray[np.float32] = np.clip(ranges[0, ::-1], *within).astype(np.float32)
     return scan

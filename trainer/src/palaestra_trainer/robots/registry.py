@@ -19,7 +19,7 @@ def robot_class(name: str) -> type[SimulatedRobot]:
     """Return the class of a robot: one in `SHIPPED`, or a class of your own as `module:Class`.
 
     Raises:
-        ConfigurationError: there is no such class, or it is no robot that a simulator could have.
+        ConfigurationError: the class does not exist, or is not a complete `SimulatedRobot`.
     """
     if name not in SHIPPED and not user_imports.names_class(name):
         raise ConfigurationError(

@@ -36,9 +36,9 @@ _LEAST_VOLTS = 0.05  # below the sensor's range; keeps the power finite
 
 
 class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
-    """A Robotino in Webots, or in any simulator that speaks its interface.
+    """A Robotino in Webots, or in any simulator with the same ROS interface.
 
-    Cameras, laser scanner, gripper and forklift are optional: the world may lack them, and each costs nothing
+    Cameras, laser scanner, gripper and forklift are optional: the world may lack them, and each costs no time
     until it is used. The arguments are those of `SimulatedRobot`.
 
     Attributes:
@@ -82,7 +82,7 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self.simulation.add((*self._infrared, self._bumper), self._wheels)
 
     def distances(self) -> NDArray[np.float32]:
-        """Return meters to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
+        """Return meters to the nearest obstacle, shape (9,), counter-clockwise from forward."""
         volts = [sensor.value for sensor in self._infrared]
         if None in volts:
             raise self._no_reading()
@@ -111,12 +111,12 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
             self._use(self._depth_camera)
 
     def color_image(self) -> NDArray[np.uint8]:
-        """Return what the camera sees, shape (height, width, 3), RGB; a view until the next step."""
+        """Return the camera's image, shape (height, width, 3), RGB; a view, valid until the next step."""
         self._require_use(self._camera, "color camera", "use_cameras(color=True)")
         return self._camera.rgb
 
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel, shape (height, width); a view until the next step."""
+        """Return meters for each pixel, shape (height, width); a view, valid until the next step."""
         self._require_use(self._depth_camera, "depth camera", "use_cameras(depth=True)")
         return self._depth_camera.depths
 
@@ -125,14 +125,14 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
         self._use(self._laser)
 
     def scan(self) -> NDArray[np.float32]:
-        """Return meters, from the rightmost ray counter-clockwise; a new array."""
+        """Return meters, counter-clockwise from the rightmost ray; a new array."""
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:
             raise self._no_reading()
         return scan_of(self._laser.value, self.scan_range_m)
 
     def use_gripper(self) -> None:
-        """Take hold of the gripper's motors; the gripper closes."""
+        """Start to use the gripper's motors; the gripper closes."""
         self._use(*self._fingers)
 
     def grip(self, opening: float) -> None:
@@ -142,7 +142,7 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
             finger.set(self.grip_m * min(max(opening, 0.0), 1.0))
 
     def use_forklift(self) -> None:
-        """Take hold of the fork's motor; the fork goes down."""
+        """Start to use the fork's motor; the fork goes down."""
         self._use(self._fork)
 
     def lift(self, height_m: float) -> None:

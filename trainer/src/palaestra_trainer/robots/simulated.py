@@ -1,7 +1,7 @@
-"""A robot in Webots, or in any simulator that speaks its interface, and the scene around it.
+"""A robot in Webots, or in any simulator with the same ROS interface, and the scene around it.
 
-The names of a robot's devices and nodes are attributes of its class. So a robot with other names is a
-subclass of a few lines, and `trainer.robot` of a job names that class.
+The names of a robot's devices and nodes are attributes of its class. So a robot with other names needs only a
+subclass of a few lines, which `trainer.robot` of a job names.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ class SimulatedRobot(RobotAbc):
     Its constructor calls `equip`, where a subclass adds its devices.
 
     Args:
-        webots: the simulator. Each of its starts connects this robot, the newest of its name; if it runs
-            already, `connect` must be called.
+        webots: the simulator. Each of its starts connects this robot, unless a newer one has the same name.
+            If the simulator runs already, call `connect`.
         node_name: the ROS name that the world gives the robot; by default the robot is its own supervisor.
         definition: the DEF name of the robot in the world; by default that of its class.
         period_ms: simulated milliseconds in one `advance`; by default that of its class.
         robots: the ROS names of all robots in the world; they step together. By default robot and supervisor.
 
     Attributes:
-        definition: see above; "": no pose of it is read.
+        definition: see above; "": its pose is not read.
         period_ms: see above; a multiple of the world's basicTimeStep.
-        target: the DEF name of the mark that its scene moves to the target; None: the world needs none.
+        target: the DEF name of the mark that its scene moves to the target; None: the world needs no mark.
         node_name: the ROS name of the robot's controller, as it runs; for sensors and motors of your own.
     """
 
@@ -83,9 +83,9 @@ class SimulatedRobot(RobotAbc):
         return self.simulation.period_ms / 1000.0
 
     def connect(self) -> None:
-        """Enable the sensors and take hold of the motors; each start of the simulator does it by itself.
+        """Enable the sensors and release the motors; each start of the simulator calls this method.
 
-        To be called when it runs already as the robot is made, and after its world was loaded anew.
+        Call it yourself if the simulator already runs when the robot is created, and after a world reload.
 
         Raises:
             WorldMisfit: the world lacks the robot's node, or the robot a device of its class.
@@ -96,10 +96,10 @@ class SimulatedRobot(RobotAbc):
         self.simulation.connect()
 
     def advance(self) -> int:
-        """Simulate one control period; return how many extra ones it took, normally 0.
+        """Simulate one control period; return the number of extra periods, normally 0.
 
         Raises:
-            Paused: time stands; nothing was sent.
+            Paused: the simulation is paused; nothing was sent.
             SimulatorDead, SimulatorHung, WrongData: as `Stepper.step`.
         """
         return self.simulation.step()
@@ -109,7 +109,7 @@ class SimulatedRobot(RobotAbc):
         self.simulation.close()
 
     def _use(self, *parts: Sensor | Actuator) -> None:
-        """Take optional devices into use.
+        """Start to use optional devices.
 
         Raises:
             NoSuchSensor: the robot is connected and lacks one of them, or cannot enable it.
@@ -154,9 +154,9 @@ class SimulatedScene(Scene, JointScene):
         target: the DEF name of the mark on the floor; by default that of the robot's class.
 
     Attributes:
-        supervisor: changes what else there is in the world, such as fields of nodes.
-        observer: answers what the world is like.
-        resets: since the simulator was last started.
+        supervisor: changes other parts of the world, such as fields of nodes.
+        observer: reads the state of the world.
+        resets: number of resets since the simulator was last started.
     """
 
     def __init__(self, webots: Webots, robot: SimulatedRobot, target: str | None = None) -> None:
@@ -171,10 +171,10 @@ class SimulatedScene(Scene, JointScene):
             webots.at_start(f"mark {mark}", lambda: require_node(webots.observer, mark))
 
     def begin(self, seed: int) -> None:
-        """Reset the simulation: everything is at its first place and at rest.
+        """Reset the simulation: all objects are at their initial positions and at rest.
 
         Raises:
-            Paused: time stands; nothing was changed.
+            Paused: the simulation is paused; nothing was changed.
             SimulatorDead, SimulatorHung, WrongData
         """
         self.resets += 1
@@ -182,7 +182,7 @@ class SimulatedScene(Scene, JointScene):
         self._robot.simulation.reset(seed)
 
     def layout(self) -> FloorLayout:
-        """Return the floor, and what stands on it now; see `webots.surroundings` for what is seen.
+        """Return the floor and the objects on it now; `webots.obstacles` describes which objects are read.
 
         Raises:
             WorldMisfit: the world has no floor.
@@ -198,11 +198,11 @@ class SimulatedScene(Scene, JointScene):
         return FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
 
     def place(self, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); fresh readings.
+        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); update all readings.
 
         Raises:
             MissingCapability: the robot's class has no DEF name.
-            Paused: time stands.
+            Paused: the simulation is paused.
             SimulatorDead, SimulatorHung
             WrongData: also when the world lacks the robot's node or the mark's.
         """
@@ -215,7 +215,7 @@ class SimulatedScene(Scene, JointScene):
         self._robot.advance()
 
     def mark(self, target: Point) -> None:
-        """Put the mark, if there is one, at `target` (x, y in meters) with the next period.
+        """Put the mark, if the world has one, at `target` (x, y in meters) with the next period.
 
         Raises:
             SimulatorDead, SimulatorHung
@@ -235,7 +235,7 @@ class SimulatedScene(Scene, JointScene):
         self._put[name] = place
 
     def set_joint(self, name: str, position: float) -> None:
-        """Put the joint with DEF `name` to radians or meters, at rest; `begin` undoes it.
+        """Move the joint with DEF `name` to radians or meters, at rest; `begin` undoes it.
 
         Raises:
             SimulatorDead, SimulatorHung
@@ -245,7 +245,7 @@ class SimulatedScene(Scene, JointScene):
 
 
 def _obstacles(thing: Thing) -> list[Obstacle]:
-    """Return the shapes of a thing as obstacles."""
+    """Return the shapes of an object as obstacles."""
     c, s = math.cos(thing.heading_rad), math.sin(thing.heading_rad)
     found = []
     for shape in thing.shapes:

@@ -15,10 +15,10 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """The master at ROS_MASTER_URI, called in the name of `caller`.
+    """The master at ROS_MASTER_URI, called with the node name `caller`.
 
-    Every method but `ping` raises MasterLost if no master answers or it refuses, and UnreadableAnswer if its
-    answer cannot be read.
+    Every method but `ping` raises MasterLost if no master responds or the master refuses the request, and
+    UnreadableAnswer if its response is invalid.
     """
 
     def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:
@@ -27,10 +27,10 @@ class Master:
         self._timeout_s = timeout_s
 
     def ping(self) -> None:
-        """Return if the master answers.
+        """Check that the master responds.
 
         Raises:
-            MasterLost: it does not, or another program answers.
+            MasterLost: it does not respond, or another program does.
         """
         try:
             self._call("getPid")

@@ -20,7 +20,7 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
         name: the node's name; a number is added so that several programs may share a master.
 
     Raises:
-        MasterLost: no master answers; rospy alone would wait forever.
+        MasterLost: no master responds; rospy alone would wait forever.
     """
     with _lock:
         if not rospy.core.is_initialized():
@@ -33,5 +33,5 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
 
 
 def node_uri() -> str:
-    """Return the URI at which this process's node answers other nodes."""
+    """Return the URI at which this process's node receives requests of other nodes."""
     return str(rospy.core.get_node_uri())

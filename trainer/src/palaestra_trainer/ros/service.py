@@ -22,7 +22,7 @@ class RosService:
     Args:
         name: the full name, e.g. /robotino/robot/time_step
         type_name: e.g. webots_ros/set_int
-        deadline_s: the longest wait for an answer.
+        deadline_s: the longest wait for a response.
     """
 
     __slots__ = ("_deadline_s", "_type", "_wire", "name", "simulator")
@@ -39,14 +39,14 @@ class RosService:
 
         Raises:
             SimulatorDead: no node serves it, or the connection broke.
-            SimulatorHung: no answer within the deadline.
-            WrongData: the service failed, or its answer cannot be read.
+            SimulatorHung: no response arrived within the deadline.
+            WrongData: the service failed, or its response is invalid.
         """
         self.begin(**fields)
         return self.finish()
 
     def begin(self, **fields: Any) -> None:
-        """Send a request; exactly one `finish` must follow before the next.
+        """Send a request; call `finish` exactly once before the next `begin`.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as a call.
@@ -54,7 +54,7 @@ class RosService:
         data = self._type.request.frame(fields)
         try:
             (self._wire or self._connect()).send(data)
-        except BaseException:  # a Ctrl-C too: the next answer would be this request's
+        except BaseException:  # also Ctrl-C: the next call would read the response to this request
             self.close()
             raise
 
@@ -67,7 +67,7 @@ class RosService:
         wire = self._asked()
         try:
             return self._read_answer(wire)
-        except BaseException:  # a Ctrl-C too: the next answer would be this request's
+        except BaseException:  # also Ctrl-C: the next call would read the response to this request
             self.close()
             raise
 
@@ -75,7 +75,7 @@ class RosService:
         """Return the descriptor that is readable once the response arrives or the connection breaks.
 
         Raises:
-            SimulatorDead: there was no `begin`.
+            SimulatorDead: no request was sent by `begin`.
         """
         return self._asked().fileno()
 
@@ -123,15 +123,15 @@ class RosService:
 def call_together(
     calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[RosService], None] | None = None
 ) -> list[Any]:
-    """Return the responses of calls that are all sent before the first answer is awaited.
+    """Send all requests before the first wait, then return all responses.
 
     Args:
         calls: services and the fields of their requests.
-        meanwhile: called before the answers are awaited, with the service that answers last.
+        meanwhile: called before the wait for responses, with the service of the last request.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the connections of the
-            others are closed, because their answers would be taken for those of later requests.
+            others are closed, because later requests would read their responses.
     """
     sent: list[RosService] = []
     try:
@@ -141,7 +141,7 @@ def call_together(
         if meanwhile is not None and sent:
             meanwhile(sent[-1])
         return [service.finish() for service in sent]
-    except BaseException:  # a Ctrl-C too
+    except BaseException:  # also Ctrl-C
         for service in sent:
             service.close()
         raise

@@ -58,12 +58,12 @@ class RosSubscriber:
         return self._wire is not None
 
     def connect(self) -> None:
-        """Connect to the publisher; it sees this subscriber when `connect` returns.
+        """Connect to the publisher; it knows this subscriber when `connect` returns.
 
         Raises:
             SimulatorDead: no node publishes the topic, or the publisher cannot be reached.
-            SimulatorHung: the publisher does not answer in time.
-            WrongData: the master or the publisher sends an invalid answer.
+            SimulatorHung: the publisher does not respond in time.
+            WrongData: the master or the publisher sends an invalid response.
         """
         self._drop()
         node = ensure_node()
@@ -107,7 +107,7 @@ class RosSubscriber:
             raise WrongData(self.simulator, f"{self.name} sent {error}") from error
 
     def newest(self, default: Any) -> Any:
-        """Return the value of the last message that has arrived; `default` if there is none.
+        """Return the value of the last message that has arrived; `default` if no message has.
 
         Raises:
             SimulatorDead, WrongData: as `next`.
@@ -122,7 +122,7 @@ class RosSubscriber:
         self._drop()
         if self._registered:
             self._registered = False
-            # A lost master has no registration any more; one that sends garbage takes no request.
+            # A lost master has lost the registration too; a master that sends garbage cannot unregister.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 

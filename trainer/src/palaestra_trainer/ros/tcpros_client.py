@@ -1,6 +1,6 @@
 """One persistent TCPROS connection of a client, with a deadline on every wait.
 
-The kernel enforces the deadlines (SO_RCVTIMEO). That needs one system call per read; a selector or Python's
+The kernel enforces the deadlines (SO_RCVTIMEO), which needs one system call per read. A selector or Python's
 own timeout would need two.
 """
 
@@ -20,9 +20,9 @@ from palaestra_trainer.waiting.wait_time import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
-_MOST_KEPT_BYTES = 4 << 20  # large enough for images, which arrive at each step, to reuse the buffer
+_MOST_KEPT_BYTES = 4 << 20  # large enough to reuse the buffer for images, which arrive at each step
 
-# A wake-up costs a virtual machine 30 us, more than a stub needs for its answer. So if the last wait was
+# A wake-up costs 30 us on a virtual machine, more than a stub needs for its response. So if the last wait was
 # short, the next one first polls a few times and yields the processor in between.
 _QUICK_S = 200e-6
 _LOOKS = 30
@@ -40,7 +40,7 @@ class TcprosClient:
     Raises:
         SimulatorDead: the connection was refused or closed.
         SimulatorHung: the handshake did not end in time.
-        WrongData: the peer serves something else under that name.
+        WrongData: the peer refused the header or sent an invalid one.
     """
 
     __slots__ = ("_buffer", "_deadline_s", "_filled", "_quick", "_simulator", "_socket", "_view")
@@ -83,7 +83,7 @@ class TcprosClient:
             raise self._fault("does not take requests", error) from error
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
-        """Return the next frame, with the `ahead` bytes before its length; valid until the next call.
+        """Return the next frame, with the `ahead` bytes before its length; it is valid until the next call.
 
         Raises:
             SimulatorDead, SimulatorHung: see the class.
@@ -91,7 +91,7 @@ class TcprosClient:
         """
         if self._quick and not self._filled:
             # Nearly always exactly one whole frame has arrived. `recv` reuses a small block that is still
-            # in the processor's cache; a buffer per connection would not be.
+            # in the processor's cache; a buffer per connection would not be in that cache.
             try:
                 data = self._socket.recv(sockets.FIRST_BYTES, socket.MSG_DONTWAIT)
             except OSError:
@@ -116,14 +116,15 @@ class TcprosClient:
             give_up = give_up or time.monotonic() + self._deadline_s
 
     def acknowledge_late(self) -> None:
-        """Let the kernel acknowledge two messages with one packet; a packet for each costs half of its read.
+        """Let the kernel acknowledge two messages with one packet.
 
-        Use it only for a peer with TCP_NODELAY: others wait for each acknowledgment before the next message.
+        A packet for each message costs half as much as reading it. Use this only for a peer with TCP_NODELAY:
+        other peers wait for each acknowledgment before the next message.
         """
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 0)
 
     def waiting_bytes(self) -> bool:
-        """Return whether unread bytes have arrived; a closed connection counts."""
+        """Return whether unread bytes have arrived, or the connection is closed."""
         if self._filled:
             return True
         try:
@@ -165,7 +166,7 @@ class TcprosClient:
         return frame if ahead else frame[LENGTH.size :]
 
     def _make_room(self, end: int) -> None:
-        """Make room for as many bytes as have arrived; the announced length may be wrong until then."""
+        """Enlarge a full buffer at most to twice its size, because the announced length may be wrong."""
         if self._filled == len(self._buffer):
             larger = bytearray(min(2 * self._filled, end + _BUFFER_BYTES))
             larger[: self._filled] = self._view
@@ -187,7 +188,7 @@ class TcprosClient:
         self._filled += count
 
     def _spin(self, room: memoryview) -> int | None:
-        """Return how many bytes arrived during polling; None: it takes longer."""
+        """Return the number of bytes that arrived during polling; None if none arrived."""
         for _ in range(_LOOKS):
             try:
                 return self._socket.recv_into(room, 0, socket.MSG_DONTWAIT)
@@ -196,7 +197,7 @@ class TcprosClient:
         return None
 
     def _sleep(self, room: memoryview) -> int:
-        """Return how many bytes arrived during a wait in the kernel."""
+        """Return the number of bytes that arrived during a wait in the kernel."""
         began = time.perf_counter()
         count = self._socket.recv_into(room, 0, socket.MSG_DONTWAIT if shutdown_deadline.is_over() else 0)
         self._quick = time.perf_counter() - began < _QUICK_S

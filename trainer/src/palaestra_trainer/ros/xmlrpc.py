@@ -1,7 +1,7 @@
-"""One XML-RPC call of the ROS master or of a node, with a deadline and a checked answer.
+"""One XML-RPC call to the ROS master or to a node, with a deadline and a checked response.
 
-rosgraph's own client would wait forever. The peer may send any bytes. For bytes that are no answer, Python's
-reader raises errors of many kinds, and all of them become `UnreadableAnswer` here.
+rosgraph's own client would wait forever. The peer may send any bytes. If they are not a response, Python's
+parser raises errors of many types, and this module converts all of them to `UnreadableAnswer`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ OK = 1
 
 
 class RpcResponse(NamedTuple):
-    """The answer of every ROS call: 1 for success, a text for people, a value."""
+    """The response to a ROS call: 1 for success, a text for people, a value."""
 
     code: int
     text: str
@@ -33,15 +33,15 @@ class _Deadline(xmlrpc.client.Transport):
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         """Return a connection whose reads and writes end in time."""
         connection = http.client.HTTPConnection(host, timeout=self._timeout_s)
-        self._connection = host, connection  # where the base class looks for what to close
+        self._connection = host, connection  # the base class closes the connection in this attribute
         return connection
 
 
 def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcResponse:
-    """Return the answer of the server at `uri`.
+    """Return the response of the server at `uri`.
 
     Raises:
-        OSError: it cannot be reached; TimeoutError: it does not answer in time.
+        OSError: the server cannot be reached; a TimeoutError if it does not respond in time.
         UnreadableAnswer: it sent an invalid ROS response.
     """
     try:

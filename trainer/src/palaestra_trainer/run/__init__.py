@@ -1,1 +1,1 @@
-"""One attempt of a run: trains, evaluates, saves, rejoins after a restart, and ends with an exit code."""
+"""One attempt of a run: trains, evaluates, saves, resumes after a restart, and ends with an exit code."""

@@ -1,6 +1,6 @@
 """One attempt of a run, from a configuration to an exit code.
 
-Errors that need no simulator to be found are found before a simulator starts.
+Errors that can be found without a simulator are reported before a simulator starts.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
-_FAR_BEYOND = 1.5  # times the steps of the job; a last rollout usually goes a little beyond
-STOPPED_S = 60.0  # for closing environments and stopping simulators
-# Code of the job's author may end the program, as by sys.exit.
+_FAR_BEYOND = 1.5  # times the steps of the job; the last rollout usually exceeds them a little
+STOPPED_S = 60.0  # the most time for closing environments and stopping simulators
+# Code of the job's author may end the program, for example by sys.exit.
 ENDING = (Exception, SystemExit, KeyboardInterrupt, GeneratorExit)
 
 
@@ -76,7 +76,7 @@ class AttemptDependencies:
     Attributes:
         make_members: creates the simulators of a configuration, not yet started.
         display: shows the progress of the run.
-        must_resume: never begin a new run.
+        must_resume: whether a new run must not begin.
         environment: the environment variables of the process.
     """
 
@@ -97,7 +97,7 @@ def run(
     """Train until done and return the exit code; resume if the directory has a checkpoint.
 
     If the run is finished, its result is reported and training is not repeated. Call it in the main thread,
-    where signals arrive. With `must_resume` it never begins a new run.
+    which receives the signals. With `must_resume` it never begins a new run.
     """
     around = AttemptDependencies(
         make_members=make_members,
@@ -122,7 +122,7 @@ def run(
 
 
 def _reported(end: End, attempt: Attempt) -> int:
-    """Log how an attempt ended, write its termination message, and return its exit code."""
+    """Log the end of an attempt, write its termination message, and return its exit code."""
     for line in end.message.splitlines():
         log.log(logging.INFO if end.code == ExitCode.DONE else logging.ERROR, line, reason=end.reason)
     write_last_word(attempt.last_word(end))
@@ -161,10 +161,10 @@ class Attempt:
         self._callbacks = JobCallbacks([])
 
     def play(self) -> End:
-        """Train, and return how the run ended. It always stops everything that it started.
+        """Train, stop everything that was started, and return the end of the run.
 
-        The first cause decides: an error while everything is stopped is logged, and changes nothing. If that
-        takes too long, the process ends.
+        The first cause decides: a later error during the stop is only logged. If the stop takes too long, the
+        process ends.
         """
         with ExitStack() as stack:
             end = self._trained(stack)
@@ -180,9 +180,9 @@ class Attempt:
     def _trained(self, stack: ExitStack) -> End:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
-            with self._watchdog():  # it ends before everything is stopped, which has a time of its own
+            with self._watchdog():  # it does not watch the stop, which has its own deadline
                 learned = self._train(*self._prepare(stack))
-        except ENDING as error:  # the edge of the process: every end has an exit code
+        except ENDING as error:  # this is the edge of the process, and every end has an exit code
             return _logged(error)
         return DONE if learned else NOTHING_LEARNED
 
@@ -213,7 +213,7 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts: Prometheus takes a jump of a counter for growth
+        self._take_over(found)  # before the server starts, as Prometheus reads a later jump as an increase
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
         stack.enter_context(self._around.display)
@@ -241,7 +241,7 @@ class Attempt:
     def _make_model(
         self, fleet: Fleet, interruption: Interruption, stack: ExitStack, found: SavedCheckpoint | None
     ) -> Learning:
-        """Return a new model with its environment; no simulator has to be up."""
+        """Return a new model with its environment; the simulators need not be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
         task = fleet.collecting[0].member.env
@@ -281,7 +281,7 @@ class Attempt:
         return found
 
     def _of_another_run(self) -> SavedCheckpoint | None:
-        """Return the newest checkpoint of the run in `resumeFrom`; None: the run has its own checkpoint."""
+        """Return the newest checkpoint of the run in `resumeFrom`; None: the field is not set."""
         another = self._configuration.resume_from
         if another is None:
             return None
@@ -291,7 +291,7 @@ class Attempt:
         return found
 
     def _train(self, run: RunContext, learning: Learning, found: SavedCheckpoint | None) -> bool:
-        """Train to the end; return whether the policy was updated, as far as its algorithm counts it."""
+        """Train to the end; return whether the policy was updated, or True for an algorithm of the user."""
         env, model = learning
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
@@ -304,13 +304,13 @@ class Attempt:
         return self._algorithm.name not in algorithms.ALGORITHMS or conductor.updates_so_far() > 0
 
     def _tell_if_it_took_longer(self) -> None:
-        """Log when an update that waits for whole episodes took the run far beyond its steps."""
+        """Log a warning if the run took many more steps, because an update waited for whole episodes."""
         wanted, taken = self._configuration.steps, self._progress.step
         if taken > _FAR_BEYOND * wanted:
             log.warning("the run took more steps, because an update is due later", wanted=wanted, taken=taken)
 
     def _forget_what_is_played_again(self) -> None:
-        """Remove evaluations and curves after the resumed step, which a previous attempt wrote."""
+        """Remove the evaluations and curves that a previous attempt wrote after the resumed step."""
         step, curves = self._progress.step, self._directory.tensorboard
         forget_after(self._directory, step)
         if curves.exists():
@@ -330,7 +330,7 @@ class Attempt:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
-        self._directory.summary.unlink(missing_ok=True)  # that of a run which is now prolonged
+        self._directory.summary.unlink(missing_ok=True)  # a finished run may continue with more steps
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)
@@ -372,7 +372,7 @@ class Attempt:
             conductor.save()
             raise
         except ValueError:
-            # PyTorch's distributions raise a ValueError for NaN; report divergence instead.
+            # PyTorch's distributions raise a ValueError for NaN; the check reports divergence instead.
             Learner(model).check(model.num_timesteps)
             raise
 

@@ -2,8 +2,8 @@
 
 The best of many evaluations on the same few episodes looks better than it is. So does the first evaluation
 that reaches a goal. Therefore both are confirmed: evaluated once more, on episodes of another stream. Each
-confirmation plays the next episodes of that stream; otherwise, after many confirmations, the stream itself
-would select a policy.
+confirmation plays the next episodes of that stream; if many confirmations played the same episodes, these
+would select the policy.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Best:
     Attributes:
         step: valid environment steps that the policy had learned from.
         success_rate: 0 to 1; None: the environment reports no success.
-        mean_return: of the evaluation's episodes.
+        mean_return: mean return of the evaluation's episodes.
     """
 
     step: int
@@ -73,7 +73,7 @@ class Selection:
     """Evaluates the model of a run, keeps the best policy in model.zip, and confirms its success rate.
 
     Args:
-        run: its evaluating simulators play; its collecting ones are paused meanwhile.
+        run: the run; its evaluating simulators play while its collecting ones are paused.
         model: the model to evaluate; its logger must be set.
     """
 
@@ -91,11 +91,12 @@ class Selection:
     def evaluate(self, step: int) -> None:
         """Evaluate the current policy, and keep it if it is the best so far; `step` is the current step.
 
-        The evaluation's line is written last. So an evaluation is repeated if it or its confirmation is cut.
+        The evaluation's line is written last. So an evaluation is repeated if it or its confirmation is
+        interrupted.
 
         Raises:
             Enough: the goal of the run is reached, and confirmed unless that is turned off.
-            ConfigurationError: there is a goal, and the environment reports no success.
+            ConfigurationError: the run has a goal, but the environment reports no success.
             Interrupted: a signal has arrived.
         """
         wanted = self._run.configuration.evaluation
@@ -112,14 +113,14 @@ class Selection:
     def recycle_resting(self) -> None:
         """Begin to recycle the evaluating simulators that are due before the next evaluation ends.
 
-        They come up while the others collect.
+        They restart while the others collect.
         """
-        keepers = [keeper for keeper in self._run.fleet.evaluating if not keeper.lost]
-        for keeper in keepers:
-            keeper.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(keepers)))
+        restarters = [restarter for restarter in self._run.fleet.evaluating if not restarter.lost]
+        for restarter in restarters:
+            restarter.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(restarters)))
 
     def finish(self, step: int) -> None:
-        """Confirm the best policy at the end of training; without evaluations save the last policy.
+        """Confirm the best policy at the end of training; without evaluations, save the last policy.
 
         Raises:
             Interrupted: a signal has arrived.
@@ -193,7 +194,7 @@ class Selection:
 
     @contextmanager
     def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:
-        """Load the policy of model.zip into the model inside; its checkpoint may be written after."""
+        """Load the policy of model.zip into the model inside the context; restore the model at its end."""
         if best.step == step:
             yield
             return
@@ -209,7 +210,7 @@ class Selection:
 
 
 def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation of the policy in model.zip; None: it has none.
+    """Return the evaluation of the policy in model.zip; None: model.zip is missing, or was not evaluated.
 
     A model.zip of a release up to a5276f3 does not hold it; then it is the best line of evaluations.jsonl.
     """
@@ -223,15 +224,15 @@ def best_of(directory: RunDirectory) -> Best | None:
 
 
 def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None:
-    """Return the confirmation of the policy of `step`; None: it was not confirmed."""
+    """Return the confirmation of the policy of `step`; None: that policy was not confirmed."""
     found = (line for line in read_lines(directory.confirmations) if line["step"] == step)
     return next(found, None)
 
 
 def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 if there is none.
+    """Return the step of the last evaluation up to `step`; 0 before the first.
 
-    An evaluation that was due but cut is not in the file, so a resumed attempt repeats it.
+    An evaluation that was interrupted is not in the file, so a resumed attempt repeats it.
     """
     steps = (int(line["step"]) for line in read_lines(directory.evaluations))
     return max((each for each in steps if each <= step), default=0)

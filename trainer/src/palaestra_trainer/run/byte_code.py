@@ -1,9 +1,9 @@
-"""Values of a model.zip that hold byte code, which another Python than the one that wrote it cannot run.
+"""Values of a model.zip that hold byte code, which only the version of Python that wrote it can run.
 
-Stable-Baselines3 pickles each value that JSON cannot write. A function or class without a name that can be
-imported is stored as byte code. Executed by another Python, it raises SystemError or ends the process.
-This release stores names and numbers only. Earlier ones stored schedules and the small network as byte code,
-and a class of a job's author may still be one that nobody can import by its name.
+Stable-Baselines3 pickles each value that JSON cannot write. A function or class that cannot be imported by
+name is stored as byte code. If another Python executes it, it raises SystemError or ends the process.
+This release stores only names and numbers. Earlier ones stored schedules and the small network as byte code,
+and a class of a job's author may still be one that cannot be imported by name.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from typing import Any
 
 from palaestra_trainer.errors import ConfigurationError
 
-# Attributes of models that are schedules. An update needs them, an action does not.
+# These attributes of models are schedules. An update needs them, an action does not.
 SCHEDULES = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf", "exploration_schedule")
 _SERIALIZED = ":serialized:"
-_PICKLER = "cloudpickle"  # its own functions are named in a pickle only to make functions and classes
+_PICKLER = "cloudpickle"  # a pickle names functions of cloudpickle only if it creates functions or classes
 
 
 def replacements(model: Path, hyperparameters: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
-    """Return values for Stable-Baselines3 to take instead of those that this Python cannot run, by name.
+    """Return replacements, by name, for values in a model.zip that this Python cannot run.
 
     Args:
         model: the file.
-        hyperparameters: returns the arguments that the run gave the class; schedules are taken from there.
+        hyperparameters: returns the arguments that the run gave the class; they contain the schedules.
 
     Raises:
-        ConfigurationError: another Python wrote byte code that is no schedule.
+        ConfigurationError: another Python wrote byte code that is not a schedule.
     """
     with zipfile.ZipFile(model) as archive:
         written_by = _python(archive)
@@ -45,7 +45,7 @@ def replacements(model: Path, hyperparameters: Callable[[], Mapping[str, Any]]) 
             f"{_this_python()}; use Python {written_by}, or export the policy there"
         )
     given = hyperparameters() if coded else {}
-    return {name: given.get(name) for name in coded}  # the model makes the rest of these arguments
+    return {name: given.get(name) for name in coded}  # the model derives the others from its arguments
 
 
 def _this_python() -> str:
@@ -53,7 +53,7 @@ def _this_python() -> str:
 
 
 def _python(archive: zipfile.ZipFile) -> str:
-    """Return the version of Python that wrote a file, as Stable-Baselines3 noted it; "" if it did not."""
+    """Return the version of Python that wrote a file, as Stable-Baselines3 stored it; "" if it is missing."""
     name = "system_info.txt"
     text = archive.read(name).decode() if name in archive.namelist() else ""
     found = re.search(r"Python: (\d+\.\d+)", text)
@@ -70,6 +70,6 @@ def _with_code(archive: zipfile.ZipFile) -> list[str]:
 
 
 def _is_code(pickled: bytes) -> bool:
-    """Return whether a pickle makes a function or class; nothing is unpickled."""
+    """Return whether a pickle creates a function or class; nothing is unpickled."""
     texts = (argument for _, argument, _ in pickletools.genops(pickled) if isinstance(argument, str))
     return any(text.partition(".")[0] == _PICKLER for text in texts)

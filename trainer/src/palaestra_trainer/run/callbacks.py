@@ -1,8 +1,8 @@
-"""The callbacks of a job: Stable-Baselines3 callbacks of its author, beside the conductor.
+"""The callbacks of a job: Stable-Baselines3 callbacks of its author, in addition to `TrainingCallback`.
 
-A mistake in their list is found before a simulator starts. They are called after the conductor, in the order
-of the job. An exception of a callback ends the run with an error that names the callback. No state of a
-callback is saved, since that would need pickling: each attempt creates the callbacks anew.
+A mistake in their list is found before a simulator starts. They are called after `TrainingCallback`, in the
+order of the job. An exception of a callback ends the run with an error that names the callback. The state of
+a callback is not saved, because that would need pickling: each attempt creates new callbacks.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from palaestra_trainer.kwargs_check import AcceptedArguments
 log = structlog.get_logger(__name__)
 
 FIELD = "algorithm.callbacks"
-# Callbacks of Stable-Baselines3 that need an EvalCallback, and the fields of a job for their work.
+# These callbacks of Stable-Baselines3 evaluate or need an EvalCallback; fields of a job replace them.
 _OF_EVALUATION: Mapping[type[BaseCallback], str] = {
     EvalCallback: "a run evaluates on simulators of its own; set trainer.evaluation",
     StopTrainingOnRewardThreshold: "a run ends at a success rate; set trainer.evaluation.stopAtSuccessRate",
@@ -40,10 +40,11 @@ _CHECKPOINTS = "a run saves checkpoints without it; set trainer.checkpoint.every
 
 
 def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
-    """Return the callbacks of a job, which are new.
+    """Create the callbacks of a job.
 
     Raises:
-        ConfigurationError: one line for each that cannot be imported, is no callback, or refuses its options.
+        ConfigurationError: one line for each that cannot be imported, is not a callback, or refuses its
+            options.
     """
     mistakes: list[str] = []
     made: list[_Named] = []
@@ -60,13 +61,13 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
 
 
 class JobCallbacks(CallbackList):
-    """The callbacks of a job as one.
+    """The callbacks of a job as one callback.
 
-    Their `_on_training_end` is called by `end`, after the last evaluation and checkpoint, not at the end of
-    `learn`. So a callback sees every scalar that is logged, and also the end of an interrupted attempt.
+    `end` calls their `_on_training_end`, after the last evaluation and checkpoint, not at the end of `learn`.
+    So a callback gets every scalar that is logged, and also the end of an interrupted attempt.
 
     Attributes:
-        stopped_by: name of the callback that ended training by returning False; None: none did.
+        stopped_by: name of the callback that ended training by returning False; None: no callback did.
     """
 
     def __init__(self, callbacks: Sequence[_Named]) -> None:
@@ -83,7 +84,7 @@ class JobCallbacks(CallbackList):
         """Call `_on_training_end` of each callback, if training has begun.
 
         Raises:
-            TrainerError: the first error of a callback. The others were called too; their errors are logged.
+            TrainerError: the first error of a callback. All others are called too; their errors are logged.
         """
         failed = self._end_each()
         _log(failed[1:])
@@ -91,7 +92,7 @@ class JobCallbacks(CallbackList):
             raise failed[0]
 
     def end_after_error(self) -> None:
-        """Do the same after an error, which a failure of a callback must not hide: each is logged."""
+        """Do the same after another error; only log errors of callbacks, so that they do not hide it."""
         _log(self._end_each())
 
     def _end_each(self) -> Sequence[TrainerError]:
@@ -109,7 +110,7 @@ class JobCallbacks(CallbackList):
         super()._on_training_start()
 
     def _on_training_end(self) -> None:
-        """Do nothing: `end` calls the callbacks."""
+        """Do nothing, because `end` calls the callbacks."""
 
 
 class _Named(CallbackList):
@@ -160,8 +161,8 @@ def _naming(name: str) -> Iterator[None]:
     try:
         yield
     except TrainerError:
-        raise  # a fault, a signal: not the callback's
-    except (Exception, SystemExit) as error:  # whatever code of the job's author raises
+        raise  # such as a fault or a signal, which the callback did not cause
+    except (Exception, SystemExit) as error:  # code of the job's author may raise anything
         raise CallbackFailed(f"callback {name}: raised {fact_of(error)}") from error
 
 

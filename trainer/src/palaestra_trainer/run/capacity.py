@@ -1,7 +1,8 @@
-"""The memory and the disk that a run may use, and refusing a replay buffer that does not fit.
+"""The memory and disk space that a run may use, and a check that its replay buffer fits.
 
-A container's memory limit is its control group's, so `limits.memory` of a job need not be passed on. Without
-a limit, the machine's available memory counts. A volume's free space is what the file system reports.
+A container's memory limit is that of its control group, so `limits.memory` of a job need not be passed to
+the trainer. Without a limit, the machine's available memory counts. The file system reports the free space of
+a volume.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from palaestra_trainer.configuration import Checkpoint
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
 
-# For an update with its batches, evaluations, and the write of a checkpoint: by far more than they need here.
+# The reserve is for an update with its batches, evaluations, and the write of a checkpoint. It is far more
+# than they need.
 RESERVE_BYTES = 128 << 20
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 _KIB = 1024
@@ -25,12 +27,12 @@ _GB = 10**9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capacity:
-    """The room that a replay buffer has.
+    """The space that is available for a replay buffer.
 
     Attributes:
         memory_bytes: memory that this process may still allocate; None: unknown.
         memory_limit: whether a limit of the container, or of another control group, determines it.
-        disk_bytes: room for checkpoints on the volume of the run directory, with those that are there.
+        disk_bytes: space for checkpoints on the volume of the run directory, including existing ones.
     """
 
     memory_bytes: int | None
@@ -41,12 +43,12 @@ class Capacity:
 def capacity_now(
     directory: RunDirectory, *, groups: Path = CONTROL_GROUPS, processes: Path = Path("/proc")
 ) -> Capacity:
-    """Return the room that there is now.
+    """Return the space that is available now.
 
     Args:
-        directory: of the run; it exists.
-        groups: where the control groups are mounted.
-        processes: where the kernel reports memory, and the control group of this process.
+        directory: the run directory; it exists.
+        groups: the folder where the control groups are mounted.
+        processes: the folder where the kernel reports memory, and the control group of this process.
     """
     machine = _available(processes / "meminfo")
     limited = min(_left_in_groups(groups, processes / "self" / "cgroup"), default=None)
@@ -59,10 +61,10 @@ def capacity_now(
 
 
 def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capacity: Capacity) -> None:
-    """Return if the replay buffer fits into memory and its checkpoints on the volume.
+    """Check that the replay buffer fits into memory, and its checkpoints on the volume.
 
     Raises:
-        ConfigurationError: they do not; with both numbers, and the largest buffer that fits.
+        ConfigurationError: they do not fit; the message has both numbers and the largest buffer that fits.
     """
     if replay is None:
         return
@@ -87,7 +89,7 @@ def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capa
 
 
 def _available(meminfo: Path) -> int | None:
-    """Return the memory that the machine can still give, which is reported in KiB; None: unknown."""
+    """Return the available memory of the machine in bytes; None: unknown."""
     for name, value in _pairs(meminfo):
         if name == "MemAvailable:":
             return value * _KIB
@@ -95,9 +97,9 @@ def _available(meminfo: Path) -> int | None:
 
 
 def _left_in_groups(groups: Path, own: Path) -> Iterator[int]:
-    """Yield the room below the memory limit of each control group that this process is in.
+    """Yield the free memory below the limit of each control group that this process is in.
 
-    Memory that caches files is not counted as used, because the kernel frees it first.
+    The file cache does not count as used, because the kernel frees it first.
     """
     for line in _lines(own):
         _, controllers, path = line.split(":", 2)
@@ -128,7 +130,7 @@ def _pairs(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def _number(path: Path) -> int | None:
-    """Return the number in a file; None: there is no file, or no limit."""
+    """Return the number in a file; None: the file is missing, or holds no number because no limit is set."""
     lines = _lines(path)
     return int(lines[0]) if lines and lines[0].isdigit() else None
 
@@ -141,7 +143,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _size(folder: Path) -> int:
-    """Return the size of all files in a folder; several names of one file count once."""
+    """Return the size of all files in a folder; hard links to one file count once."""
     found = (path.lstat() for path in folder.rglob("*") if path.is_file())
     return sum({entry.st_ino: entry.st_size for entry in found}.values())
 

@@ -1,6 +1,6 @@
 """Reports of a user's own training program (`trainer.command`), for /status, /metrics and the operator.
 
-The built-in loop reports by itself. Without reports the operator does not see a program's steps. It then
+The built-in loop reports by itself. Without reports the operator does not know a program's steps. It then
 cannot detect progress between preempted attempts, and ends the replica as `NoProgress`.
 """
 
@@ -25,28 +25,28 @@ from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.status_server import status_server
 
 _lock = threading.Lock()
-_EVALUATING_S = 60.0  # no step of an environment takes longer
+_EVALUATING_S = 60.0  # a step of an environment does not take longer
 
 
 class ProgramReport(Progress):
-    """The progress of a user's own program; how it spends its time is unknown.
+    """The progress of a user's own program; its time by cause is unknown.
 
-    Its step is the one that the program reports. Before its first report, it is the number of steps of its
-    tolerant environments in this attempt.
+    Its step is the one that the program reports. Before the first report, it is the number of steps of its
+    fault-tolerant environments in this attempt.
     """
 
     _reports = _evaluates = False
 
     @property
     def phase(self) -> str:
-        """Training, or evaluating if the last step was of an evaluating environment and is not long ago.
+        """The phase: evaluating if the last step was recent and of an evaluating environment, else training.
 
-        The operator takes no evaluation for training that stands still.
+        So the operator does not mistake an evaluation for stalled training.
         """
         return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Ignore it: any thread of the program may wait for simulators."""
+        """Ignore it, because any thread of the program may wait for simulators."""
         del cause
         return nullcontext()
 
@@ -55,7 +55,7 @@ class ProgramReport(Progress):
         return replace(super().counted(kept), goodput={})
 
     def reports(self, step: int, success_rate: float | None) -> None:
-        """Set the step, and the success rate if there is one, as the program reports them."""
+        """Set the step, and the success rate if the program reports one."""
         self._reports, self.step = True, step
         self.stepped(1)
         if success_rate is not None:
@@ -88,9 +88,9 @@ def report(step: int, success_rate: float | None) -> None:
 
 
 def reported(configuration: Configuration) -> ProgramReport:
-    """Return the progress that environments of this process count in.
+    """Return the progress in which environments of this process count their steps.
 
-    Worker processes of a program count for themselves, and /status does not show it.
+    Each worker process of a program counts separately, and /status does not show these counts.
     """
     if multiprocessing.parent_process() is None:
         with _lock:

@@ -1,7 +1,8 @@
-"""Look at a run directory before anything is started, written or deleted.
+"""Check a run directory before anything is started, written or deleted.
 
-A disk, a copy or a person may have damaged any file. A run that went on would end in a traceback hours later,
-or would lose without a word what the file held. `journal.json` may be lost, and is not looked at.
+A disk, a copy or a person may have damaged any file. Without the check, a run would end in a traceback hours
+later, or would lose the content of the file without a message. `journal.json` is not checked, because a run
+does not need it.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class _Summary(_Content):
 
 
 def inspect(directory: RunDirectory) -> None:
-    """Return if every file of a run directory can be read; it may be missing, or have few of them.
+    """Check that every file in a run directory can be read; files and the directory may be missing.
 
     Raises:
         ConfigurationError: one line for each damaged file.
@@ -70,7 +71,7 @@ def inspect(directory: RunDirectory) -> None:
 
 
 class _Damaged(Exception):
-    """A file is not what a run wrote; the text is the fact."""
+    """A file is damaged; the text is the fact."""
 
 
 def _damages(directory: RunDirectory) -> Iterator[tuple[Path, str]]:
@@ -93,7 +94,7 @@ def _damages(directory: RunDirectory) -> Iterator[tuple[Path, str]]:
                 check(path)
         except _Damaged as damage:
             yield path, str(damage)
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:  # a number of 5,000 digits too
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:  # also a number of 5,000 digits
             yield path, f"cannot be read ({error})"
 
 
@@ -108,7 +109,7 @@ def _check_file(path: Path) -> None:
 
 
 def _check_lines(path: Path, kind: type[_Content]) -> None:
-    """Check a file of JSON lines; one that a crash has cut short is ignored, as everywhere."""
+    """Check a file of JSON lines; a line that a crash has truncated is ignored, as by all readers."""
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         try:
             content = json.loads(line)
@@ -125,7 +126,7 @@ def _check_model(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         if damaged := archive.testzip():
             raise _Damaged(f"{damaged} in it is damaged")
-        # One that was cut short may end in the index of a zip inside of it.
+        # A truncated file may end with the index of a zip that it contains, and so seem to be complete.
         if _DATA not in archive.namelist():
             raise _Damaged(f"has no {_DATA}, as models of Stable-Baselines3 have")
         if BEST in archive.namelist():
@@ -133,7 +134,7 @@ def _check_model(path: Path) -> None:
 
 
 def _check(content: Any, kind: Any, where: str = "") -> None:
-    """Raise the first reason why content is not of a kind."""
+    """Raise an error with the first reason if content does not match a type."""
     try:
         TypeAdapter(kind).validate_python(content, strict=True)
     except ValidationError as error:

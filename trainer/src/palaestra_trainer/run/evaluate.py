@@ -26,7 +26,7 @@ log = structlog.get_logger(__name__)
 
 
 def _nobody(result: dict[str, Any]) -> None:
-    """Report to nobody."""
+    """Ignore a result."""
 
 
 def measure(
@@ -40,19 +40,20 @@ def measure(
 ) -> dict[str, Any]:
     """Return the evaluation of a run directory's model, in the first `episodes` episodes of a seed stream.
 
-    Only the configuration's evaluating simulators are created and started; without one, a collecting one is.
+    Only the evaluating simulators of the configuration are created and started; if it has none, the first
+    collecting one is.
 
     Args:
-        configuration: of the run.
-        model: the file.
-        make_members: makes the simulators.
-        episodes: how many.
+        configuration: the configuration of the run.
+        model: the model.zip of the run directory.
+        make_members: creates the simulators.
+        episodes: number of episodes.
         stream: name of the seed stream.
-        report: called with the result, before simulators are stopped; if they are not after a minute, the
-            process ends.
+        report: called with the result, before simulators are stopped; if they do not stop within a minute,
+            the process ends.
 
     Raises:
-        ConfigurationError: the model is missing or does not fit.
+        ConfigurationError: the model is missing, or does not fit the configuration.
         FaultBudgetSpent: a simulator broke more often than its budget allows.
     """
     evaluating = _evaluating(configuration)
@@ -83,7 +84,7 @@ def measure(
 
 
 def _evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
-    """Return the simulators to evaluate on: those of that role, else a collecting one."""
+    """Return the simulators with role Evaluate; if none has that role, the first collecting one."""
     if found := configuration.with_role(Role.EVALUATE):
         return found
     collecting = configuration.with_role(Role.COLLECT)[0]

@@ -1,8 +1,9 @@
 """An environment without a simulator, which computes the rewards of goals for hindsight experience replay.
 
-The collecting environments cannot do it: their simulators may be restarting in other threads while the
-algorithm learns. The environment gets a robot of the job's class that is never connected, and is never reset
-or stepped. The environments of simulators are made with such robots too, so what fits them fits here.
+The collecting environments cannot compute them: their simulators may be restarting in other threads while the
+algorithm learns. This environment gets a robot of the job's class that is never connected. The environment is
+never reset or stepped. Environments of simulators are also created with robots that are not connected yet, so
+each environment that works there can be created here.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Attached, Webots
-from palaestra_trainer.webots.facade_registry import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
-# No simulator has this name. An environment that asks for readings gets SimulatorDead with it.
+# No simulator has this name. So an environment that reads a sensor gets SimulatorDead with this name.
 _NAME = "judge"
 
 
@@ -28,10 +29,10 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
     """Return an environment of a job whose `compute_reward` may be called at any time.
 
     Raises:
-        ConfigurationError: it does not fit the job's robot, or has no `compute_reward`.
+        ConfigurationError: the environment does not fit the job's robot, or has no `compute_reward`.
     """
     webots = Webots(_NAME, wanted.simulators[0].world, launcher=Attached())
-    withdraw(webots)
+    open_facades.withdraw(webots)
     robot = robot_class(wanted.robot or DEFAULT_ROBOT)(webots)
     judge = make_environment(wanted.environment, robot, SimulatedScene(webots, robot))
     if not callable(getattr(judge.unwrapped, COMPUTE_REWARD, None)):
@@ -44,7 +45,7 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
 
 
 def _refuse_other_rewards(env: gymnasium.Env[Any, Any]) -> None:
-    """Refuse wrappers that change the reward of a step, since `compute_reward` returns it unchanged."""
+    """Refuse wrappers that change the reward of a step, because `compute_reward` does not use them."""
     while isinstance(env, gymnasium.Wrapper):
         if isinstance(env, gymnasium.RewardWrapper):
             raise ConfigurationError(

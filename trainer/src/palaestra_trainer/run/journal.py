@@ -1,8 +1,8 @@
-"""The counters of a run since its last checkpoint, for the attempt after one that was killed.
+"""The counters of a run since its last checkpoint, for the attempt after a kill.
 
-A killed process saves nothing. Its steps are played again, but its time and its faults are not undone, so
-they are written to a file every few seconds. The write does not wait for the disk: a killed process loses
-nothing by that, and a machine that dies loses only data that a resume does not need.
+A killed process saves nothing. Its steps are played again, but its time and its faults still count, so they
+are written to a file every few seconds. The write does not wait for the disk: a kill loses nothing by that,
+and a crash of the machine loses only data that a resume does not need.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Journal:
 
     Args:
         path: the file; it may be missing.
-        clock: returns seconds, from any origin.
+        clock: returns seconds from any starting point.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
@@ -36,7 +36,7 @@ class Journal:
         self._next = clock() + EVERY_S
 
     def keep(self, progress: Progress) -> None:
-        """Write the counters to the file, unless that was done in the last seconds."""
+        """Write the counters to the file, at most every `EVERY_S` seconds."""
         if self._clock() < self._next:
             return
         content = {"step": progress.step, "counters": progress.counted().to_json()}
@@ -51,7 +51,7 @@ class Journal:
     def regained(self, step: int, saved: Counters) -> Counters:
         """Return the counters of a run that resumes from `step`.
 
-        They are the `saved` ones of that step, unless the run continued after it without another checkpoint.
+        They are the `saved` ones of that step, unless the run continued after it without a new checkpoint.
         """
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))

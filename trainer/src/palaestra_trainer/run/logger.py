@@ -1,4 +1,4 @@
-"""The curves of a run: Stable-Baselines3's logger, with the figures of the run in each of its points."""
+"""The curves of a run: Stable-Baselines3's logger, with the scalars of the run in each of its points."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from palaestra_trainer.telemetry.progress import Progress
 
 
 class CurvesLogger(Logger):
-    """Writes to TensorBoard, and to the figures of /metrics.
+    """Writes to TensorBoard, and to the values of /metrics.
 
     Args:
-        folder: of TensorBoard.
-        progress: the run; its scalars are recorded at each dump, which is rarer than a rollout.
+        folder: the folder of TensorBoard's event files.
+        progress: the run; its scalars are recorded at each dump, which is less frequent than a rollout.
     """
 
     def __init__(self, folder: Path, progress: Progress) -> None:
@@ -24,14 +24,14 @@ class CurvesLogger(Logger):
         self._progress = progress
 
     def dump(self, step: int = 0) -> None:
-        """Write what was recorded, with the scalars of the run."""
+        """Write the recorded values, with the scalars of the run."""
         for name, value in self._progress.scalars().items():
             self.record(name, value)
         super().dump(step)
 
 
 def hide_points(folder: Path, *, after: int) -> None:
-    """Write the mark by which TensorBoard hides the points of earlier files whose step is larger."""
+    """Write the event by which TensorBoard hides points of earlier files with a step larger than `after`."""
     from torch.utils.tensorboard.writer import SummaryWriter  # noqa: PLC0415 - most programs write no curves
 
     with SummaryWriter(str(folder), purge_step=after + 1):

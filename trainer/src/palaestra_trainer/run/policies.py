@@ -43,9 +43,9 @@ class TrainedPolicy:
         model: the Stable-Baselines3 model, which learned from normalized observations.
         environment_id: name of the environment that it learned in.
         environment_options: keyword arguments of that environment, without robot and scene.
-        environment: that environment as the job has it, with its wrappers.
-        scales: mean, variance, clip and epsilon by the key of the observation, by "" if it has none; what is
-            not in it is not normalized.
+        environment: that environment as the job sets it, with its wrappers.
+        scales: mean, variance, clip and epsilon by the key of the observation, or by "" if it is not a Dict;
+            missing keys are not normalized.
     """
 
     model: BaseAlgorithm
@@ -55,9 +55,9 @@ class TrainedPolicy:
     scales: Mapping[str, Scale]
 
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-        """Return the environment that the policy learned in and its wrappers, with a robot and its scene.
+        """Return the environment that the policy learned in, with its wrappers, a robot and its scene.
 
-        The environment gets those of the two that its signature accepts, as in a run.
+        The environment gets robot and scene if its signature accepts them, as in a run.
 
         Raises:
             ConfigurationError: it is not registered, or its signature does not fit.
@@ -75,11 +75,11 @@ class TrainedPolicy:
     ) -> tuple[Any, Any]:
         """Return an action for an observation as the environment returned it, and the policy's next state.
 
-        A policy of MaskablePPO needs the masks that the environment's `action_masks` returns; no other takes
-        any.
+        A policy of MaskablePPO needs the masks that the environment's `action_masks` returns; other policies
+        take no masks.
 
         Raises:
-            ValueError: there are no masks for a policy that needs them, wrong ones, or masks for another one.
+            ValueError: a policy that needs masks got none or wrong ones, or another policy got masks.
         """
         seen = (self._seen(observation), state, episode_start)
         if takes_masks(self.model):
@@ -119,8 +119,8 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
     Stable-Baselines3 unpickles the zip, so load only files that you trust.
 
     Raises:
-        ConfigurationError: there is no model, or no training.yaml beside it; or it has byte code of another
-            Python.
+        ConfigurationError: the model is missing, or training.yaml in its folder is; or the model has byte
+            code of another Python.
     """
     path = Path(run_or_zip)
     model = RunDirectory(path).model if path.is_dir() else path

@@ -21,10 +21,10 @@ log = structlog.get_logger(__name__)
 
 
 def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False) -> TrainingState:
-    """Return the state after each simulator was brought back to the saved state, or as near as possible.
+    """Bring each simulator back to the saved state, or as near as possible; return the resulting state.
 
     A simulator that was broken at the save, breaks now, or is new in the run begins its next episode. If
-    `masked`, so does one whose mask forbids an action of its episode now.
+    `masked`, so does a simulator whose mask now forbids an action of its episode.
     """
     before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
     observation = cast("Observations", env.resume(before, masked=masked))
@@ -48,24 +48,24 @@ def rejoin(env: SimulatorsVecEnv, saved: TrainingState, *, masked: bool = False)
 
 
 def _tell(begun: np.ndarray, same: np.ndarray) -> None:
-    """Warn of simulators that replayed their episode and reached another observation."""
+    """Log a warning if simulators replayed their episode and reached another observation."""
     different = sum(not new and not equal for new, equal in zip(begun, same, strict=False))
     if different:
         log.warning(
-            "simulators do not repeat what they did: the run goes on, but not exactly as it would have",
+            "simulators do not repeat their episodes: the run continues from other observations",
             simulators=different,
         )
     if begun.any():
-        log.info("simulators begin an episode anew", simulators=int(begun.sum()))
+        log.info("simulators begin a new episode", simulators=int(begun.sum()))
 
 
 def _resized(values: np.ndarray, length: int) -> np.ndarray:
-    """Return `length` values: missing ones are 0."""
+    """Return `length` values; missing ones are 0."""
     return np.concatenate([values, np.zeros(length, dtype=values.dtype)])[:length]
 
 
 def _returns_left(saved: TrainingState, begun: np.ndarray) -> np.ndarray | None:
-    """Return the discounted rewards of the episodes that continue; None: they are not needed."""
+    """Return the discounted rewards of the episodes that continue; None: the run does not normalize."""
     known = saved.running_returns
     return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
 

@@ -20,10 +20,10 @@ def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
 
     `success_rate`, its `success_interval` and `mean_return` belong to the policy
     in model.zip, which learned for `best_step` steps. They come from its
-    confirmation, else from its evaluation; without one they are null. Faults and
-    restarts are of all attempts, and so are `duration_s`, the speed derived from
-    it, and `goodput`, its seconds by cause; `trained_share` is the share of
-    these that trained.
+    confirmation, else from its evaluation; without an evaluation they are null.
+    Faults and restarts are those of all attempts. So are `duration_s`, the speed
+    derived from it, and `goodput`, its seconds by cause. `trained_share` is the
+    share of these seconds that was spent on training.
     """
     best = measured(directory)
     counters = progress.counted()
@@ -58,7 +58,7 @@ def write_summary(directory: RunDirectory, content: dict[str, Any]) -> None:
 
 
 def finished(directory: RunDirectory, configuration: Configuration) -> dict[str, Any] | None:
-    """Return the summary of a finished run; None: it is not finished, or its `steps` were raised since."""
+    """Return the summary of a finished run; None: it is not finished, or its `steps` were raised later."""
     try:
         content = json.loads(directory.summary.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
@@ -67,12 +67,12 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         return None
     if content["target"] < configuration.steps:
         return None
-    return {name: value for name, value in content.items() if name != "event"}  # structlog's own word
+    return {name: value for name, value in content.items() if name != "event"}  # structlog uses this key
 
 
 def last_word_of(summary: dict[str, Any]) -> Termination:
     """Return the termination message of an attempt that finds its run finished."""
-    interval = summary.get("success_interval")  # absent in one of a release up to a5276f3
+    interval = summary.get("success_interval")  # a summary of a release up to a5276f3 does not have it
     return Termination(
         step=summary["steps"],
         reason="Completed: before",
@@ -82,7 +82,7 @@ def last_word_of(summary: dict[str, Any]) -> Termination:
 
 
 def measured(directory: RunDirectory) -> dict[str, Any]:
-    """Return the most reliable measurement of model.zip; empty: it was never evaluated."""
+    """Return the most reliable measurement of model.zip; empty if it was never evaluated."""
     best = best_of(directory)
     if best is None:
         return {}

@@ -1,8 +1,9 @@
 """The link that gives a run on a claim a readable name in TensorBoard.
 
-On a claim, a run is at `<uid>/<replica>`, and a UID means nothing to a reader. TensorBoard names a run by its
-path. So a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the claim points to the run's
-curves. The run itself stays where it is: resumes, warm starts and `palaestra fetch` find it by its UID.
+On a claim, a run is at `<uid>/<replica>`, and TensorBoard names a run by its path. A reader does not
+recognize a UID. So a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the claim points
+to the run's curves. The run itself is not moved: resumes, warm starts and `palaestra fetch` find it by its
+UID.
 
 Training does not need the link. An error is logged once and does not end the run.
 """
@@ -45,8 +46,8 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
 def _folder(name: str, parent: int, stack: ExitStack) -> int:
     """Return a descriptor of a folder in an open folder; create the folder if it is missing.
 
-    Other jobs write to the claim too. A job could replace a folder by a link and so choose where this process
-    writes. Therefore a link is refused here; a descriptor always refers to the folder that was opened.
+    Other jobs write to the claim too. A job could replace a folder by a link, so that this process writes
+    into another folder. So links are refused; a descriptor always refers to the folder that was opened.
     """
     with suppress(FileExistsError):
         os.mkdir(name, dir_fd=parent)
@@ -58,10 +59,10 @@ def _folder(name: str, parent: int, stack: ExitStack) -> int:
 def _link(name: str, target: str, folder: int) -> None:
     """Make `name` in an open folder a link to `target`; replace a link with another target.
 
-    The link is created atomically. It needs no temporary name, which TensorBoard could show as a run.
+    The link is created atomically, without a temporary name, which TensorBoard could show as a run.
 
     Raises:
-        OSError: the file system supports no links, or the name belongs to something that is not a link.
+        OSError: the file system does not support links, or the name exists and is not a link.
     """
     try:
         os.symlink(target, name, dir_fd=folder)

@@ -39,8 +39,8 @@ class End:
 
     Attributes:
         code: exit code of the process.
-        reason: one word, for programs.
-        message: a sentence, for people.
+        reason: one word for programs.
+        message: a sentence for people.
     """
 
     code: int
@@ -62,12 +62,12 @@ ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
 
 
 def end_of(error: BaseException) -> End:
-    """Return the end that an error means for the run."""
+    """Return the end of a run that an error ended."""
     for kind, code, reason in ENDS:
         if isinstance(error, kind):
             return End(code, reason, str(error))
     if isinstance(error, SystemExit | KeyboardInterrupt):
-        fact = "code of the job ended the program, which is for the run to decide"
+        fact = "code of the job ended the program, but only the run may end it"
         return End(UNEXPECTED, "ProgramEnded", f"{fact} ({fact_of(error)}); raise an error instead")
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         where = error.filename or "the run directory"
@@ -80,7 +80,7 @@ def write_last_word(
 ) -> None:
     """Write the termination message to the file of PALAESTRA_TERMINATION_LOG or of Kubernetes.
 
-    Outside Kubernetes there is no default file, and none is created.
+    The default file does not exist outside Kubernetes, and is not created.
     """
     chosen = environment.get(TERMINATION_VARIABLE)
     if chosen is None and not default.exists():

@@ -1,9 +1,9 @@
-"""The work between rollouts: evaluate, save, rest and end.
+"""The callback that works between rollouts: it evaluates, saves, pauses simulators and ends the run.
 
-The model's state is complete only at a rollout boundary, because no collected
-data waits to be learned from. So everything that reads or saves the model
-happens there. If a run is interrupted during a rollout, that rollout is played
-again after the resume, with the same seeds and the same random numbers.
+The model's state is complete only at a rollout boundary, where no collected data
+waits to be learned from. So the model is evaluated and saved only there. If a
+run is interrupted during a rollout, that rollout is played again after the
+resume, with the same seeds and the same random numbers.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from palaestra_trainer.waiting import shutdown_deadline
 
 log = structlog.get_logger(__name__)
 
-# A shorter learning phase is not worth two service calls per simulator, nor a copy of the model.
+# A shorter learning phase is not worth the pause, with two service calls per simulator, and a model copy.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 
@@ -69,7 +69,7 @@ class TrainingCallback(BaseCallback):
         self._cut = False
 
     def drop_rollout(self) -> None:
-        """Put the model back to the last boundary, because a callback cut the rollout; call `finish` next."""
+        """Set the model back to the last boundary after a callback ended the rollout; call `finish` next."""
         if self._boundary is not None:
             self._boundary.put_back(self.model)
         self._cut = True
@@ -87,7 +87,7 @@ class TrainingCallback(BaseCallback):
         self._selection.finish(self._step)
 
     def save(self) -> None:
-        """Put the model back to the last boundary and save it there; before the first boundary do nothing."""
+        """Set the model back to the last boundary and save it; before the first boundary do nothing."""
         run, state = self._run, self._boundary
         if state is None:
             return
@@ -96,7 +96,7 @@ class TrainingCallback(BaseCallback):
             self._before_update.put_back(self.model)
         started = time.monotonic()
         with run.progress.spending(Cause.CHECKPOINTING):
-            # Steps after the boundary are played again, so their counts are dropped; faults and time stay.
+            # Steps after the boundary are played again, so their counts are dropped; faults and time remain.
             counters = run.progress.counted(kept=step).to_json() | state.rollout["counters"]
             manifest = checkpoint.describe(run.configuration, step, counters)
             if self._saver.save(self.model, state, manifest):
@@ -111,7 +111,8 @@ class TrainingCallback(BaseCallback):
     def leave_update(self, *_step: object) -> None:
         """Raise Interrupted before a gradient step if a signal has arrived and the update takes too long.
 
-        It does so only if the tensors from before the update are kept. The update's data is collected again.
+        It raises only if a copy of the tensors from before the update exists. A resume collects the update's
+        data again.
         """
         if self._before_update is not None and shutdown_deadline.is_over():
             self._run.interruption.check()
@@ -124,7 +125,7 @@ class TrainingCallback(BaseCallback):
         if self._rollout_ended is not None and self.updates_so_far() != self._updates:
             self._learning_s = time.monotonic() - self._rollout_ended
         if self._resumed:
-            # State-dependent exploration has drawn its noise twice for this rollout.
+            # State-dependent exploration has drawn its noise for this rollout a second time.
             self._resumed.put_back(self.model)
             self._resumed = None
         self._learner.check(self.model.num_timesteps)
@@ -147,7 +148,7 @@ class TrainingCallback(BaseCallback):
         self._record_rewards(infos, self.locals["dones"])
         if self._run.display.due:
             self._run.display.show(self._run.progress.status())
-        # A rollout may take longer than the grace period, so it is dropped and played again.
+        # A rollout may take longer than the grace period, so a signal ends it here, and it is played again.
         self._run.interruption.check()
         return True
 
@@ -157,12 +158,12 @@ class TrainingCallback(BaseCallback):
             self._env.pause()
             self._resting = True
         first = self._learning_s is None and self._step > getattr(self.model, "learning_starts", -1)
-        if first or self._resting:  # the first update may be long, and so may one like the last
+        if first or self._resting:  # the first update may be long, and so may an update after a long one
             self._before_update = Tensors.of(self.model)
 
     def updates_so_far(self) -> int:
-        """Return how often the policy was updated, as far as its algorithm counts it."""
-        return int(self.model._n_updates)  # noqa: SLF001 - no public name has it
+        """Return the number of updates that the algorithm has counted."""
+        return int(self.model._n_updates)  # noqa: SLF001 - the count has no public name
 
     def _mark_boundary(self) -> None:
         self._before_update = None
@@ -195,5 +196,5 @@ class TrainingCallback(BaseCallback):
 
 
 def _passed(before: int, now: int, every: int) -> bool:
-    """Return whether a multiple of `every` lies after `before` and up to `now`; never for 0."""
+    """Return whether a multiple of `every` lies after `before` and up to `now`; False if `every` is 0."""
     return every > 0 and now // every > before // every

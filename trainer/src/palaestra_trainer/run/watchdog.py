@@ -1,6 +1,6 @@
 """End a run that makes no progress.
 
-The watchdog has a thread of its own, because it detects that other threads hang.
+The watchdog has its own thread, because it must detect that other threads hang.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Watchdog:
     Args:
         idle_s: returns the seconds since the last progress.
         deadline_s: the longest time without progress.
-        last_word: called before the process ends, to report it.
+        last_word: called before the process ends, to write the termination message.
         leave: ends the process; takes the exit code.
     """
 
@@ -71,7 +71,7 @@ class Watchdog:
 
 
 def stalled(progress: Progress) -> End:
-    """Return the end of a run whose environments have not stepped for the deadline; never blocks."""
+    """Return the end of a run whose environments have not stepped within the deadline; never blocks."""
     fact = f"no environment step for {progress.idle_s():.0f} s while {progress.phase}"
     if down := progress.down():
         return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not up: {', '.join(down)}")

@@ -1,4 +1,4 @@
-"""Allocates simulators to environments of any process, by a lock file each in the scratch folder."""
+"""Allocate simulators to environments of any process, by one lock file each in the scratch folder."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def allocate(configuration: Configuration, role: Role) -> Allocation:
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:
-    """Return the lock's file; ROS_LOG_DIR is the scratch folder in every container of the plan.
+    """Return the path of the lock file; ROS_LOG_DIR is the scratch folder in every container of the plan.
 
-    Its name contains the address too, because outside a container jobs and users may share the folder.
+    The file name contains the address too, because jobs and users may share the folder outside a container.
     """
     address = simulator.control or f"{configuration.job}-{configuration.replica}"
     words = re.sub(r"\W+", "-", f"{os.getuid()} {address} {simulator.name}")

@@ -11,7 +11,7 @@ from palaestra_trainer.simulators.interface import Environment
 class Attributes:
     """The attributes that a program has set on a member's environment; a standby gets them too.
 
-    An environment gets each value once, so what it makes of it later stays.
+    Each environment gets each value once, so a value that the environment changes later is not overwritten.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class Attributes:
             self.give(env)
 
     def give(self, env: Environment) -> None:
-        """Set on the environment of the next episode those that it has not got."""
+        """Set the attributes that the environment of the next episode has not received yet."""
         for name in self._waiting if env is self._given_to else self._values:
             _put(env, name, copied(self._values[name]))
         self._waiting.clear()
@@ -35,6 +35,6 @@ class Attributes:
 
 
 def _put(env: Environment, name: str, value: Any) -> None:
-    """Set an attribute where it is defined, in a wrapper or in the environment, else in the environment."""
+    """Set an attribute on the wrapper or environment that defines it; on the environment if none does."""
     if not env.set_wrapper_attr(name, value, force=False):
         setattr(env.unwrapped, name, value)

@@ -1,4 +1,4 @@
-"""Limits on faults: restarts of one simulator within a time, and the least size of a group."""
+"""Limits on faults: restarts of one simulator in a time window, and the smallest size of a group."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class RestartLimit:
     """How often a member may be restarted.
 
     Attributes:
-        restarts: how many after faults within any `within_s` seconds.
+        restarts: the most restarts after faults within any `within_s` seconds.
     """
 
     restarts: int = 10
@@ -44,7 +44,7 @@ class RestartBudget:
     def spent_share(self) -> float:
         """Share of `limit.restarts` spent within `within_s`, 0 to 1; callable from any thread.
 
-        It is 0 for a limit of 0: no warning would be possible.
+        It is always 0 for a limit of 0, because the first fault is final and cannot be predicted.
         """
         now, limit = self.clock(), self.limit.restarts
         recent = sum(now - at < self.limit.within_s for at, _ in tuple(self._spent))
@@ -79,7 +79,7 @@ class Group:
 
     Args:
         left: number of simulators in the group.
-        least: the least number, at least one; None: all of them.
+        least: the smallest number that the run needs, at least 1; None: all of them.
     """
 
     def __init__(self, left: int = 1, least: int | None = None) -> None:

@@ -1,6 +1,6 @@
-"""The simulators that environments find by themselves, one for each environment that asks.
+"""Simulators for environments that were created without one; each environment gets its own.
 
-These are a facade of the program, those in PALAESTRA_CONFIG, or stubs of their own.
+The simulator is that of a `Webots` facade of the program, one of PALAESTRA_CONFIG, or a new one.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Configured:
 def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Configured:
     """Return a started simulator for an environment that was created without one.
 
-    It is that of a `Webots` facade of this process; else one of PALAESTRA_CONFIG. If that is not set, as in a
-    notebook, it is a new one with this world and driver, which ends when it is released, or with this
-    process.
+    It is the simulator of a `Webots` facade of this process, else one of PALAESTRA_CONFIG. If that variable
+    is not set, as in a notebook, a new simulator with this world and driver is started. The new one ends when
+    it is released, or with this process.
 
     Raises:
         ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
@@ -84,7 +84,7 @@ def configured_simulator(role: Role) -> Configured:
     """Return a started simulator with this role that no other environment uses.
 
     Raises:
-        ConfigurationError: there is no configuration, or each simulator with this role has an environment.
+        ConfigurationError: PALAESTRA_CONFIG is not set, or each simulator with this role has an environment.
         SimulatorFault: the simulator does not start.
     """
     configuration = load()

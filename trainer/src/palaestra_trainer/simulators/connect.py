@@ -1,7 +1,7 @@
 """Create the simulators of a configuration with their environments, not yet started.
 
-`connect` finds them behind the sidecars of a pod, `connect_members` includes standbys, and `connect_here`
-starts sidecars of its own.
+`connect` uses the sidecars of a pod, `connect_members` adds the standbys, and `connect_here` starts new
+sidecars as processes of this program.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.facade_registry import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
@@ -40,8 +40,8 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
 
     Raises:
         ConfigurationError: the configuration cannot be read, or its environment or robot is unknown.
-        MasterLost: no ROS master answers.
-        SimulatorDead, SimulatorHung: a sidecar does not answer.
+        MasterLost: no ROS master responds.
+        SimulatorDead, SimulatorHung: a sidecar does not respond.
     """
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
@@ -91,7 +91,7 @@ def robot_of(world: str) -> str:
 
 
 def robot_for(world: str) -> type[SimulatedRobot]:
-    """Return the class of the robot of PALAESTRA_CONFIG; without that, of the one in a world that ships.
+    """Return the robot class of PALAESTRA_CONFIG; if it is not set, that of the robot in a world that ships.
 
     Raises:
         ConfigurationError: the configuration cannot be read, or names no such class.
@@ -115,7 +115,7 @@ class OwnSimulator:
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
         supervisor, robot = _WORLDS[world]
         self.webots = Webots(supervisor, world, driver=driver)
-        withdraw(self.webots)
+        open_facades.withdraw(self.webots)
         self.robot = robot_class(robot)(self.webots)
         self.scene = SimulatedScene(self.webots, self.robot)
         try:
@@ -156,8 +156,8 @@ def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: Simulato
     """Return the simulator behind a sidecar, with the environment of a configuration, not started.
 
     Raises:
-        ConfigurationError: the environment is unknown, or it does not take what it is given.
-        SimulatorDead, SimulatorHung: the sidecar does not answer.
+        ConfigurationError: the environment is unknown, or it does not accept its options or this robot.
+        SimulatorDead, SimulatorHung: the sidecar does not respond.
     """
     make = partial(make_environment, configuration.environment)
     robot = robot_class(configuration.robot or DEFAULT_ROBOT)

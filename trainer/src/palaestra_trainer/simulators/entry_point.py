@@ -1,4 +1,4 @@
-"""What `gymnasium.make` calls: an environment with the robot that it is given, or one that it finds."""
+"""Entry points for `gymnasium.make`: environments with a given robot, or with one that this module finds."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def make(
     Args:
         robot: the robot to drive, given together with its `scene`.
         scene: arranges episodes.
-        simulator: returns robot and scene if none are given; called once for each environment of
+        simulator: called for robot and scene if they are not given, once for each environment of
             `make_vec`. `palaestra_trainer.testing.fake_arena` needs no simulator.
         role: without `robot` and `simulator`, the environment takes the newest `Webots` facade of this
-            process. If there is none, it takes the first simulator of PALAESTRA_CONFIG with this role that
-            no environment of any process uses. Without PALAESTRA_CONFIG it starts a stub, which ends with
-            `close()` or with this process.
+            process, else the first simulator of PALAESTRA_CONFIG with this role that no environment of any
+            process uses. Without PALAESTRA_CONFIG it starts a stub, which ends with `close()` or with this
+            process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:
@@ -151,9 +151,9 @@ def make_seeing(
 
 
 class _Place(NamedTuple):
-    """Where an environment is played, and how it gives that back."""
+    """The robot and scene of an environment, and the function that releases their simulator."""
 
-    robot: Any  # of the capabilities that the environment asks for, which it checks
+    robot: Any  # the environment checks that the robot has the capabilities that it needs
     scene: Scene
     release: Callable[[], None] | None = None
 
@@ -165,7 +165,7 @@ def _place(
     role: str,
     own: tuple[str, str] = _ARENA,
 ) -> _Place:
-    """Return the robot and scene that are given, made by `simulator`, found with this role, or of its own."""
+    """Return robot and scene: those given, those of `simulator()`, else those of `simulator_for`."""
     if (robot is None) != (scene is None):
         raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
     if robot is not None and scene is not None:
@@ -182,7 +182,7 @@ _Made = TypeVar("_Made")
 
 
 def _made(kind: Callable[..., _Made], place: _Place, options: object) -> _Made:
-    """Return the environment at a place, which is given back if the robot there does not fit."""
+    """Return an environment with the robot and scene of a place; release the place if that fails."""
     try:
         return kind(place.robot, place.scene, options, place.release)
     except BaseException:
@@ -195,7 +195,7 @@ def role_of(name: str) -> Role:
     """Return the role of that name.
 
     Raises:
-        ConfigurationError: there is none.
+        ConfigurationError: no role has this name.
     """
     if name not in set(Role):
         raise ConfigurationError(f'role: "{name}" does not exist; choose {" or ".join(Role)}')

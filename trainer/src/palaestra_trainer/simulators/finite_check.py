@@ -1,4 +1,4 @@
-"""Refuse NaN and infinite observations and rewards where they arise; nothing can be learned from them."""
+"""Refuse NaN and infinite observations and rewards as soon as they occur; they cannot be learned from."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from palaestra_trainer.simulators.interface import Environment
 
 
 def check_observation(simulator: str, env: Environment, observation: Any) -> None:
-    """Return if every number of an observation is finite; it may be a mapping of several.
+    """Check that every number of an observation, or of each observation in a mapping, is finite.
 
     The robot has already checked its sensors, so a wrong number here comes from the environment's own code.
 
     Raises:
-        Diverged: a number is not finite; the message names the environment and the number's place.
+        Diverged: a number is not finite; the message names the environment and the number's index.
     """
     parts = observation if isinstance(observation, Mapping) else {"": observation}
     for name, part in parts.items():
@@ -28,7 +28,7 @@ def check_observation(simulator: str, env: Environment, observation: Any) -> Non
 
 
 def check_reward(simulator: str, env: Environment, reward: Any, info: Mapping[str, Any]) -> None:
-    """Return if a reward is finite.
+    """Check that a reward is finite.
 
     Raises:
         Diverged: it is not finite; the message names the environment and the wrong terms of `info`.
@@ -43,7 +43,7 @@ def check_reward(simulator: str, env: Environment, reward: Any, info: Mapping[st
 
 
 def _not_finite(part: Any) -> str:
-    """Return place and value of the first number that is not finite; "" if all are finite."""
+    """Return index and value of the first number that is not finite; "" if all are finite."""
     numbers = np.asarray(part)
     if numbers.dtype.kind != "f" or np.isfinite(numbers).all():
         return ""

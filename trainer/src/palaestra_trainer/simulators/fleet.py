@@ -20,62 +20,64 @@ from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
 from palaestra_trainer.waiting.signals import Check, go_on
 
-LONG_S = 5.0  # a start longer than this is logged with the missing simulators, again after each doubling
+# A start that takes longer is logged with the missing simulators, and again each time its duration doubles.
+LONG_S = 5.0
 
 log = structlog.get_logger(__name__)
 
 
 class Fleet:
-    """The keepers of all members of a configuration.
+    """The restarters of all members of a configuration.
 
     Args:
-        configuration: has the settings of each member, found by its name.
+        configuration: has the settings of each member under its name.
         members: one for each simulator of the configuration.
         watcher: receives every fault and restart.
 
     Attributes:
-        collecting: keepers of the members that gather experience, in the configuration's order.
-        evaluating: keepers of the members that evaluate the policy; empty if nothing is evaluated.
+        collecting: restarters of the members that gather experience, in the configuration's order.
+        evaluating: restarters of the members that evaluate the policy; empty if nothing is evaluated.
     """
 
     def __init__(self, configuration: Configuration, members: Sequence[Member], watcher: Watcher) -> None:
         by_name = {member.name: member for member in members}
         missing = [wanted.name for wanted in configuration.simulators if wanted.name not in by_name]
         if missing:
-            raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
+            raise ConfigurationError(f"simulators: {', '.join(missing)} was not created; add it to members")
         groups = groups_of(configuration)
-        keepers = {
+        restarters = {
             wanted.name: Restarter(
                 by_name[wanted.name], limit_of(wanted), watcher, group=groups[wanted.group]
             )
             for wanted in configuration.simulators
         }
-        self.collecting = [keepers[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
-        self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
+        self.collecting = [restarters[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
+        self.evaluating = [restarters[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
         self._all = [*self.collecting, *self.evaluating]
 
     def meters(self) -> dict[str, SimulatorStats]:
         """Return the counts of each member, by its name."""
-        return {keeper.name: keeper.meter for keeper in self._all}
+        return {restarter.name: restarter.meter for restarter in self._all}
 
     def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
         """Start all members at once; return when each was tried once and enough of each group are up.
 
-        Members that are not up yet are still started in the background.
+        The start of the other members continues in the background.
 
         Args:
-            check: called every tenth of a second. What it raises, such as `Interrupted`, does not wait for
-                members: a start that is under way may go on in its thread, and no other begins.
+            check: called every tenth of a second. If it raises, e.g. `Interrupted`, this method raises at
+                once: a running start may continue in its thread, and no other begins.
             stepped: whether the run has taken steps before, which shows that its worlds were right.
 
         Raises:
             FaultBudgetSpent: too many simulators of a group failed to start, within their budgets.
-            ConfigurationError: a world lacks what the environment needs, as two processes of it showed.
+            ConfigurationError: two processes in a row showed that a world lacks a device or node that the
+                environment needs.
         """
         check()
-        for keeper in self._all:
-            keeper.stepped = stepped
-            keeper.begin_start()
+        for restarter in self._all:
+            restarter.stepped = stepped
+            restarter.begin_start()
         began, report_at_s = time.monotonic(), LONG_S
         try:
             while not self._enough():
@@ -83,60 +85,62 @@ class Fleet:
                 if (waited_s := time.monotonic() - began) >= report_at_s:
                     report_at_s = 2 * waited_s
                     log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
-                # Any finished work ends the wait: a first start that failed may be enough too.
+                # Any finished work ends the wait: a group may be large enough after a start that failed, too.
                 wait(
-                    [work for keeper in self._all if (work := keeper.under_way)],
+                    [work for restarter in self._all if (work := restarter.under_way)],
                     LOOK_EVERY_S,
                     FIRST_COMPLETED,
                 )
         except BaseException:
-            for keeper in self._all:
-                keeper.abandon()
+            for restarter in self._all:
+                restarter.abandon()
             raise
-        for keeper in self._all:
-            keeper.stepped = True  # from here on other members may step, even if this one still starts
+        for restarter in self._all:
+            restarter.stepped = True  # other members may step from now on, even while this one still starts
 
     def stop(self) -> None:
-        """Stop all members at once, in any state, also during a repair."""
-        stops = [in_background(keeper.stop, f"stop-{keeper.name}") for keeper in self._all]
+        """Stop all members at once, in any state, also during a restart."""
+        stops = [in_background(restarter.stop, f"stop-{restarter.name}") for restarter in self._all]
         wait(stops)
         for stop in stops:
             stop.result()
 
     def _down(self) -> list[str]:
-        return [keeper.name for keeper in self._all if not keeper.up()]
+        return [restarter.name for restarter in self._all if not restarter.up()]
 
     def _enough(self) -> bool:
-        up = Counter(keeper.group for keeper in self._all if keeper.up())
-        return all(keeper.tried and up[keeper.group] >= keeper.group.least for keeper in self._all)
+        up = Counter(restarter.group for restarter in self._all if restarter.up())
+        return all(
+            restarter.tried and up[restarter.group] >= restarter.group.least for restarter in self._all
+        )
 
 
 @contextmanager
-def running(keepers: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
-    """Run the members inside the context, once their recycling is over; pause them outside."""
-    for keeper in keepers:
-        keeper.unpause(check)
+def running(restarters: Sequence[Restarter], check: Check = go_on) -> Iterator[None]:
+    """Unpause the members inside the context, after any recycling; pause them again at its end."""
+    for restarter in restarters:
+        restarter.unpause(check)
     try:
         yield
     finally:
-        rest(keepers)
+        rest(restarters)
 
 
 @contextmanager
-def resting(keepers: Sequence[Restarter]) -> Iterator[None]:
-    """Pause the members inside the context, run them outside."""
-    rest(keepers)
+def resting(restarters: Sequence[Restarter]) -> Iterator[None]:
+    """Pause the members inside the context; unpause them at its end."""
+    rest(restarters)
     try:
         yield
     finally:
-        for keeper in keepers:
-            keeper.unpause()
+        for restarter in restarters:
+            restarter.unpause()
 
 
-def rest(keepers: Sequence[Restarter]) -> None:
+def rest(restarters: Sequence[Restarter]) -> None:
     """Pause the members."""
-    for keeper in keepers:
-        keeper.pause()
+    for restarter in restarters:
+        restarter.pause()
 
 
 def groups_of(configuration: Configuration) -> dict[str, Group]:

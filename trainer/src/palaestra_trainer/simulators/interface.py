@@ -73,7 +73,10 @@ class ReportsLeftOut(Protocol):
     """A member whose simulator reports what it leaves out of its world."""
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what it left out at its last start, in lines for people; () before. Never blocks."""
+        """Return the parts of its world that the simulator left out at its last start, in lines for people.
+
+        It is empty before the first start. Never blocks.
+        """
         ...
 
 
@@ -85,7 +88,7 @@ class Watcher(Protocol):
         ...
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """A simulator broke; its episode, of so many steps, is cut."""
+        """A simulator broke; its episode of `steps_lost` steps is truncated."""
         ...
 
     def started(self, simulator: str) -> None:
@@ -109,7 +112,7 @@ class Watcher(Protocol):
         ...
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Book the time of the training thread inside the context on `cause`; no turn may end inside."""
+        """Count the training thread's time inside the context under `cause`; no turn may end inside."""
         ...
 
 

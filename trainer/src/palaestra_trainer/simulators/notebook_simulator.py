@@ -1,6 +1,6 @@
 """The simulator of a facade that a program created before its environment, as in the paper.
 
-The program starts, pauses and ends it: `with webots:` and `webots.run` decide when it steps.
+The program starts, pauses and stops the simulator: it steps inside `with webots:` and `webots.run`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.connect import robot_for
 from palaestra_trainer.simulators.interface import Environment, Step
 from palaestra_trainer.webots import Webots
-from palaestra_trainer.webots.facade_registry import give_back, offered, take
+from palaestra_trainer.webots.facade import open_facades
 
 
 class NotebookSimulator:
@@ -38,32 +38,32 @@ class NotebookSimulator:
         self.scene = SimulatedScene(webots, self.robot)
         if webots.available():
             self.robot.connect()
-        take(webots)
+        open_facades.take(webots)
 
     def release(self) -> None:
         """Close the robot's connections and offer the facade again; safe to repeat."""
         self.robot.close()
-        give_back(self.webots)
+        open_facades.give_back(self.webots)
 
 
 def offered_simulator(world: str) -> NotebookSimulator | None:
-    """Return the newest facade that no environment uses; None: this process has none.
+    """Return the simulator of the newest facade that no environment uses; None if there is no such facade.
 
-    Its robot is that of PALAESTRA_CONFIG; without that, the one in the world that ships for the environment.
+    Its robot has the class in PALAESTRA_CONFIG. If that is not set, it is the robot of `world`, which ships.
     """
-    webots = offered()
+    webots = open_facades.offered()
     return None if webots is None else NotebookSimulator(webots, robot_for(world))
 
 
 class NotebookMember:
-    """A member in such a simulator; it is restarted after faults, and started and paused by the program.
+    """A member in a facade's simulator: the program starts and pauses it, the trainer restarts it.
 
     Args:
         place: the simulator.
         wanted: the environment.
 
     Raises:
-        ConfigurationError: the environment is unknown, or does not take what it is given.
+        ConfigurationError: the environment is unknown, or does not accept its options or the robot.
     """
 
     def __init__(self, place: NotebookSimulator, wanted: Wanted) -> None:
@@ -75,7 +75,7 @@ class NotebookMember:
         place.webots.at_start(f"environment of {self.name}", self._one_life.end)
 
     def due(self, episodes: int = 1) -> None:
-        """It is not recycled: `webots.run(..., restart=True)` does that."""
+        """Return None: only the program recycles it, by `webots.run(..., restart=True)`."""
         del episodes
 
     def start(self) -> None:
@@ -86,11 +86,11 @@ class NotebookMember:
         self._place.release()
 
     def restart(self) -> None:
-        """Restart it, unless the program has done that; it runs as before, or is paused.
+        """Restart the simulator, unless the program has restarted it; it is then running or paused as before.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it does not start in time.
-            ConfigurationError: the facade is only attached to it.
+            ConfigurationError: the facade is attached to a simulator that it did not start.
         """
         if not (self._one_life.ended and self._webots.available()):
             self._webots()
@@ -106,7 +106,7 @@ class NotebookMember:
 
 
 class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment whose episodes do not go on in a simulator that the program has restarted.
+    """An environment whose episode ends when the program restarts the simulator.
 
     Attributes:
         ended: whether the simulator was started since the last reset.
@@ -130,7 +130,7 @@ class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
         """Return the result of the environment's step.
 
         Raises:
-            SimulatorDead: the simulator of this episode has ended; or as the environment raises it.
+            SimulatorDead: the simulator of this episode has ended, or the environment raised it.
         """
         if self.ended:
             raise SimulatorDead(self._name, "was restarted amid an episode")

@@ -1,4 +1,4 @@
-"""When a healthy simulator is worn enough to be restarted between two episodes."""
+"""The limits after which a healthy simulator is restarted between two episodes."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _MIB = 2**20
 
 
 class RecyclePolicy:
-    """How worn one simulator is, since it was last taken into use.
+    """Compares one simulator with its limits, counted since it was last taken into use.
 
     Args:
-        limits: what it may reach; nothing: it is never due.
-        memory: returns the bytes that its processes use, None where nobody knows.
-        clock: seconds, from anywhere.
+        limits: the limits of its use; None: it is never due.
+        memory: returns the bytes that its processes use, or None if that is unknown.
+        clock: returns seconds from any starting point.
     """
 
     def __init__(
@@ -34,13 +34,13 @@ class RecyclePolicy:
         self._since = self._asked = clock()
 
     def begin(self) -> None:
-        """Count from now on; it was started, or has taken over."""
+        """Count from now on, because the simulator was started or has taken over."""
         self._since = self._clock()
 
     def due(self, resets: int, episodes: int = 1) -> str | None:
-        """Return why to restart it after so many `resets`, before the next `episodes`; None: no reason.
+        """Return the reason to restart it after `resets`, before the next `episodes`; None: no reason.
 
-        Before several episodes, the limit of resets is a reason only if a restart now saves one amid them.
+        Before several episodes, the limit of resets is a reason only if a restart now avoids one among them.
         """
         checks = (self._by_resets(resets, episodes), self._by_age(), self._by_memory())
         return next((reason for reason in checks if reason is not None), None)

@@ -1,10 +1,10 @@
-"""Keeping one simulator going.
+"""Start one simulator and restart it after faults.
 
-A `Restarter` looks after one member: it starts it, mends it after a fault within
-its budget, recycles it between episodes and lets it rest. Starting and mending
-take seconds, so they happen in a thread of the keeper's own: while that works,
-the keeper is `busy` and nobody else touches the member. Which seed an episode
-gets, and what a fault means for learning, is decided elsewhere.
+A `Restarter` owns one member: it starts it, restarts it after a fault within its
+budget, recycles it between episodes and pauses it. A start or restart takes
+seconds, so it runs in a thread of the restarter. While that thread works, the
+restarter is `busy`, and no other code may use the member. Other modules decide
+which seed an episode gets and what a fault means for learning.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ from palaestra_trainer.waiting.signals import Check, go_on
 log = structlog.get_logger(__name__)
 
 LOOK_EVERY_S = 0.1
-# A canceled try ends at once, unless it waits for a program that does not answer.
+# A canceled start ends at once, unless it waits for a program that does not respond.
 SETTLE_S = 10.0
-# A simulator that dies every two dozen resets is recycled every few seconds, all night.
+# A simulator that dies after two dozen resets is recycled every few seconds, which would fill the log.
 LOG_RECYCLING_EVERY_S = 60.0
 
 
 class Restarter:
-    """Keeps one member playing: starts, steps, mending, recycling and rests.
+    """Starts, steps, restarts, recycles and pauses one member.
 
     Attributes:
-        member: the member it looks after; hands off while the keeper is `busy`.
+        member: the member; do not use it while the restarter is `busy`.
         watcher: notified of every fault and restart.
-        group: the simulators that the member is one of.
-        tried: whether it has been tried to start the member.
-        lost: whether the member was given up, since the others of its group are enough.
-        stepped: whether the run has taken a step, with the worlds that it has.
-        meter: counts what is played.
+        group: the group of simulators that the member belongs to.
+        tried: whether the first start of the member has ended, with or without a fault.
+        lost: whether the member was given up, because the others of its group are enough.
+        stepped: whether the run has taken a step, which shows that its worlds were right.
+        meter: counts steps and resets of the member.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Restarter:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        self._refusal = ""  # how the last process showed a mistake of the configuration
+        self._refusal = ""  # the fault by which the last process showed a mistake of the configuration
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
@@ -91,23 +91,23 @@ class Restarter:
 
     @property
     def under_way(self) -> Future[None] | None:
-        """The work on the member in the keeper's own thread; None: there is none."""
+        """The work on the member that runs in the restarter's thread; None: no work runs."""
         return None if self._work is None or self._work.done() else self._work
 
     @property
     def busy(self) -> bool:
-        """Whether the member is being started, mended or recycled, in a thread that nobody may disturb."""
+        """Whether the restarter's thread starts, restarts or recycles the member; do not use it meanwhile."""
         return self.under_way is not None
 
     def up(self) -> bool:
-        """Return whether the member is up, as far as is known: neither being mended nor lost.
+        """Return whether the member is up: it is neither lost nor being restarted, and no fault is known.
 
         Raises:
             FaultBudgetSpent: it broke more often than its budget allows.
-            ConfigurationError: before any step, two of its processes lacked what the environment needs, or
-                refused it in the same words.
-            MasterLost: it could not be mended without a ROS master.
-            SimulatorFault: it could not be recycled; begin to mend it.
+            ConfigurationError: before any step, two processes in a row lacked a device that the environment
+                needs, or failed with the same message.
+            MasterLost: it could not be restarted without a ROS master.
+            SimulatorFault: it could not be recycled; call `begin_mending`.
         """
         if self.busy:
             return False
@@ -117,41 +117,41 @@ class Restarter:
         return not self.lost
 
     def begin_start(self) -> None:
-        """Begin to start the member, again after each fault; then it is up, or lost."""
+        """Begin to start the member, again after each fault, until it is up or lost."""
         self._begin(self._start)
 
     def begin_mending(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
-        """Begin to restart the broken member until it is up, or lost.
+        """Begin to restart the broken member, again after each fault, until it is up or lost.
 
         Args:
-            fault: how it broke.
-            steps_lost: environment steps of the episode that the fault cut.
+            fault: the fault that broke it.
+            steps_lost: environment steps of the episode that the fault truncated.
         """
         self._report(fault, steps_lost)
         self._begin(partial(self._mend, fault))
 
     def abandon(self) -> None:
-        """Begin no further try of the work that is under way; may be called from any thread."""
+        """Begin no further restart after the current one; callable from any thread."""
         self._abandoned = True
 
     def stop(self) -> None:
-        """Stop the member, however it is; a mending that is under way is ended before."""
+        """Stop the member in any state; first cancel a restart that is running."""
         settle([self])
         if self.busy:
-            log.warning("simulator not stopped: it is still being mended", simulator=self.name)
+            log.warning("simulator not stopped: its restart has not ended", simulator=self.name)
         else:
             self._switch(self.member.stop)
 
     def reset(
         self, seed: int, options: dict[str, Any] | None = None, check: Check = go_on
     ) -> tuple[Any, dict[str, Any]]:
-        """Return first observation and info of a new episode, in a recycled member if that is due.
+        """Return first observation and info of a new episode; recycle the member before it if that is due.
 
-        They are copies, as those of `step`: the environment may go on to write into its own.
-        `check` is called every tenth of a second while the member is recycled; raises to wait no longer.
+        Both are copies, as those of `step`, because the environment may write into its own objects later.
+        `check` is called every tenth of a second while the member is recycled; it raises to end the wait.
 
         Raises:
-            SimulatorFault: it broke; begin to mend it.
+            SimulatorFault: it broke; call `begin_mending`.
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
@@ -163,12 +163,12 @@ class Restarter:
         return copied(observation), copied(info)
 
     def step(self, action: Any) -> Step:
-        """Return what the environment's step returns, all of it numbers that can be learned from.
+        """Return the result of the environment's step, with finite observation and reward.
 
         Observation and info are copies, and the environment gets a copy of the action.
 
         Raises:
-            SimulatorFault: it broke; begin to mend it.
+            SimulatorFault: it broke; call `begin_mending`.
             Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
@@ -181,37 +181,37 @@ class Restarter:
         return copied(observation), reward, terminated, truncated, copied(info)
 
     def action_mask(self) -> np.ndarray:
-        """Return which actions the environment allows in the next step; shape (choices,), bool.
+        """Return a mask of the actions that the environment allows in the next step; shape (choices,), bool.
 
         Raises:
-            SimulatorFault: it broke; begin to mend it.
+            SimulatorFault: it broke; call `begin_mending`.
             ConfigurationError: the environment returned no mask of its actions.
         """
         return mask_of(self.member.env)
 
     def set_attribute(self, name: str, value: Any) -> None:
-        """Set an attribute of the member's environment, where it is defined, and of each that follows it.
+        """Set an attribute of the member's environment, and of each environment that replaces it.
 
-        While the keeper is busy, it is set when the next episode begins.
+        While the restarter is busy, the attribute is set when the next episode begins.
         """
         self._attributes.set(name, value, None if self.busy else self.member.env)
 
     def pause(self) -> None:
-        """Let the member rest; a broken one is found by the next step that needs it."""
+        """Pause the member; the next step reports a fault if it is broken."""
         self._switch(self.member.pause)
 
     def recycle_resting(self, episodes: int) -> None:
-        """Begin to recycle the resting member if it is due before or amid the next `episodes`."""
+        """Begin to recycle the paused member if it is due before or during the next `episodes`."""
         if self.up() and (reason := self.member.due(episodes)):
             self._log_recycling(reason)
             self._recycles_resting = True
             self._begin(self._recycle_resting)
 
     def unpause(self, check: Check = go_on) -> None:
-        """End the rest; a broken member is found by the next step that needs it.
+        """End the pause; the next step reports a fault if the member is broken.
 
-        Waits for a recycling that began during the rest. If that fails, mending begins.
-        `check` is called every tenth of a second meanwhile; raises to wait no longer.
+        Waits for a recycling that began during the pause. If that recycling fails, a restart begins.
+        `check` is called every tenth of a second meanwhile; it raises to end the wait.
         """
         if self._recycles_resting:
             self._recycles_resting = False
@@ -223,7 +223,7 @@ class Restarter:
 
     def _begin(self, work: Callable[[], None]) -> None:
         self._abandoned = False
-        self._work = in_background(work, f"keeper-{self.name}")
+        self._work = in_background(work, f"restarter-{self.name}")
 
     def _start(self) -> None:
         try:
@@ -263,20 +263,23 @@ class Restarter:
         return True
 
     def _judge(self, fault: SimulatorFault) -> None:
-        """Raise ConfigurationError if the second process in a row shows the same mistake, before any step."""
+        """Raise ConfigurationError if two processes in a row show the same mistake before any step."""
         before, self._refusal = self._refusal, self._refusal_of(fault)
         if before and before == self._refusal:
             raise ConfigurationError(f"{self.name}: {fault}") from fault
 
     def _refusal_of(self, fault: SimulatorFault) -> str:
-        """Return what a fault of another process must be equal to, to show a mistake; "" if it shows none."""
+        """Return the mistake that a fault shows, to compare it with that of the next process.
+
+        It is "" if the fault shows no mistake of the configuration.
+        """
         if isinstance(fault, WorldMisfit):
             return "" if self.stepped else WorldMisfit.__name__
         refused = isinstance(fault, WrongData | SimulatorRefused)
         return str(fault) if refused and not self.meter.stepped else ""
 
     def _lose(self, spent: FaultBudgetSpent) -> None:
-        log.error("simulator given up: the others go on", simulator=self.name, fact=str(spent))
+        log.error("simulator given up: the others continue", simulator=self.name, fact=str(spent))
         self.lost = True
         self.watcher.given_up(self.name)
         with contextlib.suppress(SimulatorFault):
@@ -309,7 +312,7 @@ class Restarter:
                 await_one([self], check)
 
     def _log_recycling(self, reason: str) -> None:
-        """Log the first time, then one line a minute at most, with the number of all times."""
+        """Log the first recycling, then at most one line a minute with the number of all recyclings."""
         self._recycled += 1
         if self._clock() >= self._log_next:
             log.info("simulator recycled", simulator=self.name, times=self._recycled, reason=reason)
@@ -324,32 +327,32 @@ class Restarter:
         self.member.pause()
 
 
-def await_one(keepers: Sequence[Restarter], check: Check = go_on) -> None:
-    """Return when one of the busy keepers is busy no more; at once if none is busy.
+def await_one(restarters: Sequence[Restarter], check: Check = go_on) -> None:
+    """Wait until one of the busy restarters is no longer busy; return at once if none is busy.
 
     Args:
-        keepers: some of them may be ready or lost.
-        check: called every tenth of a second; raises to wait no longer.
+        restarters: some of them may be ready or lost.
+        check: called every tenth of a second; it raises to end the wait.
     """
-    works = _under_way(keepers)
+    works = _under_way(restarters)
     while works and not wait(works, LOOK_EVERY_S, FIRST_COMPLETED).done:
         check()
 
 
-def settle(keepers: Sequence[Restarter]) -> None:
-    """End what goes on in the keepers' threads: no further tries, and those under way fail.
+def settle(restarters: Sequence[Restarter]) -> None:
+    """End the work in the restarters' threads: running starts fail, and no others begin.
 
-    Waits `SETTLE_S` seconds at most, and as long as the request to one that does not answer takes.
+    Waits at most `SETTLE_S` seconds, plus the timeout of one request to a program that does not respond.
     """
-    for keeper in keepers:
-        keeper.abandon()
+    for restarter in restarters:
+        restarter.abandon()
     give_up = time.monotonic() + SETTLE_S
-    while (busy := [keeper for keeper in keepers if keeper.busy]) and time.monotonic() < give_up:
-        for keeper in busy:
+    while (busy := [restarter for restarter in restarters if restarter.busy]) and time.monotonic() < give_up:
+        for restarter in busy:
             if time.monotonic() < give_up:
-                keeper.member.abandon()
+                restarter.member.abandon()
         wait(_under_way(busy), LOOK_EVERY_S)
 
 
-def _under_way(keepers: Sequence[Restarter]) -> list[Future[None]]:
-    return [work for keeper in keepers if (work := keeper.under_way) is not None]
+def _under_way(restarters: Sequence[Restarter]) -> list[Future[None]]:
+    return [work for restarter in restarters if (work := restarter.under_way) is not None]

@@ -19,7 +19,7 @@ from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.recycle_policy import RecyclePolicy
 from palaestra_trainer.webots import Mode, Webots
-from palaestra_trainer.webots.facade_registry import withdraw
+from palaestra_trainer.webots.facade import open_facades
 
 _POLL_S = 0.1
 
@@ -29,8 +29,8 @@ MakeEnvironment = Callable[[RobotAbc, Scene], gymnasium.Env[Any, Any]]
 def driven_robot(robots: Sequence[RobotName], definition: str) -> RobotName | None:
     """Return the robot of a world that a class with this DEF name drives.
 
-    It is the first robot with that name. If none has it, it is the first one that is no supervisor; None if
-    all are supervisors.
+    It is the first robot with that name. If no robot has it, it is the first one that is not a supervisor.
+    None: all robots are supervisors.
     """
     of_class = (each for each in robots if definition and each.definition == definition)
     others = (each for each in robots if not each.supervisor)
@@ -44,7 +44,7 @@ class Simulator:
         name: `<group>-<index>`, as in the configuration.
         sidecar: starts and stops the simulator.
         make_environment: creates the environment from robot and scene.
-        start_deadline_s: the longest time for the sidecar to answer, and for the simulator after a start.
+        start_deadline_s: the longest wait in seconds for the sidecar's first response, and for each start.
         recycle: limits at which it is restarted between two episodes; by default never.
         robot: the class of the robot in its world.
 
@@ -75,7 +75,7 @@ class Simulator:
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )
-        withdraw(self.webots)
+        open_facades.withdraw(self.webots)
         self.robot = robot(self.webots, driven.ros_name, robots=[each.ros_name for each in state.robots])
         self.scene = SimulatedScene(self.webots, self.robot)
         self.env = make_environment(self.robot, self.scene)
@@ -91,7 +91,7 @@ class Simulator:
         return self.robot.simulation.simulated_s
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what the simulator left out of its world at its last start, in lines for people."""
+        """Return the parts of its world that the simulator left out at its last start, as text lines."""
         return self.sidecar.left_out
 
     def due(self, episodes: int = 1) -> str | None:
@@ -110,7 +110,7 @@ class Simulator:
         self.wear.begin()
 
     def restart(self) -> None:
-        """Stop the simulator, in any state, and start it, once its sidecar answers.
+        """Wait for the sidecar, stop the simulator in any state, and start it.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it, or its sidecar, does not start in time.
@@ -120,10 +120,10 @@ class Simulator:
         self.start()
 
     def await_sidecar(self) -> None:
-        """Return when the sidecar answers; a kubelet needs some time to restart a container.
+        """Wait until the sidecar responds; a kubelet needs some time to restart a container.
 
         Raises:
-            SimulatorDead, SimulatorHung: it did not answer within `start_deadline_s` seconds.
+            SimulatorDead, SimulatorHung: it did not respond within `start_deadline_s` seconds.
         """
         self._abandoned.clear()
         give_up = time.monotonic() + self.start_deadline_s
@@ -153,7 +153,7 @@ class Simulator:
             self.sidecar.expect_stop(0.0)
 
     def pause(self) -> None:
-        """Pause the simulator: it uses no processor time until `run`."""
+        """Pause the simulator: it uses no processor time until `unpause`."""
         self.webots.supervisor.set_mode(Mode.PAUSE)
 
     def unpause(self) -> None:
@@ -161,7 +161,7 @@ class Simulator:
         self.webots.supervisor.set_mode(Mode.FAST)
 
     def _memory(self) -> int | None:
-        # A sidecar that does not answer is no reason to restart its simulator.
+        # A sidecar that does not respond is not a reason to recycle its simulator.
         with contextlib.suppress(SimulatorFault):
             return self.sidecar.state().rss_bytes
         return None

@@ -2,13 +2,14 @@
 
 Both simulators belong to one sidecar and differ in their ROS names. A restart swaps their roles: the spare
 takes over at once if it is ready. The other one is restarted in its own thread and becomes the spare. If it
-does not start, it is started again, within a budget like that of the active one, and stays down after that.
+does not start, it is started again, within a budget like that of the active one. When that budget is spent,
+it stays down.
 
 If the spare breaks while it stands by, its fault is found and reported when it must take over. The restart
-after that waits for the other simulator, which is already being started. So no fault waits for more than one
-start.
+after that waits for the other simulator, which is already being started. So a fault never waits for more than
+one start.
 
-The environment belongs to the active simulator, so do not keep it over a restart.
+The environment belongs to the active simulator, so read `env` again after a restart.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class Standby:
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time of both since they were created, over all restarts."""
+        """Seconds of simulated time of both simulators since they were created, over all restarts."""
         return sum(each.simulated_s for each in self._both)
 
     def spare(self) -> StandbyState | None:
@@ -76,7 +77,7 @@ class Standby:
         return self._spare.state
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what the first simulator left out of its world; the other one has the same world."""
+        """Return the parts that the first simulator left out; the other one has the same world."""
         return self._both[0].left_out()
 
     def due(self, episodes: int = 1) -> str | None:
@@ -130,8 +131,8 @@ class Side:
     """One of the two simulators, and the thread that may be preparing it.
 
     Attributes:
-        simulator: only the thread may use it while it prepares it.
-        wanted: False: it is not started any more.
+        simulator: while the thread prepares it, only that thread may use it.
+        wanted: whether it may be started again.
     """
 
     def __init__(self, simulator: Simulator, limit: RestartLimit) -> None:
@@ -152,13 +153,13 @@ class Side:
         return None if preparation.exception() else StandbyState.READY
 
     def prepare(self) -> Future[None]:
-        """Begin to restart it until it is up, in any state, unless that is under way."""
+        """Begin to restart it, in any state, again until it is up; do nothing if that already runs."""
         if self._preparation is None or self._preparation.done():
             self._preparation = in_background(self._restart, f"standby-{self.simulator.name}")
         return self._preparation
 
     def take_over(self) -> None:
-        """Return when it is up and runs; wait no longer than the start deadline of a simulator.
+        """Wait until it is up, then unpause it; the wait ends at the start deadline of a simulator.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it did not start, or broke while it stood by.
@@ -174,7 +175,7 @@ class Side:
         simulator.wear.begin()
 
     def abandon(self) -> None:
-        """Make a start that is under way fail soon, and begin no other."""
+        """Make a running start fail soon, and begin no other."""
         self.wanted = False
         self.simulator.abandon()
 
@@ -183,8 +184,8 @@ class Side:
         self.wanted = False
         preparation, self._preparation = self._preparation, None
         while preparation is not None and not preparation.done():
-            # The kill makes its start fail and ends its thread. It may be needed twice: a process
-            # that is only about to be started cannot be killed yet.
+            # The kill makes the start fail and so ends its thread. It may be needed twice, because a process
+            # that is about to be started cannot be killed yet.
             self.abandon()
             wait([preparation], _ASK_AGAIN_S)
         self.simulator.stop()
@@ -213,9 +214,9 @@ class Side:
         simulator.pause()
 
     def _spend(self, fault: SimulatorFault) -> None:
-        """Return if it may be started once more; raise the fault if the budget is spent."""
+        """Count one more start against the budget; raise the fault if the budget is spent."""
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
-            log.error("standby left down until it is wanted", simulator=self.simulator.name, fact=str(spent))
+            log.error("standby stays down until it is needed", simulator=self.simulator.name, fact=str(spent))
             raise fault from spent

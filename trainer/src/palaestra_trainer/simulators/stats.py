@@ -1,4 +1,4 @@
-"""The counts of one simulator: steps, slow ones, resets, simulated time and spent restarts."""
+"""The counts of one simulator: steps, slow steps, resets, simulated time and spent restarts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Timed(Protocol):
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time in this attempt, over all restarts."""
+        """Seconds of simulated time in this attempt, over all restarts of the simulator."""
         ...
 
 
@@ -55,7 +55,7 @@ class SimulatorStats:
         stepped: whether an environment step was taken.
 
     Args:
-        member: the member that is played in.
+        member: the member whose steps are counted.
         budget: its restart budget.
     """
 
@@ -74,7 +74,7 @@ class SimulatorStats:
 
     @property
     def simulated_s(self) -> float | None:
-        """Simulated seconds; None: the member does not count them."""
+        """Seconds of simulated time; None: the member does not count it."""
         return self._member.simulated_s if isinstance(self._member, Timed) else None
 
     @property

@@ -1,4 +1,4 @@
-"""Run work in a thread that does not keep the process from ending."""
+"""Run work in a daemon thread, which does not keep the process alive."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a run reports while it trains: progress, figures, /status, /metrics, the log and the display."""
+"""Reports of a run while it trains: progress, metrics, /status, /metrics, the log and the display."""

@@ -32,11 +32,11 @@ class ProgressDisplay(Protocol):
 
     @property
     def due(self) -> bool:
-        """Whether it is time to show again; cheap, called at every step."""
+        """Whether the display should be updated now; cheap, because it is called at every step."""
         ...
 
     def show(self, status: TrainerStatus) -> None:
-        """Show where the run stands."""
+        """Show the progress of the run."""
         ...
 
 
@@ -55,7 +55,7 @@ class _Paced:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Do nothing: nothing is open."""
+        """Do nothing, because nothing is open."""
 
     @property
     def due(self) -> bool:
@@ -88,7 +88,7 @@ class Lines(_Paced):
 
 
 class Bar(_Paced):
-    """A progress bar with the figures beside it."""
+    """A progress bar, followed by success rate, mean return, speed and faults."""
 
     every_s = 0.5
 

@@ -1,8 +1,8 @@
-"""Account for the wall clock of a run, by cause.
+"""Divide the wall-clock time of a run among causes.
 
-Every second since the start is booked on exactly one cause, so the causes add up to the wall clock. Only the
-thread that created the ledger books time. Work of other threads, such as the repair of one of several
-simulators, does not delay the run, so it is not booked.
+Every second since the start is counted under exactly one cause, so the causes add up to the wall-clock time.
+Only the thread that created the ledger counts time. Work of other threads, such as the restart of one of
+several simulators, does not delay the run, so it is not counted.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)
 class GoodputLedger:
     """The ledger of one attempt; it begins with the cause `starting`.
 
-    A vector step is booked on transport, except the time that the thread waited for simulators, which is
-    booked on stepping.
+    A vector step counts as transport, except for the time that the thread waited for simulators, which counts
+    as stepping.
 
     Args:
-        clock: returns seconds, from any origin.
-        waited: returns the seconds that the calling thread has waited for simulators, from any origin.
+        clock: returns seconds from any starting point.
+        waited: returns the seconds that the calling thread has waited for simulators since any time.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class GoodputLedger:
 
     @property
     def cause(self) -> Cause:
-        """The cause that time is booked on now."""
+        """The cause under which time is counted now."""
         return self._cause
 
     @contextmanager
     def spending(self, cause: Cause) -> Iterator[None]:
-        """Book the time inside on `cause`, except that of inner contexts; no effect in other threads."""
+        """Count the time inside under `cause`, except that of inner contexts; no effect in other threads."""
         if threading.get_ident() != self._owner:
             yield
             return
@@ -63,10 +63,10 @@ class GoodputLedger:
         self._in_vain |= threading.get_ident() == self._owner
 
     def seconds(self) -> dict[str, float]:
-        """Return the seconds booked on each cause so far; may be called from any thread.
+        """Return the seconds counted under each cause so far; callable from any thread.
 
-        They add up to the wall clock without the current step. How to divide that step among the causes is
-        known only at its end, and no cause may ever decrease.
+        They add up to the wall-clock time without the current step. That step can be divided among the causes
+        only at its end, and the seconds of a cause must never decrease.
         """
         with self._lock:
             seconds = dict(self._seconds)
@@ -75,7 +75,7 @@ class GoodputLedger:
         return {cause.value: spent for cause, spent in seconds.items()}
 
     def _turn_to(self, cause: Cause) -> Cause:
-        """Book the time since the last call and switch to `cause`; return the previous cause."""
+        """Count the time since the last call, switch to `cause`, and return the previous cause."""
         with self._lock:
             before, now, waited = self._cause, self._clock(), self._waited()
             spent = now - self._since
@@ -90,6 +90,6 @@ class GoodputLedger:
 
 
 def trained_share(seconds: Mapping[str, float]) -> float | None:
-    """Return the share of the wall clock that trained, 0 to 1; None before any time was booked."""
+    """Return the share of the time that was spent on training, 0 to 1; None before any time was counted."""
     total = sum(seconds.values())
     return sum(seconds.get(cause, 0.0) for cause in TRAINING) / total if total > 0 else None

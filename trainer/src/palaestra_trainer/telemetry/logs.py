@@ -18,7 +18,7 @@ _last_lines: deque[str] = deque(maxlen=MOST_LINES)
 
 
 def configure_logs() -> None:
-    """Write log lines to the current standard error; a progress bar replaces it."""
+    """Write log lines to the current `sys.stderr`, because a progress bar replaces that stream."""
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,
@@ -36,7 +36,7 @@ def last_lines() -> tuple[str, ...]:
 
 
 class _Renderer(structlog.dev.ConsoleRenderer):
-    """Renders without the passwords of addresses, and keeps the last lines."""
+    """Renders log lines without the passwords in addresses, and keeps the last lines."""
 
     def __call__(self, logger: Any, name: str, event_dict: structlog.typing.EventDict) -> str:
         text = masked(super().__call__(logger, name, event_dict))

@@ -1,4 +1,4 @@
-"""Figures of one attempt that only /metrics shows; they are not kept for the next attempt."""
+"""Values of one attempt that only /metrics exports; they are not kept for the next attempt."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _successes() -> deque[bool]:
 
 @dataclass(slots=True)
 class MetricValues:
-    """Written by the training thread, read by any thread.
+    """The values; the training thread writes them, and any thread may read them.
 
     Attributes:
         returns: returns of training episodes.
@@ -71,7 +71,7 @@ class MetricValues:
 
 
 class Logged(KVWriter):
-    """An output of Stable-Baselines3's logger: gives `figures` the values that TensorBoard gets."""
+    """An output of Stable-Baselines3's logger: copies the values for TensorBoard to `figures`."""
 
     def __init__(self, figures: MetricValues) -> None:
         self._figures = figures
@@ -84,4 +84,4 @@ class Logged(KVWriter):
         self._figures.logged = {**self._figures.logged, **key_values}
 
     def close(self) -> None:
-        """Do nothing: nothing is open."""
+        """Do nothing, because nothing is open."""

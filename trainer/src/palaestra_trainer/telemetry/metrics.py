@@ -1,7 +1,7 @@
 """Export the state of a run as Prometheus metrics.
 
-Nothing is counted here: each scrape reads `Progress`, so that /metrics and /status cannot differ. Every
-family is always present, and has no value while its value is unknown.
+This module counts nothing: each scrape reads `Progress`, so that /metrics and /status cannot differ. Every
+family is always present; it has no sample while its value is unknown.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.telemetry.metric_values import MetricValues
 from palaestra_trainer.telemetry.progress import Counters, Progress
 
-# For each value of the label, the name under which Stable-Baselines3 logs it.
+# Each value of the label, with the name under which Stable-Baselines3 logs it.
 LOSSES = MappingProxyType({name: f"train/{name}" for name in metric_definitions.LOSSES})
 MEASURES = MappingProxyType(
     {"exploration_rate": "rollout/exploration_rate", "ent_coef": "train/ent_coef", "std": "train/std"}

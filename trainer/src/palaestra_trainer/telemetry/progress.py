@@ -1,4 +1,4 @@
-"""The progress of a run, in one place, for everything that shows it.
+"""The progress of a run, in one object for all of its readers.
 
 The training loop, the VecEnv and the evaluations report to it, each from its
 own thread. /status, /metrics, the display, the summary and the watchdog read it.
@@ -46,7 +46,7 @@ PHASES: Mapping[Cause, str] = MappingProxyType(
 
 @dataclass(slots=True)
 class Counters:
-    """The counts over all attempts of a run, which its checkpoints therefore keep.
+    """The counts over all attempts of a run; its checkpoints keep them.
 
     Attributes:
         episodes: collected episodes that ended without a fault.
@@ -70,7 +70,7 @@ class Counters:
 
     @property
     def seconds(self) -> float:
-        """Wall time of the run."""
+        """Wall-clock seconds of the run."""
         return sum(self.goodput.values())
 
     @property
@@ -98,12 +98,12 @@ class Progress:
         step: valid environment steps so far, over all attempts.
         target: steps at which the run ends.
         counters: counts over all attempts; the time of this attempt is missing, see `counted`.
-        success_rate: of this attempt's last evaluation or confirmation; None before the first, or if the
-            environment reports no success.
-        success_interval: the interval around it; None if it is None.
-        checkpoint: the newest checkpoint; None if there is none.
+        success_rate: success rate of this attempt's last evaluation or confirmation; None before the first,
+            or if the environment reports no success.
+        success_interval: the interval around `success_rate`; None if that is None.
+        checkpoint: the newest checkpoint; None before the first.
         attempt: this attempt's number in the run directory; None before it is recorded.
-        figures: counts of this attempt only.
+        figures: values of this attempt only, for /metrics.
     """
 
     def __init__(
@@ -136,11 +136,11 @@ class Progress:
 
     @property
     def awaits_simulators(self) -> bool:
-        """Whether the run waits for simulators now, and for nothing else."""
+        """Whether the run waits only for simulators now."""
         return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING, Cause.RECYCLING}
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Book the time inside the context on `cause`, see `GoodputLedger`."""
+        """Count the time inside the context under `cause`, see `GoodputLedger`."""
         return self._goodput.spending(cause)
 
     def stepped(self, steps: int) -> None:
@@ -165,7 +165,7 @@ class Progress:
         self._returns.extend(returns)
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
-        """Count a fault and the steps of the episode that it cut; mark the simulator as down."""
+        """Count a fault and the steps of the episode that it truncated; mark the simulator as down."""
         with self._lock:
             self.counters.steps_lost += steps_lost
             self.counters.faults[fault.kind] += 1
@@ -181,7 +181,7 @@ class Progress:
             )
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """Count a step that took much longer than others; it is not a fault."""
+        """Count a step that took much longer than others, which is not a fault."""
         del seconds
         with self._lock:
             self.counters.faults[FaultKind.SLOW] += 1
@@ -199,7 +199,7 @@ class Progress:
             self._standings.gave_up(simulator)
 
     def add(self, simulator: str, role: Role) -> None:
-        """Add a simulator, unless it is there."""
+        """Add a simulator, unless it is known already."""
         with self._lock:
             self._standings.add(simulator, role)
 
@@ -208,11 +208,11 @@ class Progress:
         self._standings.has_standby(simulator, ask)
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns what the simulator left out; any thread may call it."""
+        """Set the function that returns the parts that the simulator left out; any thread may call it."""
         self._standings.reports_left_out(simulator, ask)
 
     def left_out(self) -> tuple[str, ...]:
-        """Return what the simulators leave out of their worlds, in lines that begin with the group."""
+        """Return the parts that simulators left out of their worlds, in lines that begin with the group."""
         return self._standings.left_out()
 
     def started(self, simulator: str) -> None:

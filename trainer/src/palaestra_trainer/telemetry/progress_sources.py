@@ -1,4 +1,4 @@
-"""Let a run's progress show what members report of themselves."""
+"""Connect the reports of members to the progress of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from palaestra_trainer.telemetry.progress import Progress
 
 
 def follow(progress: Progress, members: Iterable[Member]) -> None:
-    """Show the spares of members, and what their simulators leave out of their worlds."""
+    """Show the state of members' spares, and the parts that their simulators left out of their worlds."""
     for member in members:
         if isinstance(member, Spared):
             progress.has_standby(member.name, member.spare)

@@ -1,4 +1,4 @@
-"""The state of each simulator of a run, and the last faults. Not locked: `Progress` holds the lock."""
+"""The state of each simulator of a run, and the last faults. `Progress` holds the lock for this module."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
 from palaestra_trainer.metric_definitions import RECYCLED
 
-FLAPPING_S = 600.0  # a simulator is steady again this long after the last call of `flaps`
+FLAPPING_S = 600.0  # a simulator counts as flapping for this time after the last call of `flaps`
 AskStandby = Callable[[], str | None]
 AskLeftOut = Callable[[], tuple[str, ...]]
 
 
 def _none() -> None:
-    """Return the state of a spare that does not exist."""
+    """Return the state of the spare of a simulator without one."""
 
 
 def _nothing() -> tuple[str, ...]:
-    """Return what a simulator left out that does not report it."""
+    """Return the left-out parts for a simulator that does not report them."""
     return ()
 
 
@@ -52,7 +52,7 @@ class SimulatorStatuses:
         self.faults: deque[FaultRecord] = deque(maxlen=MOST_FAULTS)
 
     def add(self, simulator: str, role: Role) -> None:
-        """Add a simulator, unless it is there."""
+        """Add a simulator, unless it is known already."""
         self._all.setdefault(simulator, _Standing(role=role))
 
     def broke(self, fault: FaultRecord) -> None:
@@ -71,7 +71,7 @@ class SimulatorStatuses:
         self._all[simulator].state = "ready"
 
     def restarted(self, simulator: str) -> None:
-        """Count a restart of a simulator, by its last fault."""
+        """Count a restart of a simulator under the kind of its last fault."""
         standing = self._all[simulator]
         standing.restarts[standing.last_kind] += 1
 
@@ -93,7 +93,7 @@ class SimulatorStatuses:
         self._all[simulator].standby = ask
 
     def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
-        """Set the function that returns what the simulator left out; any thread may call it."""
+        """Set the function that returns the parts that the simulator left out; any thread may call it."""
         self._all[simulator].left_out = ask
 
     def left_out(self) -> tuple[str, ...]:

@@ -20,10 +20,10 @@ from palaestra_trainer.telemetry.progress import Progress
 def status_server(
     address: str, progress: Progress, known: Mapping[Family, Values] = MappingProxyType({})
 ) -> Server:
-    """Return a server that has the address and answers once it is started.
+    """Return a server that has bound the address; it responds after its start.
 
     Args:
-        address: `host:port`; port 0 takes a free one.
+        address: `host:port`; port 0 chooses a free one.
         progress: the state of the run.
         known: metrics that do not change, see `metrics.constants`.
 

@@ -1,6 +1,6 @@
 """Robots and a task that need no simulator, and the checks that every robot must pass.
 
-They are shipped, not kept among the tests, because authors of environments, robots and algorithms need them.
+They ship with the package, because authors of environments, robots and algorithms need them.
 """
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene

@@ -1,9 +1,9 @@
 """The definition of a robot and of each capability, as checks for any implementation.
 
 A fake, a simulated and a real robot of one class pass the same checks, so an environment
-can be moved from one to the other. Each rule is a constant: the sentence in the
-error of a robot that fails it. The checks drive, so give the robot half a meter of
-free floor on every side.
+can be moved from one to the other. Each rule is a constant, a sentence that is also the
+error message for a robot that fails it. The checks move the robot, so give it half a meter
+of free floor on every side.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ MOTORS_ARE_NAMED = "motors has a name and greatest a positive number for each mo
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
-PERIODS = 3  # of each movement: enough for the constant speed to outweigh the acceleration
+PERIODS = 3  # periods of each movement: enough for the constant speed to outweigh the acceleration
 STILL_M = 0.002  # apparent motion of a standing robot: odometry has steps
 RESET_M = 0.01  # a simulator may let the robot settle on its wheels
-SHARE = 0.5  # of its greatest speeds, at which steering is checked
+SHARE = 0.5  # share of the robot's greatest speeds at which steering is checked
 
 
 class NotConforming(TrainerError, AssertionError):
@@ -82,7 +82,7 @@ def check_scene(robot: Any, scene: Scene, start: Pose, target: tuple[float, floa
         robot: the robot in the scene, with `Steering` and `Localization`.
         scene: the scene to check.
         start: a pose with half a meter of free floor on every side.
-        target: x, y in meters of another free place.
+        target: x, y in meters of another free position.
 
     Raises:
         NotConforming: with the broken rule and the observed value.
@@ -237,7 +237,7 @@ def _check_readings_stand_still(robot: RobotAbc) -> None:
 
 
 def _readings(robot: object) -> list[Any]:
-    """Return what the robot senses without devices that have to be taken into use, as lists."""
+    """Return the readings of the robot as a list, except those of optional devices."""
     return [
         *(robot.distances().tolist() if isinstance(robot, Distances) else ()),
         *(robot.joints().tolist() if isinstance(robot, Joints) else ()),
@@ -273,7 +273,7 @@ def _numbers(robot: Any) -> NDArray[np.float64]:
 
 
 def moved(before: Pose, after: Pose) -> Twist:
-    """Return how far a robot moved: meters forward and left of its first pose, radians turned."""
+    """Return a robot's motion in the frame of its first pose: meters forward and left, radians turned."""
     dx, dy = after.x_m - before.x_m, after.y_m - before.y_m
     c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
     turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)

@@ -1,4 +1,4 @@
-"""A life that ends at given steps, as that of a simulator that crashes."""
+"""A base class for fakes that crash at given steps, as a simulator does."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from palaestra_trainer.errors import SimulatorDead
 
 
 class Crashing:
-    """A thing that dies at some of its steps, and lives again after `restart`.
+    """A fake that crashes at some of its steps, and works again after `restart`.
 
     Args:
-        deaths: numbers of the steps, counted from 1 over its whole life, at which it dies.
+        deaths: numbers of the steps at which it crashes, counted from 1 and over restarts.
         name: its name in faults.
     """
 
@@ -22,14 +22,14 @@ class Crashing:
         self._dead = False
 
     def restart(self) -> None:
-        """Bring it back to life."""
+        """Make it work again after a crash."""
         self._dead = False
 
     def _live_a_step(self) -> None:
-        """Count a step, which may be its last.
+        """Count a step, and crash if it is one of `deaths`.
 
         Raises:
-            SimulatorDead: it is dead.
+            SimulatorDead: it has crashed, in this step or before.
         """
         self._live()
         self._steps += 1
@@ -37,10 +37,10 @@ class Crashing:
         self._live()
 
     def _live(self) -> None:
-        """Return while it lives.
+        """Check that it has not crashed.
 
         Raises:
-            SimulatorDead: it is dead.
+            SimulatorDead: it has crashed.
         """
         if self._dead:
             raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")

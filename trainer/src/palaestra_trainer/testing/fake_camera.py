@@ -1,8 +1,8 @@
-"""What the cameras of a `FakeRobotino` see, by geometry: the target's pole, cylinders, walls and floor.
+"""Camera images of a `FakeRobotino`, computed by geometry: the target's pole, cylinders, walls and floor.
 
-Everything stands upright on the floor. So a column of pixels looks along one direction over the floor, and
-the distance to each thing is computed once a column. A pixel sees the nearest thing that it meets between
-foot and top. Colors are flat: there is no light, no shadow and no noise, unlike in a simulator that renders.
+All objects stand upright on the floor. So each column of pixels has one direction over the floor, and the
+distance to each object is computed once per column. A pixel shows the nearest object that its ray meets
+between foot and top. Colors are flat, without light, shadow and noise, unlike in a simulator that renders.
 
 Camera, pole and colors are those of the shipped world `seeing`.
 """
@@ -22,8 +22,8 @@ from palaestra_trainer.testing.fake_scene import CYLINDER_HEIGHT_M, CYLINDER_RAD
 
 HEIGHT, WIDTH = 48, 64  # pixels
 FIELD_OF_VIEW_RAD = 1.0472  # horizontal
-FORWARD_M, ABOVE_M = 0.23, 0.3  # from the robot's center, from the floor
-RANGE_M = (0.05, 6.0)  # of the depth camera
+FORWARD_M, ABOVE_M = 0.23, 0.3  # position of the camera from the robot's center, and from the floor
+RANGE_M = (0.05, 6.0)  # range of the depth camera
 POLE_HEIGHT_M, POLE_RADIUS_M = 0.5, 0.05
 WALL_HEIGHT_M = 0.3
 
@@ -34,7 +34,7 @@ Colors = NDArray[np.uint8]
 Depths = NDArray[np.float32]
 _Row = NDArray[np.floating[Any]]
 
-# The line of sight of a pixel, per meter forward: meters to the left by column, meters up by row.
+# These give the ray of a pixel, per meter forward: meters to the left by column, meters up by row.
 _FOCAL = 0.5 * WIDTH / math.tan(0.5 * FIELD_OF_VIEW_RAD)  # pixels
 _LEFT: _Row = (0.5 * WIDTH - 0.5 - np.arange(WIDTH)) / _FOCAL
 _UP: _Row = (0.5 * HEIGHT - 0.5 - np.arange(HEIGHT))[:, None] / _FOCAL
@@ -43,7 +43,7 @@ _FLOOR_M: _Row = np.where(_UP < 0.0, ABOVE_M / np.maximum(-_UP, 1e-9), math.inf)
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """A thing as the columns of an image meet it: meters forward to it, its height and its color."""
+    """An object in an image: meters forward to it by column, its height and its color."""
 
     forward_m: _Row
     height_m: float
@@ -59,7 +59,7 @@ def look(pose: Pose, target: Point, cylinders: Sequence[Point]) -> tuple[Colors,
     colors = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     colors[:] = np.where(_UP < 0.0, np.array(FLOOR, np.uint8), np.array(SKY, np.uint8))[:, None]
     for thing in _things(pose, target, cylinders):
-        top_m = ABOVE_M + _UP * thing.forward_m  # infinite beside the thing, and so refused
+        top_m = ABOVE_M + _UP * thing.forward_m  # infinite, and so not seen, in columns beside the object
         seen = (thing.forward_m < depths) & (top_m >= 0.0) & (top_m <= thing.height_m)
         np.copyto(depths, thing.forward_m, where=seen)
         colors[seen] = thing.color
@@ -82,7 +82,7 @@ def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_
 
 
 def _to_wall(position_m: float, way: _Row) -> _Row:
-    """Return meters forward to the wall on the side to which each column looks."""
+    """Return meters forward to the wall that each column faces."""
     away = np.copysign(np.maximum(np.abs(way), 1e-9), way)
     wall: _Row = (np.copysign(HALF_SIDE_M, way) - position_m) / away
     return wall

@@ -1,8 +1,8 @@
 """An e-puck on the floor of the world `pen`, computed in this process.
 
 `fake_pen()` returns a robot and a scene that run at some ten thousand steps a second. The robot drives as
-`FakeWheels` does; its infrared sensors have the places and the range of the real ones. It can die at given
-steps, as simulators do.
+`FakeWheels` does; its infrared sensors have the positions and the range of the real ones. It can crash at
+given steps, as simulators do.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from palaestra_trainer.testing.fake_scene import FakeScene
 from palaestra_trainer.testing.fake_wheels import FakeWheels
 from palaestra_trainer.testing.rays import nearest
 
-# x and y of each sensor, from the left of the front counter-clockwise. Source: E-puck of Webots.
+# x and y of each sensor, counter-clockwise from the front left. Source: E-puck of Webots.
 SENSORS_M = np.array(
     [
         (0.03, 0.01),
@@ -46,7 +46,7 @@ PEN = FloorLayout(
 
 
 class FakeEPuck(FakeWheels, Distances):
-    """An e-puck, computed here. The arguments are those of `FakeWheels`."""
+    """An e-puck, computed in this process. The arguments are those of `FakeWheels`."""
 
     floor = PEN
     axle_m = 0.052
@@ -59,7 +59,7 @@ class FakeEPuck(FakeWheels, Distances):
     distance_range_m = (0.0, 0.07)
 
     def distances(self) -> NDArray[np.float32]:
-        """Return meters to the nearest obstacle, shape (8,), from the left of the front counter-clockwise."""
+        """Return meters to the nearest obstacle, shape (8,), counter-clockwise from the front left."""
         self._live()
         return self._distances.copy()
 

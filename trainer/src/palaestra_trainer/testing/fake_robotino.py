@@ -2,9 +2,9 @@
 
 `fake_arena()` returns a robot and a scene for `MoveToTargetEnv` that run at some
 twenty thousand steps a second, for notebooks, tests and experiments with rewards.
-`fake_seeing()` is the same for `SeeTarget`: its robot has cameras. The
-physics are those that matter to the task: acceleration takes time, walls and cylinders
-stop the robot and let it slide, infrared has a range of 40 cm. It can die at given
+`fake_seeing()` is the same for `SeeTarget`: its robot has cameras. Only the physics
+that the task needs are computed: acceleration takes time, walls and cylinders stop the
+robot and let it slide, infrared has a range of 40 cm. The robot can crash at given
 steps, as simulators do.
 """
 
@@ -33,22 +33,22 @@ from palaestra_trainer.testing.fake_scene import (
 )
 
 BASIC_STEP_S = 0.032
-BASIC_STEPS = 6  # in one control period
+BASIC_STEPS = 6  # number of basic steps in one control period
 ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotino3/base.c
-NOISE = 0.005  # of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
+NOISE = 0.005  # as a share of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
 
 
 class FakeRobotino(Crashing, RobotinoAbc):
-    """A Robotino on the arena's floor, computed here.
+    """A Robotino on the arena's floor, computed in this process.
 
     Args:
-        deaths: numbers of the `advance` calls, counted from 1 over its whole life, at
-            which it dies; every call raises `SimulatorDead` from then until `restart`.
+        deaths: numbers of the `advance` calls at which it crashes, counted from 1 and over
+            restarts; every call raises `SimulatorDead` from then until `restart`.
         name: its name in faults.
 
     Attributes:
-        cylinders: x, y in meters of those that stand on the floor.
-        target: x, y in meters of the mark, a pole that cameras see.
+        cylinders: x, y in meters of the cylinders that stand on the floor.
+        target: x, y in meters of the mark, which is a pole for cameras.
     """
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
@@ -67,7 +67,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
 
     @property
     def layout(self) -> FloorLayout:
-        """The arena with what stands in it; only its cylinders are simulated."""
+        """The arena with its obstacles; only its cylinders are simulated."""
         return self._layout
 
     @layout.setter
@@ -96,7 +96,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._wanted = (vx, vy, omega)
 
     def advance(self) -> int:
-        """Simulate one control period; there are never extra ones."""
+        """Simulate one control period; return 0, because extra periods are never needed."""
         self._live_a_step()
         self._bumped = False
         for _ in range(BASIC_STEPS):
@@ -107,7 +107,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         return 0
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
+        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
         self._live()
         self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
         self._wanted = self._velocity = (0.0, 0.0, 0.0)
@@ -130,7 +130,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._heading_rad = wrapped(self._heading_rad + omega * BASIC_STEP_S)
 
     def _slide(self) -> None:
-        """Push the robot out of the obstacle that it hit; the rest of its motion is sliding."""
+        """Push the robot out of an obstacle that it hit, so that it slides along it."""
         for x, y in self.cylinders:
             reach = CYLINDER_RADIUS_M + RADIUS_M
             distance = math.hypot(self._x_m - x, self._y_m - y)
@@ -150,7 +150,7 @@ class FakeRobotino(Crashing, RobotinoAbc):
         self._distances = np.clip(seen * noise, *SENSOR_RANGE_M).astype(np.float32)
 
     def _ray(self, bearing_rad: float) -> float:
-        """Return meters from the robot's body to the nearest obstacle in this direction of the world."""
+        """Return meters from the robot's body to the nearest obstacle in this direction in the world."""
         ux, uy = math.cos(bearing_rad), math.sin(bearing_rad)
         nearest = min(_to_wall(self._x_m, ux), _to_wall(self._y_m, uy))
         for x, y in self.cylinders:
@@ -169,12 +169,12 @@ class FakeSeeingRobotino(FakeRobotino, Cameras):
         self._in_use: set[str] = set()
 
     def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
-        """Let the chosen cameras have an image from the next `advance` on."""
+        """Make the chosen cameras render an image in each later `advance`."""
         self._live()
         self._in_use |= {name for name, wanted in (("color", color), ("depth", depth)) if wanted}
 
     def color_image(self) -> NDArray[np.uint8]:
-        """Return what the camera sees from the pose after the last step, a new array."""
+        """Return the camera's image from the pose after the last step, a new array."""
         return self._look("color")[0]
 
     def depth_image(self) -> NDArray[np.float32]:

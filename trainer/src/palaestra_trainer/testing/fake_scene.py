@@ -10,15 +10,15 @@ from palaestra_trainer.robots.base import Scene
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
-HALF_SIDE_M = 2.0  # of the arena, from the center to the inner faces of the walls
+HALF_SIDE_M = 2.0  # from the center of the arena to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
 CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
 CYLINDER_HEIGHT_M = 0.4
-STORED_M = -0.7  # height of a cylinder that waits under the floor of the world `seeing`
+STORED_M = -0.7  # height of a cylinder that is stored under the floor of the world `seeing`
 
 
 def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLINDER_HEIGHT_M) -> FloorLayout:
-    """Return the arena of the shipped world with cylinders at these places, their centers at `height_m`."""
+    """Return the arena of the shipped world with cylinders at these positions, centered at `height_m`."""
     half = 0.5 * CYLINDER_HEIGHT_M
     return FloorLayout(
         low=(-HALF_SIDE_M, -HALF_SIDE_M),
@@ -38,20 +38,20 @@ def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLIND
 
 
 class Placed(Protocol):
-    """A fake robot, as far as its scene knows it."""
+    """The interface of a fake robot for its scene."""
 
     target: Point
 
     @property
     def layout(self) -> FloorLayout:
-        """The floor, and what stands on it."""
+        """The floor and the obstacles on it."""
         ...
 
     @layout.setter
     def layout(self, layout: FloorLayout) -> None: ...
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
+        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
         ...
 
 
@@ -60,7 +60,7 @@ class FakeScene(Scene):
 
     Args:
         robot: the robot.
-        layout: what stands on the floor when an episode begins.
+        layout: the floor and the obstacles on it when an episode begins.
     """
 
     def __init__(self, robot: Placed, layout: FloorLayout | None = None) -> None:
@@ -72,17 +72,17 @@ class FakeScene(Scene):
 
     @property
     def target(self) -> Point:
-        """Where the mark is: x, y in meters."""
+        """The position of the mark: x, y in meters."""
         return self._robot.target
 
     def begin(self, seed: int) -> None:
-        """Put everything back to its place."""
+        """Put all obstacles back to their initial positions."""
         self._seed = seed
         self._things = {thing.name: thing for thing in self._first.obstacles}
         self._robot.layout = self._first
 
     def layout(self) -> FloorLayout:
-        """Return the floor, and what stands on it now."""
+        """Return the floor and the obstacles on it now."""
         return self._robot.layout
 
     def place(self, start: Pose, target: Point) -> None:
@@ -95,10 +95,10 @@ class FakeScene(Scene):
         self._robot.target = target
 
     def put(self, name: str, place: tuple[float, float, float]) -> None:
-        """Let an obstacle stand at x, y, z (meters) until the next `begin`.
+        """Move an obstacle to x, y, z (meters) until the next `begin`.
 
         Raises:
-            WrongData: there is none of that name.
+            WrongData: no obstacle has that name.
         """
         if name not in self._things:
             raise WrongData("fake", f"the world has no node DEF {name}")

@@ -1,7 +1,7 @@
 """A task with any pair of spaces, computed in this process, to try algorithms on.
 
-Its observations and rewards depend on the seed of the episode and on every action since, and on nothing else.
-So it repeats itself, and a resumed run that lost a part of its past becomes another run.
+Its observations and rewards depend only on the seed of the episode and on every action since. So a run is
+repeatable, and a resumed run that lost a part of its state differs from the original.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ ACTIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
 
 
 class FakeTask(Crashing, gymnasium.Env[Any, Any]):
-    """Episodes of at most `max_steps` steps whose observations are drawn anew at each step.
+    """Episodes of at most `max_steps` steps; each step draws a new observation.
 
     Args:
-        observation_space: a copy of it is drawn from.
-        action_space: a copy of it is the task's.
-        deaths: numbers of the steps, counted from 1 over its whole life, at which it dies; see `restart`.
+        observation_space: the space of observations; the task uses a copy.
+        action_space: the space of actions; the task uses a copy.
+        deaths: numbers of the steps at which it crashes, counted from 1 and over restarts; see `restart`.
         max_steps: steps after which an episode is truncated.
     """
 
@@ -77,7 +77,7 @@ class FakeTask(Crashing, gymnasium.Env[Any, Any]):
         return self._observe(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Take a step; one of nine ends the episode."""
+        """Take a step; on average one of nine terminates the episode."""
         self._live_a_step()
         self._length += 1
         self._past = zlib.crc32(np.ascontiguousarray(action).tobytes(), self._past)
@@ -91,14 +91,14 @@ class FakeTask(Crashing, gymnasium.Env[Any, Any]):
 
 
 class MaskedTask(FakeTask):
-    """A fake task that forbids actions: what came before decides which ones.
+    """A fake task that forbids actions; the previous actions of the episode decide which ones.
 
     Raises:
         AssertionError: a step has a forbidden action.
     """
 
     def action_masks(self) -> np.ndarray:
-        """Return which choices the next step allows: at least one of each number of the action."""
+        """Return a mask of the choices that the next step allows, at least one per number of the action."""
         self._live()
         return self._allowed()
 

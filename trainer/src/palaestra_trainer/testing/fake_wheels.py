@@ -1,6 +1,7 @@
 """A robot on two wheels, computed in this process.
 
-It drives without slip and at once as commanded; walls and things stop it and let it slide. A subclass senses.
+It drives without slip and follows commands at once; walls and obstacles stop it and let it slide. A subclass
+adds sensors.
 """
 
 from __future__ import annotations
@@ -23,17 +24,17 @@ PERIOD_S = 0.192
 
 
 class FakeWheels(Crashing, RobotAbc, Steering, Localization):
-    """A robot on two wheels; a subclass has `floor`, sizes and speeds, and implements `_look`.
+    """A robot on two wheels; a subclass sets `floor`, sizes and speeds, and implements `_look`.
 
     Args:
-        deaths: numbers of the `advance` calls, counted from 1 over its whole life, at which it dies; every
+        deaths: numbers of the `advance` calls at which it crashes, counted from 1 and over restarts; every
             call raises `SimulatorDead` from then until `restart`.
         name: its name in faults.
 
     Attributes:
-        floor: the floor that it stands on at first.
-        axle_m: from one wheel to the other.
-        layout: the floor and what stands on it.
+        floor: the initial layout.
+        axle_m: distance between the wheels.
+        layout: the floor and the obstacles on it.
         target: x, y in meters of the mark.
     """
 
@@ -53,7 +54,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         return PERIOD_S
 
     def steer(self, forward: float, turn: float) -> None:
-        """Set the wanted velocity; slower along the same curve if a wheel cannot run so fast."""
+        """Set the wanted velocity; reduce it along the same curve if a wheel cannot turn so fast."""
         self._live()
         rim = abs(forward) + 0.5 * abs(turn) * self.axle_m
         slower = min(1.0, self.speed_m_s / max(rim, self.speed_m_s))
@@ -65,7 +66,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         return Pose(self._x_m, self._y_m, self._heading_rad)
 
     def advance(self) -> int:
-        """Simulate one control period; there are never extra ones."""
+        """Simulate one control period; return 0, because extra periods are never needed."""
         self._live_a_step()
         forward, turn = self._wanted
         middle = self._heading_rad + 0.5 * turn * PERIOD_S
@@ -77,7 +78,7 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
         return 0
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
+        """Put the robot at rest at `pose` and update all readings; `seed` decides the noise."""
         self._live()
         self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
         self._wanted = (0.0, 0.0)
@@ -86,10 +87,10 @@ class FakeWheels(Crashing, RobotAbc, Steering, Localization):
 
     @abstractmethod
     def _look(self) -> None:
-        """Let the sensors measure from the pose of now."""
+        """Update the readings of the sensors from the current pose."""
 
     def _slide(self) -> None:
-        """Push the robot out of the walls and of the things that it hit."""
+        """Push the robot out of walls and obstacles that it hit."""
         (low_x, low_y), (high_x, high_y) = self.layout.low, self.layout.high
         for thing in self.layout.obstacles:
             inside = self.radius_m - thing.gap(self._x_m, self._y_m)

@@ -1,4 +1,4 @@
-"""Rays of the fakes: meters to the nearest thing on a floor of walls, rectangles and circles."""
+"""Rays of the fakes: meters to the nearest object on a floor of walls, rectangles and circles."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Eye = tuple[float, float] | tuple[Rays, Rays]
 
 
 def nearest(layout: FloorLayout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
-    """Return meters along each ray to the walls and to what stands on the floor.
+    """Return meters along each ray to the walls and to the obstacles on the floor.
 
     Args:
         layout: the floor; its walls are at its edges.
-        eye: x, y in meters of the place from which the rays go; one for all, or arrays of one for each.
+        eye: x, y in meters of the origin of the rays; one for all, or arrays of one for each.
         angles: directions of the rays in the world, in radians.
     """
     way = np.cos(angles), np.sin(angles)
@@ -60,5 +60,5 @@ def _to_thing(thing: Obstacle, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
 
 
 def _sloping(slope: Rays) -> Rays:
-    """Return slopes by which can be divided."""
+    """Return slopes that are not 0, because they are used as divisors."""
     return np.copysign(np.maximum(np.abs(slope), _LEAST_SLOPE), slope)

@@ -1,4 +1,4 @@
-"""MLflow: a run on a tracking server, by the client of `mlflow-skinny`, which has no store of its own."""
+"""MLflow: a run on a tracking server; the client is that of `mlflow-skinny`, which has no local store."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ log = structlog.get_logger(__name__)
 
 NAME = "mlflow"
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
-# The client's own limits would let a server that is away hold up training for minutes.
+# With the client's own limits, a server that does not respond would block training for minutes.
 PATIENCE = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "10", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2"}
-MOST_PARAMETERS = 100  # of one request
+MOST_PARAMETERS = 100  # in one request
 LONGEST_PARAMETER = 6000
 
 
 class MLflow(Tracker):
     """Sends the curves of a run to an MLflow server.
 
-    The server must answer when an attempt begins. If it does not answer later, points are lost and training
+    The server must respond when an attempt begins. If it does not respond later, points are lost and training
     continues.
 
     Args:
-        uri: address of the server; None: the variable MLFLOW_TRACKING_URI.
-        experiment: experiment of the run, which is created if it is missing.
+        uri: address of the server; None: the value of the variable MLFLOW_TRACKING_URI.
+        experiment: experiment of the run; it is created if it is missing.
     """
 
     def __init__(self, uri: str | None = None, experiment: str = "palaestra") -> None:
@@ -89,7 +89,7 @@ class MLflow(Tracker):
 
 
 def flat(configuration: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield each value as text, by its path with dots; lists are one value each."""
+    """Yield path and text of each value; a path has dots, and a list is one value."""
     for name, value in configuration.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{name}.")

@@ -1,7 +1,7 @@
-"""The part that all trackers share: which values they get, and which of their runs a training run continues.
+"""The base of all trackers: it selects the values to send, and the tracker's run to continue.
 
 A tracker gets each scalar that TensorBoard gets, at the same step. The id of the tracker's run is kept in
-`trackers.json` of the run directory, so that every attempt continues the same run there.
+`trackers.json` of the run directory, so that every attempt continues the same run of the tracker.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from stable_baselines3.common.logger import KVWriter
 
 from palaestra_trainer.run_directory import RunDirectory, replace_file
 
-TENSORBOARD = "tensorboard"  # the name by which a record excludes TensorBoard
+TENSORBOARD = "tensorboard"  # a record with this name in its exclusions is not for TensorBoard
 
 
 class Tracker(BaseCallback):
@@ -56,7 +56,7 @@ class Tracker(BaseCallback):
 
 
 class Scalars(KVWriter):
-    """Stable-Baselines3's way to a tracker: calls `send` with the scalars of each dump."""
+    """An output of Stable-Baselines3's logger: calls `send` with the scalars of each dump."""
 
     def __init__(self, send: Callable[[int, Mapping[str, float]], None]) -> None:
         self._send = send
@@ -64,7 +64,7 @@ class Scalars(KVWriter):
     def write(
         self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
     ) -> None:
-        """Send the numbers that TensorBoard draws; texts, images and films are left out."""
+        """Send the numbers that TensorBoard plots; texts, images and videos are omitted."""
         scalars = {
             name: float(value)
             for name, value in key_values.items()
@@ -75,7 +75,7 @@ class Scalars(KVWriter):
             self._send(step, scalars)
 
     def close(self) -> None:
-        """Do nothing: the tracker ends its run itself."""
+        """Do nothing, because the tracker ends its run itself."""
 
 
 def configuration_of(directory: RunDirectory) -> dict[str, Any]:
@@ -86,12 +86,12 @@ def configuration_of(directory: RunDirectory) -> dict[str, Any]:
 
 
 def title_of(configuration: Mapping[str, Any]) -> str:
-    """Return the name by which people find the run of a configuration: its job and the replica's number."""
+    """Return a name for people for the run of a configuration: its job and the replica's number."""
     return f"{configuration['job']}-{configuration['replica']}"
 
 
 def known_run(directory: RunDirectory, tracker: str) -> str | None:
-    """Return the id of the run that a tracker has for a run directory; None: it has none yet."""
+    """Return the id of the run that a tracker has for a run directory; None: the tracker has no run yet."""
     known = _known(directory)
     return known.get(tracker)
 

@@ -17,7 +17,8 @@ log = structlog.get_logger(__name__)
 
 NAME = "wandb"
 MODES = ("offline", "online")
-# What waits for simulators and the checkpoint leave of the default grace period; see `waiting.patience`.
+# The rest of the default grace period, after waits for simulators and the checkpoint; see
+# `waiting.shutdown_deadline`.
 FINISH_S = 5
 
 
@@ -38,7 +39,7 @@ class Wandb(Tracker):
         self._step = 0
 
     def begin(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
-        """Begin the run, or continue it: attempts of one id are uploaded as one run."""
+        """Begin the run, or continue it: attempts with the same id are uploaded as one run."""
         run = known_run(directory, NAME)
         if run is None:
             run = secrets.token_hex(4)
@@ -54,7 +55,7 @@ class Wandb(Tracker):
             group=configuration["job"],
             config=dict(configuration),
             dir=str(directory.path),
-            # The log of the run is the pod's; a program of git may be missing.
+            # The console is off because the pod's log has the output; git may not be installed.
             settings=wandb.Settings(
                 console="off",
                 disable_git=True,
@@ -67,7 +68,7 @@ class Wandb(Tracker):
         self._run.define_metric("*", step_metric="step")
 
     def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
-        """Log the scalars; `step` is a value too, the x axis: W&B ignores a step below its last one."""
+        """Log the scalars with `step` as the x axis, because W&B ignores a step below its last one."""
         self._step = max(self._step, step)
         self._run.log({**scalars, "step": step}, step=self._step)
 

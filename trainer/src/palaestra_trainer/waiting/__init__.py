@@ -1,1 +1,1 @@
-"""Waiting with a deadline: turns of threads, what was waited, how long is left, and signals that end it."""
+"""Waiting with a deadline: turns in one thread, time waited, time left, and signals that end a wait."""

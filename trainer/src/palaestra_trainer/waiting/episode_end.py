@@ -1,4 +1,4 @@
-"""Episodes that do not end, where somebody waits for their end."""
+"""A limit for episodes that do not end while another part of the program waits for their end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REMEDY = "return truncated after a number of steps, or register it with max_epis
 
 
 class EpisodeEnd:
-    """Waits for the end of an episode: says every minute that it goes on, and gives up after so many steps.
+    """Watches one episode: logs once a minute that it has not ended, and raises after `MOST_STEPS` steps.
 
     Args:
         waits: the name of the waiting part, for messages.
@@ -30,10 +30,10 @@ class EpisodeEnd:
         self._say_at = clock() + SAY_EVERY_S
 
     def not_after(self, steps: int) -> None:
-        """Take note of the steps of the episode so far.
+        """Check the number of steps of the episode so far.
 
         Raises:
-            ConfigurationError: there are too many.
+            ConfigurationError: the episode has `MOST_STEPS` steps or more.
         """
         if steps >= MOST_STEPS:
             raise ConfigurationError(
@@ -42,4 +42,6 @@ class EpisodeEnd:
             )
         if self._clock() >= self._say_at:
             self._say_at = self._clock() + SAY_EVERY_S
-            log.warning("an episode goes on", waits=self._waits, steps=steps, most=MOST_STEPS, remedy=REMEDY)
+            log.warning(
+                "an episode has not ended", waits=self._waits, steps=steps, most=MOST_STEPS, remedy=REMEDY
+            )

@@ -1,7 +1,7 @@
-"""End the process in time, whatever code of the job's author still does.
+"""End the process in time, even if code of the job's author still runs.
 
-A method `close` that hangs, a thread that lives on and a function that waits at the exit of Python would each
-keep a run that is complete, and its pod, for ever.
+A `close` method that hangs, a thread that does not end, or an exit function that waits would each keep a
+complete run and its pod alive forever.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def leave_after(
     before: Callable[[], None] = nothing,
     leave: Callable[[int], object] = os._exit,
 ) -> threading.Timer:
-    """Return a running timer that ends the process; cancel it if it need not.
+    """Return a running timer that ends the process unless it is canceled.
 
     Args:
         seconds: from now.
@@ -39,7 +39,7 @@ def leave_after(
     def end() -> None:
         others = [thread for thread in threading.enumerate() if not thread.daemon]
         names = [thread.name for thread in others if thread is not threading.main_thread()]
-        log.warning("ended although code of the job goes on", after_s=seconds, threads=names)
+        log.warning("process ended while code of the job was running", after_s=seconds, threads=names)
         faulthandler.dump_traceback(sys.__stderr__ or 2, all_threads=True)
         before()
         leave(code)

@@ -1,10 +1,10 @@
 """Step several simulators in one thread: while one computes a step, the others get their turn.
 
-A step of an environment is one function that sends, waits and reads. Each step runs in a greenlet of its
-own, so that the waits of many environments overlap. After a greenlet has sent a long request to its
-simulator, it lets the others run before it waits for the answer. `take_turns` runs the greenlets, and
-`let_others` is where a turn may end. The answer of one simulator is read while the others still compute.
-Threads needed twice the processor time for the same: see docs/decisions/0006-turns-instead-of-threads.md.
+A step of an environment is one function that sends, waits and reads. Each step runs in its own greenlet, so
+that the waits of many environments overlap. After a greenlet has sent a long request to its simulator, it
+lets the others run before it waits for the response. `take_turns` runs the greenlets, and a turn may end
+only in `let_others`. The response of one simulator is read while the others still compute. Threads needed
+twice the processor time for this: see docs/decisions/0006-turns-instead-of-threads.md.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
 # After this time the first greenlet waits alone; its own deadline and fault attribution then apply. The time
-# is longer than a step, because the wait counts as its turn, and short beside a deadline, which begins then.
+# is longer than a step, because the wait alone counts as its turn. It is short compared with the deadline,
+# which begins only then.
 _SOON_MS = 500
 
 
 class PendingResponse(Protocol):
-    """An object whose descriptor becomes readable when an answer arrives."""
+    """An object whose descriptor becomes readable when a response arrives."""
 
     def fileno(self) -> int:
         """Return the descriptor to watch."""
@@ -40,9 +41,9 @@ class _Turn(greenlet):
         work: the current or last work.
         done: whether it has finished.
         result: the return value of `work`.
-        failure: the exception that it raised instead.
-        away_s: seconds that it spent in others' turns, without the time in which all of them wait.
-        until: the descriptor of the answer that it waits for; None: it can run.
+        failure: the exception that `work` raised, if any.
+        away_s: seconds that others' turns took during this work, without the time in which all turns wait.
+        until: the descriptor of the response that it waits for; None: it can run.
     """
 
     def __init__(self) -> None:
@@ -74,7 +75,7 @@ class _Turn(greenlet):
         while self.work is not None and self.parent is not None:
             try:
                 self.result = self.work()
-            except Exception as error:  # noqa: BLE001 - raised by `take_turns`, when no work is left in the middle
+            except Exception as error:  # noqa: BLE001 - take_turns raises it after all works have ended
                 self.failure = error
             self.done = True
             self.parent.switch()
@@ -94,7 +95,7 @@ def let_others(until: PendingResponse | None = None) -> None:
     """Let the other works of `take_turns` run first; without others, this does nothing.
 
     Args:
-        until: the others may run until this can be read; by default each runs once.
+        until: the others may run until its descriptor is readable; by default each runs once.
     """
     turn = getcurrent()
     if isinstance(turn, _Turn) and turn.parent is not None:
@@ -113,7 +114,7 @@ def away_s() -> float:
 def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
     """Return the results of `works`, in their order; each runs until it calls `let_others`, then the next.
 
-    All works finish before the first error is raised, so that none is left half done.
+    All works finish before the first error is raised, so that no work stays half done.
 
     Raises:
         Exception: of the first work, in their order, that failed.

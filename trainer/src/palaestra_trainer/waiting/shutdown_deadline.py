@@ -1,7 +1,7 @@
-"""How long the run may still wait for simulators, all together, after a signal asked it to end.
+"""One deadline for all waits for simulators after a signal asked the run to end.
 
-Each call has its own deadline. But sixteen simulators of a run may hang, and the run has one grace period.
-A signal handler limits the waits by setting a number; it raises nothing in the middle of a call.
+Each call has its own deadline, but sixteen simulators of a run may hang, and the run has only one grace
+period. A signal handler sets the deadline as a number; it does not raise in the middle of a call.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ LEFT_S = 10.0
 
 
 class _Limit:
-    """The end of all waits of this process, on its monotonic clock."""
+    """The time after which no wait of this process may begin, on its monotonic clock."""
 
     at_s = math.inf
 
 
 def end(after_s: float = LEFT_S) -> None:
-    """Let no wait begin later than `after_s` seconds from now."""
+    """Set the deadline: no wait may begin later than `after_s` seconds from now."""
     _Limit.at_s = time.monotonic() + after_s
 
 
 def renew() -> None:
-    """Remove the limit: each call waits for its own deadline again."""
+    """Remove the deadline: each call waits for its own deadline again."""
     _Limit.at_s = math.inf
 
 

@@ -1,13 +1,14 @@
 """Handle SIGTERM and SIGINT.
 
-The first signal is recorded. The run ends where it next checks for it: at a
-boundary with a checkpoint, or, while simulators start, at once and without a
-checkpoint, because there is nothing to save. The handler itself raises nothing,
-because it may run while a lock is released. Waits that are under way may last
-`patience.LEFT_S` seconds more. A second signal ends the process at once, and so
-does a signal that arrives before the run listens. After the run's end, while
-Python exits, signals are ignored. A SIGINT that was ignored when the program
-started, as in the background of a script, stays ignored.
+The first signal is recorded, and the run ends at its next check for signals.
+During training it then saves a checkpoint of the last rollout boundary. While
+simulators start, it saves no checkpoint, because there is nothing to save. The
+handler itself raises nothing, because it may run while a lock is released.
+Waits may continue for `shutdown_deadline.LEFT_S` seconds. A second signal ends
+the process at once, and so does a signal that arrives before the run listens.
+After the run's end, while Python exits, signals are ignored. A SIGINT that was
+ignored when the program started, as in the background of a script, stays
+ignored.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ class Interrupted(TrainerError):
 def leaving_when_asked() -> Iterator[None]:
     """Let a signal end the process at once as interrupted, except while an `Interruption` listens.
 
-    It covers the seconds of imports. Without it the signal would kill the process, or, if the process is the
-    first of a container, have no effect, although there is nothing to save yet. While Python exits, a signal
-    has no effect, because it would replace the exit code of the run.
+    It covers the seconds of imports, when there is nothing to save yet. Without it the signal would kill the
+    process, or have no effect if the process is the first of a container. While Python exits, a signal has no
+    effect, because it would replace the exit code of the run.
     """
     atexit.register(end_undisturbed)
     before = {number: signal.signal(number, _leave) for number in obeyed(SIGNALS)}
@@ -106,5 +107,5 @@ class Interruption:
         shutdown_deadline.end()
         for later in self._before:
             signal.signal(later, signal.SIG_DFL)
-        # Not by a logger: this may run while the logger writes a line.
+        # A logger is not used here, because the handler may run while the logger writes a line.
         os.write(2, f"{self.requested.name}: ending; {HURRY}\n".encode())

@@ -1,7 +1,7 @@
 """Layer 2: Webots as Python objects, over the services and topics of its stock `ros` controller.
 
-All peculiarities of that controller are handled here and nowhere else: the wake-up that it can lose, the
-step that blocks forever while paused, and the state that a reset does not restore.
+Only this package handles the peculiarities of that controller: it can lose a wake-up, a step blocks forever
+while the simulation is paused, and a reset does not restore the whole state.
 """
 
 from palaestra_trainer.webots.attached import Attached

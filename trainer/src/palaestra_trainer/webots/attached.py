@@ -1,4 +1,4 @@
-"""A simulator that another program starts and ends."""
+"""A launcher for a simulator that another program starts and stops."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from palaestra_trainer.errors import ConfigurationError
 class Attached:
     """A launcher that starts nothing: the facade uses the simulator that already runs under its name.
 
-    The facade may step, reset, pause and change it, like the program that started it. It cannot stop it.
+    The facade may step, reset, pause and change the simulator, like the program that started it. It cannot
+    stop the simulator.
     """
 
     def start(self) -> None:
-        """Start nothing: it runs already, or `failure` reports that it does not."""
+        """Do nothing, because the simulator runs already; if it does not, `failure` reports that."""
 
     def confirm_ready(self) -> None:
         """Do nothing."""
 
     def ready(self) -> bool:
-        """Return False: this facade does not stop a simulator that hangs."""
+        """Return False, so that the facade does not stop a simulator that hangs."""
         return False
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Refuse to stop it.
+        """Refuse to stop the simulator.
 
         Raises:
             ConfigurationError: always.
@@ -31,11 +32,11 @@ class Attached:
         raise ConfigurationError("only attached to this simulator; stop it where it was started")
 
     def failure(self) -> str | None:
-        """Return why it cannot be used; called only while it does not answer."""
+        """Return the reason why it cannot be used; called only while it does not respond."""
         return "no simulator answers under this name; start it, or remove launcher=Attached()"
 
     def refused(self) -> bool:
-        """Return False: nobody here knows its exit code."""
+        """Return False, because this process cannot know the exit code."""
         return False
 
     def wait_stopped(self, deadline_s: float) -> None:

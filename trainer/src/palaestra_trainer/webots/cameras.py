@@ -1,6 +1,6 @@
 """The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
 
-An array is valid until the next step, which writes the next one to the same place; see `pictures`.
+An array is valid until the next step, which writes the next one into the same memory; see `image_decoding`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from palaestra_trainer.webots.image_decoding import ImageReading, PointsReading,
 
 
 class _Rendered(Sensor):
-    """A sensor whose readings a simulator must render."""
+    """A sensor whose readings must be rendered by the simulator."""
 
     __slots__ = ()
 
@@ -77,7 +77,7 @@ class RangeFinder(_Rendered):
 class Lidar(Sensor):
     """A lidar; `value` is meters, read-only: shape (layers, rays), float32; infinite: out of range.
 
-    Layers are from the top down, the rays of a layer from left to right.
+    Layers are ordered from the top down, the rays of a layer from left to right.
     """
 
     __slots__ = ()
@@ -87,7 +87,7 @@ class Lidar(Sensor):
 
 
 class LidarPoints(Sensor):
-    """The point cloud of a lidar, which it enables; a `Lidar` of the same device may be added too.
+    """The point cloud of a lidar; enables that lidar. A `Lidar` of the same device may be added too.
 
     `value` is read-only: shape (layers * rays, 3), float32, x, y and z in meters in the lidar's frame;
     infinite where a ray hit nothing.

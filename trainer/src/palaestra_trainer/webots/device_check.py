@@ -1,7 +1,7 @@
-"""Check that a world has what a program needs, before the first step.
+"""Check before the first step that a world has the devices and nodes that a program needs.
 
-Without the check a missing device would look like a broken simulator: a service that no node offers. Only a
-complete list or a definite answer counts, so a simulator that is still starting is not blamed.
+Without the check a missing device would look like a broken simulator, because no node offers its service.
+Only a complete list or a definite response counts, so a simulator that is still starting is not blamed.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from palaestra_trainer.webots.observer import Observer
 
 
 def require_devices(robot: str, wanted: Iterable[str]) -> None:
-    """Return if the robot with the ROS name `robot` has every device in `wanted`.
+    """Check that the robot with the ROS name `robot` has every device in `wanted`.
 
     Raises:
         WorldMisfit: its list of devices is complete and lacks some.
-        SimulatorDead, SimulatorHung, WrongData: it does not answer.
+        SimulatorDead, SimulatorHung, WrongData: the simulator does not respond.
     """
     observer = Observer(robot)
     try:
@@ -38,11 +38,11 @@ def require_devices(robot: str, wanted: Iterable[str]) -> None:
 
 
 def require_node(observer: Observer, name: str) -> None:
-    """Return if the world has a node with DEF `name`.
+    """Check that the world has a node with DEF `name`.
 
     Raises:
-        WorldMisfit: it has none.
-        SimulatorDead, SimulatorHung, WrongData: it does not answer.
+        WorldMisfit: the world has no such node.
+        SimulatorDead, SimulatorHung, WrongData: the simulator does not respond.
     """
     if not observer.exists(name):
         raise WorldMisfit(

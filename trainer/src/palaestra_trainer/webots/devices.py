@@ -12,7 +12,7 @@ from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.message_decoding import BOOL, FLOAT64, RANGE, NumberReading
 from palaestra_trainer.webots.services import Services
 
-# Webots replaces these characters in names of devices, and no others.
+# Webots replaces only these characters in names of devices.
 _REPLACED = str.maketrans("-. ()", "_____")
 
 
@@ -22,19 +22,19 @@ def topic_name(device: str) -> str:
 
 
 class Sensor:
-    """A sensor: enabled with a period, then read once a step.
+    """A sensor that is enabled with a period, then read once a step.
 
     Args:
         robot: the ROS name of the robot's controller.
         device: the device's name in the world, e.g. ir1
         type_name: the type of its topic.
         decode: reads the value out of a message's bytes.
-        topic: the name of its topic below the device's.
+        topic: the name of its topic, below the name of the device.
 
     Attributes:
         robot: see above.
         device: see above.
-        late: whether a message that arrives before the next step may belong to the previous one.
+        late: whether the next message to arrive may belong to the previous step.
     """
 
     __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
@@ -80,7 +80,7 @@ class Sensor:
         )
 
     def read(self) -> bool:
-        """Take the next message; if it does not arrive in time, keep the value and return False.
+        """Read the next message; if it does not arrive in time, keep the old value and return False.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -93,7 +93,7 @@ class Sensor:
         return True
 
     def read_arrived(self) -> bool:
-        """Take the last message that has already arrived; False if there is none.
+        """Read the last message that has already arrived; return False if no message has.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -108,7 +108,7 @@ class Sensor:
         """Disable the sensor and unsubscribe.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then stays.
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then remains.
         """
         self._enable(value=0)
         self.close()
@@ -156,8 +156,8 @@ class Motor:
     Attributes:
         robot: see above.
         device: see above.
-        velocity: rad/s, as last confirmed; None until the simulator confirms a command.
-        velocity_service: sets it.
+        velocity: the last confirmed velocity in rad/s; None until the simulator confirms a command.
+        velocity_service: the service that sets the velocity.
     """
 
     __slots__ = ("_position", "_services", "device", "robot", "velocity", "velocity_service")
@@ -176,7 +176,7 @@ class Motor:
         """Turn at `velocity` rad/s from the next step on.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`; it will be sent again.
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the next call sends the velocity again.
         """
         self.velocity = None
         self.velocity_service(value=velocity)
@@ -188,11 +188,12 @@ class Motor:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        self.velocity = None  # a backward velocity under position control was confirmed, but ignored
+        # Under position control the simulator confirms a backward velocity but ignores it.
+        self.velocity = None
         self._position(value=position)
 
     def release(self) -> None:
-        """Stop under velocity control, as needed at the start and after every reset.
+        """Switch to velocity control and stop, as needed at the start and after every reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
@@ -207,13 +208,13 @@ class Motor:
 
 
 def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:
-    """Set velocities of motors in rad/s from the next step on, with all requests sent at once.
+    """Set velocities of motors in rad/s from the next step on; all requests are sent at once.
 
-    A velocity that a motor has confirmed is not sent again. So after a reset of the simulation, call
-    `release` of its motors.
+    A velocity that a motor has confirmed is not sent again. So call `release` of the motors after a reset of
+    the simulation.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: as `RosService`; the velocities will be sent again.
+        SimulatorDead, SimulatorHung, WrongData: as `RosService`; the next call sends the velocities again.
     """
     changes = [(motor, velocity) for motor, velocity in wanted if velocity != motor.velocity]
     if not changes:

@@ -1,7 +1,7 @@
 """Webots, started on demand: the facade of the paper.
 
-Simulated time passes only inside `with webots:` and `webots.run(...)`. Otherwise every simulator is paused,
-because between steps a simulator that is not paused uses a whole core for nothing.
+Simulated time passes only inside `with webots:` and `webots.run(...)`. Outside of them every simulator is
+paused, because a simulator that is not paused uses a whole core even between steps.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from palaestra_trainer.errors import (
 )
 from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
-from palaestra_trainer.webots.facade_registry import offer, withdraw
+from palaestra_trainer.webots.facade_registry import FacadeRegistry
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 
@@ -30,7 +30,7 @@ Result = TypeVar("Result")
 
 _PROBE_S = 1.0
 _POLL_S = 0.02
-_STOP_DEADLINE_S = 5.0  # the longest time that it may take to quit
+_STOP_DEADLINE_S = 5.0  # the longest time that a simulator may take to quit
 
 
 class Launcher(Protocol):
@@ -41,27 +41,27 @@ class Launcher(Protocol):
         ...
 
     def confirm_ready(self) -> None:
-        """Report that it has answered a real round trip."""
+        """Report that the simulator has responded to a real request."""
         ...
 
     def ready(self) -> bool:
-        """Return whether it runs and was confirmed as ready."""
+        """Return whether the simulator runs and was confirmed as ready."""
         ...
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that it will end; it is killed after `deadline_s` seconds."""
+        """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
         ...
 
     def failure(self) -> str | None:
-        """Return why it is no longer running; None while it runs or starts."""
+        """Return the reason why it is no longer running; None while it runs or starts."""
         ...
 
     def refused(self) -> bool:
-        """Return whether it ended with the exit code 2, by which a program refuses what it is given."""
+        """Return whether it ended with exit code 2, by which a program refuses its input."""
         ...
 
     def wait_stopped(self, deadline_s: float) -> None:
-        """Return when its process has ended.
+        """Wait until its process has ended.
 
         Raises:
             SimulatorHung: it did not end within `deadline_s` seconds.
@@ -83,15 +83,15 @@ class Webots:
     By default it is a new simulator. If the ROS names of the world are in use on the master, `_2`, `_3`, ...
     is appended to them. To use a simulator that already runs, pass `launcher=Attached()`.
 
-    The next environment that is made without a simulator uses this one.
+    The next environment that is created without a simulator uses this one.
 
     Args:
         supervisor_node_name: the ROS name of the supervisor in the world.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
         launcher: starts the process; by default on this machine.
-        driver: of that process: "stub", "mujoco" or "webots".
+        driver: the program of that process: "stub", "mujoco" or "webots".
         options: command-line options of that process, e.g. ["--step-sleep-ms=5"].
-        start_deadline_s: the longest time until it answers.
+        start_deadline_s: the longest time until it responds.
 
     Raises:
         ConfigurationError: the process on this machine refused the world or the driver.
@@ -119,13 +119,13 @@ class Webots:
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = launcher
-        # A connection of its own with a shorter deadline: a simulator that hangs is not available.
+        # The probe has its own connection with a shorter deadline, because it must report a hang early.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
         self._entered = 0
         self._stopped = False
-        offer(self)
+        open_facades.offer(self)
 
     @property
     def robot_name(self) -> str:
@@ -133,26 +133,26 @@ class Webots:
         return self.supervisor_node_name
 
     def name_of(self, robot: str) -> str:
-        """Return the ROS name under which the robot runs that has the ROS name `robot` in the world."""
+        """Return the ROS name under which a robot runs; `robot` is its ROS name in the world."""
         return f"{robot}{self._suffix}"
 
     def at_start(self, name: str, connect: Callable[[], None]) -> None:
-        """Call `connect` after each start from now on; it replaces the previous function of that `name`."""
+        """Call `connect` after each later start; it replaces the previous function with this `name`."""
         self._at_start[name] = connect
 
     def start(self) -> None:
-        """Start the simulator and return when it answers and its robots are connected.
+        """Start the simulator and wait until it responds and its robots are connected.
 
         If it runs, its connections are opened again; if it hangs, it is restarted. Outside `with webots:` it
         is paused afterwards.
 
         Raises:
             SimulatorDead: its process ended.
-            SimulatorHung: it did not answer in time.
+            SimulatorHung: it did not respond in time.
             WrongData: it refuses to pause, or refuses a robot's devices.
         """
         if self._launcher.ready() and not self.available():
-            self.stop()  # it hangs, and no other can be started while it exists
+            self.stop()  # the simulator hangs, and no other can be started while it exists
         self._disconnect()
         self._launcher.start()
         self.wait_available()
@@ -163,11 +163,11 @@ class Webots:
             connect()
 
     def wait_available(self) -> None:
-        """Return when the simulator answers, after a start or a reload.
+        """Wait until the simulator responds, after a start or a reload.
 
         Raises:
-            SimulatorDead: its process ended; SimulatorRefused, if that refused what it was given.
-            SimulatorHung: it did not answer in time.
+            SimulatorDead: its process ended; a SimulatorRefused if the process refused its input.
+            SimulatorHung: it did not respond in time.
         """
         give_up = time.monotonic() + self._start_deadline_s
         while not self.available():
@@ -179,13 +179,13 @@ class Webots:
                 raise SimulatorHung(
                     self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
                 )
-            time.sleep(_POLL_S)  # between two real round trips; the master has no call that would wait
+            time.sleep(_POLL_S)  # the master has no call that waits for a node
 
     def stop(self) -> None:
         """End the simulator through its supervisor; it is killed only if it does not quit.
 
         Raises:
-            SimulatorHung: the kill had no effect in time either.
+            SimulatorHung: the simulator did not quit, and the kill did not end it in time.
         """
         self._stopped = True
         try:
@@ -195,7 +195,7 @@ class Webots:
         self._launcher.wait_stopped(_STOP_DEADLINE_S + _PROBE_S)
 
     def __call__(self) -> None:
-        """Restart the simulator, in any state; the result is the same as after `start`.
+        """Restart the simulator in any state; then the state is the same as after `start`.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `stop` and `start`.
@@ -204,7 +204,7 @@ class Webots:
         self.start()
 
     def available(self) -> bool:
-        """Return whether the simulator answers a real round trip now."""
+        """Return whether the simulator responds to a real request now."""
         try:
             self._probe(ask=True)
         except SimulatorFault:
@@ -212,7 +212,7 @@ class Webots:
         return True
 
     def run(self, callback: Callable[[], Result], restart: bool = False) -> Result:  # noqa: FBT001, FBT002 - the paper's signature
-        """Return what `callback` returns, called while the simulation runs as fast as possible.
+        """Return the result of `callback`, called while the simulation runs as fast as possible.
 
         Args:
             callback: the function that needs the simulation.
@@ -247,7 +247,7 @@ class Webots:
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:
-            # An error from inside the block matters more than a simulator that cannot be paused.
+            # An error that the block raised is more important than a simulator that cannot be paused.
             if exc is None:
                 raise
 
@@ -257,7 +257,7 @@ class Webots:
         Raises:
             subprocess.TimeoutExpired: that process does not end; errors of the simulator are suppressed.
         """
-        withdraw(self)
+        open_facades.withdraw(self)
         self._disconnect()
         if self._own is not None:
             self._own.close()
@@ -267,7 +267,7 @@ class Webots:
             self._launcher.expect_stop(0.0)
             return
         self._launcher.expect_stop(_STOP_DEADLINE_S)
-        # It may break before it quits; then the announced deadline ends it.
+        # If the simulator breaks before it quits, the launcher kills it at the announced deadline.
         with contextlib.suppress(SimulatorFault):
             self.supervisor.quit()
 
@@ -275,3 +275,6 @@ class Webots:
         self._probe.close()
         self.observer.close()
         self.supervisor.close()
+
+
+open_facades: FacadeRegistry[Webots] = FacadeRegistry()

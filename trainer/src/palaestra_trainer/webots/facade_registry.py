@@ -1,49 +1,48 @@
 """The facades that environments may use: open ones that this process created for itself.
 
-In a notebook, an environment that is made after `Webots(...)` is meant for that simulator. A facade is
-offered until it is closed, except while an environment has it. A forked process is offered none of its
-parent's.
+In a notebook, an environment that is created after `Webots(...)` is meant for that simulator. A facade is
+offered until it is closed, except while an environment uses it. A forked process does not get the facades of
+its parent.
 """
 
 from __future__ import annotations
 
 import itertools
 import os
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 from weakref import WeakSet, WeakValueDictionary
 
-if TYPE_CHECKING:
-    from palaestra_trainer.webots.facade import Webots
-
-_numbers = itertools.count()
-_open: WeakValueDictionary[tuple[int, int], Webots] = WeakValueDictionary()  # by process and number
-_taken: WeakSet[Webots] = WeakSet()
+Facade = TypeVar("Facade")
 
 
-def offer(webots: Webots) -> None:
-    """Offer a new facade to environments."""
-    _open[os.getpid(), next(_numbers)] = webots
+class FacadeRegistry(Generic[Facade]):
+    """The open facades of this process and its parents; the registry does not keep them alive."""
 
+    def __init__(self) -> None:
+        self._numbers = itertools.count()
+        self._open: WeakValueDictionary[tuple[int, int], Facade] = WeakValueDictionary()  # by process, number
+        self._taken: WeakSet[Facade] = WeakSet()
 
-def withdraw(webots: Webots) -> None:
-    """Offer a facade to no environment any more; safe to repeat."""
-    for key, known in list(_open.items()):
-        if known is webots:
-            _open.pop(key, None)
+    def offer(self, facade: Facade) -> None:
+        """Offer a new facade to environments."""
+        self._open[os.getpid(), next(self._numbers)] = facade
 
+    def withdraw(self, facade: Facade) -> None:
+        """Stop offering a facade to environments; safe to repeat."""
+        for key, known in list(self._open.items()):
+            if known is facade:
+                self._open.pop(key, None)
 
-def offered() -> Webots | None:
-    """Return the newest facade that no environment has; None: there is none."""
-    mine = sorted(key for key in list(_open.keys()) if key[0] == os.getpid())
-    free = (known for key in reversed(mine) if (known := _open.get(key)) is not None and known not in _taken)
-    return next(free, None)
+    def offered(self) -> Facade | None:
+        """Return the newest facade that no environment uses; None: all are used, or no facade is open."""
+        mine = sorted(key for key in list(self._open.keys()) if key[0] == os.getpid())
+        known = (self._open.get(key) for key in reversed(mine))
+        return next((facade for facade in known if facade is not None and facade not in self._taken), None)
 
+    def take(self, facade: Facade) -> None:
+        """Reserve a facade for one environment."""
+        self._taken.add(facade)
 
-def take(webots: Webots) -> None:
-    """Reserve a facade for one environment."""
-    _taken.add(webots)
-
-
-def give_back(webots: Webots) -> None:
-    """Offer a facade again, unless it was closed or withdrawn."""
-    _taken.discard(webots)
+    def give_back(self, facade: Facade) -> None:
+        """Offer a facade again, unless it was closed or withdrawn."""
+        self._taken.discard(facade)

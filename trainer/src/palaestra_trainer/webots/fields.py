@@ -1,4 +1,4 @@
-"""Convert values of fields between Python and their services.
+"""Convert values of fields between Python and the services that read and write them.
 
 In Python a rotation is axis and angle, as in a world file; its service takes a quaternion.
 """
@@ -19,7 +19,7 @@ _SMALLEST_TURN: Final = 1e-6
 
 
 class FieldCodec(NamedTuple):
-    """The type of a field: its name in services, its values in words, and its encoder and decoder."""
+    """The type of a field: its name in services, a description of its values, its encoder and decoder."""
 
     name: str
     wanted: str
@@ -31,7 +31,7 @@ def kind_of(type_number: int, field: str) -> FieldCodec:
     """Return the type of a field from its type number; `field` is its name in errors.
 
     Raises:
-        ConfigurationError: it holds nodes, which have no value.
+        ConfigurationError: the field holds nodes, which are not values.
     """
     kind = _KINDS.get(type_number & ~_MULTIPLE)
     if kind is None:
@@ -57,7 +57,7 @@ def turn_about_z(heading_rad: float) -> dict[str, float]:
 
 
 def _exactly(*types: type) -> Callable[[Any], Any]:
-    """Return a check that passes only values of these exact types: a bool is not a number here."""
+    """Return a check that accepts only values of these exact types, so that a bool is not a number."""
 
     def check(value: Any) -> Any:
         if type(value) not in types:

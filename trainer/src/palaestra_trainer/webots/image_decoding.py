@@ -1,10 +1,10 @@
-"""Read images and points from sensors' messages as NumPy arrays, without copying or decoding a pixel.
+"""Read images and points from sensors' messages as NumPy arrays, without copying or decoding pixels.
 
 An array is a read-only view of the bytes that the connection received. It is valid until the next step, whose
-message is written to the same place. Its numbers may be unaligned; a copy is aligned.
+message is written into the same memory. Its numbers may be unaligned; a copy is aligned.
 
-All messages of one device begin alike except for number and time. So a head that was understood once is only
-compared from then on.
+All messages of one device have the same head except for number and time. So a head is parsed once, and the
+heads of later messages are only compared with it.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ _FLOAT_BYTES: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Where the numbers of a message are.
+    """The positions of the numbers in a message.
 
     Attributes:
         head: the bytes from the frame_id to the data, which all messages of this layout have.
-        data_at: where the numbers begin.
+        data_at: the offset of the first number, in bytes.
         length: bytes of the whole message.
-        shape: of the array.
-        strides: of the array, in bytes.
+        shape: shape of the array.
+        strides: strides of the array, in bytes.
     """
 
     head: bytes
@@ -55,7 +55,7 @@ class _Arrays(ABC):
 
     Args:
         device: the device's name in errors.
-        dtype: of the array's numbers.
+        dtype: NumPy type of the array's numbers.
     """
 
     __slots__ = ("_device", "_dtype", "_layout")
@@ -135,7 +135,7 @@ class RangesReading(ImageReading):
         """Return a read-only view of the distances in the message.
 
         Raises:
-            ValueError: also for a distance that is negative or NaN.
+            ValueError: as for other images, or a distance is negative or NaN.
             struct.error: the message ends within its head.
         """
         ranges = super().__call__(message)
@@ -178,7 +178,7 @@ class PointsReading(_Arrays):
 
 
 def _after_text(message: Message, at: int) -> int:
-    """Return the end of the text that begins at `at` with its length."""
+    """Return the offset after the text at offset `at`, which begins with its length."""
     (length,) = _LENGTH.unpack_from(message, at)
     return at + _LENGTH.size + int(length)
 

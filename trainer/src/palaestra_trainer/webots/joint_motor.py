@@ -1,4 +1,4 @@
-"""Motors that one kind of command moves: of grippers, forks, arms and models of MuJoCo."""
+"""Motors of grippers, forks, arms and models of MuJoCo; each motor takes one kind of command."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ Command = Literal["position", "velocity", "force", "torque", "control"]
 
 
 class JointMotor:
-    """A motor under one kind of command.
+    """A motor that takes one kind of command.
 
     Args:
         robot: the ROS name of the robot's controller.
         device: the motor's name in the world.
-        command: "position" (rad or m), "velocity", "force" (N), "torque" (N m), or "control" in the units of
-            an actuator of MuJoCo that Webots has no motor for.
+        command: "position" (rad or m), "velocity", "force" (N), "torque" (N m), or "control". The latter is
+            for actuators of MuJoCo without a motor in Webots, in the units of the actuator.
 
     Attributes:
         robot: see above.
         device: see above.
-        service: sets the command.
+        service: the service that sets the command.
     """
 
     __slots__ = ("_position", "_ready", "_services", "device", "robot", "service")
@@ -47,7 +47,7 @@ class JointMotor:
         self.service(value=value)
 
     def prepare(self) -> None:
-        """Let the motor take commands of `service`, before the first one after a reset.
+        """Prepare the motor for commands of `service`; needed before the first command after a reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
@@ -57,10 +57,10 @@ class JointMotor:
         self._ready = True
 
     def release(self) -> None:
-        """Keep what the simulator's reset has set, until the next command.
+        """Keep the state that the simulator's reset has set, until the next command.
 
-        A world gives its motors a state of its own: the position in the file, or the control of a keyframe,
-        which holds a robot up. A command of 0 would replace it.
+        The world defines that state: the position in the file, or the control of a keyframe, which holds a
+        robot up. A command of 0 would replace it.
         """
         self._ready = False
 

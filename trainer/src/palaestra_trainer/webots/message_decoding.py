@@ -1,4 +1,4 @@
-"""Read the reading from a sensor's message, without decoding the rest.
+"""Decode the reading in a sensor's message, and skip the rest of the message.
 
 Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
 always sends the same `frame_id`.
@@ -11,7 +11,7 @@ import struct
 from functools import cache
 from typing import Any
 
-# The numbers after the header, in the codes of `struct`; the reading comes last.
+# These are the numbers after the header, as codes of `struct`; the reading is the last one.
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
 FLOAT64 = "d"
@@ -41,7 +41,7 @@ class NumberReading:
         """Return the reading.
 
         Raises:
-            ValueError: it is not finite, or the message has a wrong length, so that text would be read.
+            ValueError: it is not finite, or the message has a wrong length, so that its text would be read.
             struct.error: the message ends within its header.
         """
         if len(message) != self._layout.size:

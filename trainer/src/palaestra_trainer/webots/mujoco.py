@@ -1,6 +1,7 @@
-"""Sensors and actuators of a model of MuJoCo for which Webots has no device.
+"""Sensors and actuators of MuJoCo models for which Webots has no device.
 
-A simulator offers them below `mujoco/`: `mujoco/hip_force` is the sensor `hip_force` of the model.
+A simulator offers them under names that begin with `mujoco/`: `mujoco/hip_force` is the sensor `hip_force` of
+the model.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _decode: Final = message_type(_TYPE).codec.decode
 
 
 class MujocoSensor(Sensor):
-    """A sensor of several numbers; `value` has them in MuJoCo's order and units: shape (numbers,), float64.
+    """A sensor of several numbers; `value` is in MuJoCo's order and units: shape (numbers,), float64.
 
     Args:
         robot: the ROS name of the robot's controller.
@@ -35,7 +36,7 @@ class MujocoSensor(Sensor):
 
 
 class MujocoActuator(JointMotor):
-    """An actuator that is no motor of Webots, such as a muscle; `set` takes MuJoCo's control.
+    """An actuator that is not a motor in Webots, such as a muscle; `set` takes MuJoCo's control.
 
     The simulator keeps the control within the actuator's `ctrlrange`.
 
@@ -54,7 +55,7 @@ def read_numbers(message: bytes | memoryview) -> NDArray[np.float64]:
     """Return the numbers of a message, as a new array.
 
     Raises:
-        ValueError: one is not finite, or the message is cut short.
+        ValueError: a number is not finite, or the message is truncated.
     """
     numbers = _decode(message).data
     if not all(map(math.isfinite, numbers)):

@@ -13,7 +13,7 @@ from palaestra_trainer.webots.services import Services
 
 
 class Mode(enum.IntEnum):
-    """How time passes. The numbers are those of Webots R2021a and later."""
+    """The modes in which time passes. The numbers are those of Webots R2021a and later."""
 
     PAUSE = 0
     REAL_TIME = 1
@@ -46,7 +46,7 @@ class Observer:
         return int(self._services.ask("robot/get_basic_time_step", "get_float"))
 
     def mode(self) -> Mode:
-        """Return how time passes."""
+        """Return the mode in which time passes."""
         return Mode(self._services.ask("supervisor/simulation_get_mode", "get_int"))
 
     def world_path(self) -> str:
@@ -71,9 +71,9 @@ class Observer:
         return self.finish_pose(name)
 
     def begin_pose(self, name: str) -> RosService:
-        """Request a pose; `finish_pose` must follow, and other work may be done in between.
+        """Request a pose and return the service that responds last.
 
-        Return the service that answers last.
+        `finish_pose` must follow; other work may be done in between.
         """
         node = self.node(name)
         position, orientation = self._pose_services()
@@ -98,7 +98,7 @@ class Observer:
         return (value.x, value.y, value.z)
 
     def things(self) -> list[Thing]:
-        """Return what stands in the world, where it is now; the floor has the name `FLOOR`.
+        """Return the objects in the world at their current positions; the floor has the name `FLOOR`.
 
         Raises:
             WorldMisfit: the world has no floor.

@@ -1,9 +1,10 @@
-"""The things that stand in a world, as a supervisor reads them from its nodes.
+"""The objects in a world, as a supervisor reads them from its nodes.
 
-A thing is a Solid at the top of the scene tree whose boundingObject is made of boxes, cylinders, capsules and
-spheres. Its shapes are read once after each start, its place at every `read`, so a thing that was moved is
-where it is now. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or Floor of Webots.
-Solids inside other nodes, and those that a program adds while the simulation runs, are not read.
+An object is a Solid at the top of the scene tree whose boundingObject consists of boxes, cylinders, capsules
+and spheres. Its shapes are read once after each start, its position at every `read`, so a moved object is
+reported at its current position. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or
+Floor of Webots. Solids inside other nodes, and Solids that a program adds while the simulation runs, are not
+read.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Vector = tuple[float, float, float]
 
 
 class ObstacleShape(NamedTuple):
-    """A box or an upright cylinder: center in the frame of its thing, half its size, radius if round."""
+    """A box or an upright cylinder: center in the frame of its object, half its size, radius if round."""
 
     center: Vector
     half: Vector
@@ -32,7 +33,7 @@ class ObstacleShape(NamedTuple):
 
 
 class Thing(NamedTuple):
-    """A solid: DEF name or "", where it is, rotation about z (0 for the floor), and its shapes."""
+    """A solid: DEF name or "", position, rotation about z (0 for the floor), and its shapes."""
 
     name: str
     place: Vector
@@ -41,7 +42,7 @@ class Thing(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """A thing as it is found once: the handles of its node and of its translation, 0 without one."""
+    """The constant facts of an object; the handle of its translation is 0 if it has no such field."""
 
     name: str
     node: int
@@ -50,10 +51,10 @@ class _Known(NamedTuple):
 
 
 class ObstacleReader:
-    """Reads the things of a world.
+    """Reads the objects of a world.
 
     Args:
-        services: those of the supervisor.
+        services: the services of the supervisor.
     """
 
     def __init__(self, services: Services) -> None:
@@ -61,11 +62,11 @@ class ObstacleReader:
         self._things: list[_Known] | None = None
 
     def forget(self) -> None:
-        """Forget the nodes, whose handles become invalid when the world is loaded anew."""
+        """Forget the nodes, whose handles become invalid when the world is reloaded."""
         self._things = None
 
     def read(self) -> list[Thing]:
-        """Return all things where they are now; the floor has the name `FLOOR`.
+        """Return all objects at their current positions; the floor has the name `FLOOR`.
 
         Raises:
             WorldMisfit: the world has no floor.
@@ -122,15 +123,15 @@ class ObstacleReader:
 
     def _heading(self, known: _Known) -> float:
         if known.name == FLOOR:
-            return 0.0  # a layout has its sides along the axes of the world
+            return 0.0  # the sides of a layout are parallel to the axes of the world
         if all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in known.shapes):
-            return 0.0  # it looks the same from every side
+            return 0.0  # its rotation about z makes no difference
         orientation = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=known.node)
         turn = orientation.orientation
         return math.remainder(2.0 * math.atan2(turn.z, turn.w), 2.0 * math.pi)
 
     def _nodes(self, node: int, name: str) -> list[int]:
-        """Return the nodes in a field; [] if there is no such field."""
+        """Return the nodes in a field; [] if the node has no such field."""
         field = self._field(node, name)
         if not field:
             return []

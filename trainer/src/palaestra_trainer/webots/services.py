@@ -1,4 +1,4 @@
-"""The services of one controller, by path, each created at first use."""
+"""The services of one controller by path; each is created at its first use."""
 
 from __future__ import annotations
 

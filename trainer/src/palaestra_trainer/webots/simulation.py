@@ -1,11 +1,11 @@
 """The steps of a simulation: the only caller of `time_step`.
 
-One step lasts one period, for all robots of the world at once, and brings one message of every sensor. The
-controller can miss its own wake-up and then sends nothing for that step. So a missing message is awaited for
-a limited time. Then the simulation steps once more; this is not a fault, but it is counted.
+One step lasts one period for all robots of the world, and every sensor sends one message in it. The
+controller can miss its own wake-up and then sends nothing for that step. So the wait for a message is
+limited. After it the simulation steps once more; this is not a fault, but it is counted.
 
-While the simulation is paused, no step is sent: the controller would wait for time to pass, and would not
-receive the request that lets it pass.
+While the simulation is paused, no step is sent: the controller would wait for time to pass, and could not
+receive the request that ends the pause.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MOST_EXTRA_STEPS = 2
 
 
 class Actuator(Protocol):
-    """A motor, as far as a simulation knows it."""
+    """The interface of a motor for `Stepper`."""
 
     @property
     def robot(self) -> str:
@@ -39,7 +39,7 @@ class Actuator(Protocol):
         ...
 
     def release(self) -> None:
-        """Take back all commands, as needed at the start and after every reset."""
+        """Withdraw all commands, as needed at the start and after every reset."""
         ...
 
     def close(self) -> None:
@@ -48,7 +48,7 @@ class Actuator(Protocol):
 
 
 class Stepper:
-    """Steps and resets.
+    """Steps and resets the simulation.
 
     Args:
         robots: the ROS names of all robots of the world; a step lasts until each has requested it.
@@ -74,12 +74,12 @@ class Stepper:
         self._connected = False
 
     def add(self, sensors: Sequence[Sensor], motors: Sequence[Actuator]) -> None:
-        """Add a robot's devices: its sensors are read at each step, its motors released at resets."""
+        """Add a robot's devices: sensors are read at each step, motors are released at each reset."""
         self._sensors += sensors
         self._motors += motors
 
     def use(self, sensor: Sensor) -> None:
-        """Add a sensor unless it is there; if the simulator is connected, enable it for the next step.
+        """Add a sensor unless it is known; if the simulator is connected, enable it for the next step.
 
         Raises:
             WorldMisfit: the robot lacks the sensor, or it cannot be enabled; it is not added.
@@ -97,7 +97,7 @@ class Stepper:
         self._sensors.append(sensor)
 
     def use_motor(self, motor: Actuator) -> None:
-        """Add a motor unless it is there; if the simulator is connected, release it.
+        """Add a motor unless it is known; if the simulator is connected, release it.
 
         Raises:
             WorldMisfit: the robot lacks the motor; it is not added.
@@ -123,7 +123,7 @@ class Stepper:
 
         Raises:
             KeyError: the node is not tracked.
-            SimulatorDead, SimulatorHung, WrongData: before the first step, which reads it from the simulator.
+            SimulatorDead, SimulatorHung, WrongData: before the first step, a request for the pose failed.
         """
         return self._tracked[name] or self._observer.pose(name)
 
@@ -197,8 +197,8 @@ class Stepper:
                 sensor.read_arrived()
         try:
             self._advance()
-            # Requested before the sensors are read, so that answers and messages arrive in others' turns;
-            # a controller answers after it has sent its sensors' messages.
+            # Poses are requested before the sensors are read, so that responses and messages arrive during
+            # others' turns. A controller responds after it has sent the messages of its sensors.
             asked = None
             for name in self._tracked:
                 asked = self._observer.begin_pose(name)
@@ -206,17 +206,17 @@ class Stepper:
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
-        except BaseException:  # a Ctrl-C too: what arrives now belongs to this step
+        except BaseException:  # also Ctrl-C: messages that arrive later belong to this step
             for sensor in self._sensors:
                 sensor.late = True
             raise
         return silent
 
     def _read_sensors(self) -> Sensor | None:
-        """Read every sensor once; return the first without a message, None if all had one."""
+        """Read every sensor once; return the first one without a message, or None if all had one."""
         silent = None
         for sensor in self._sensors:
-            # A lost wake-up affects all sensors, so only one of them is waited for.
+            # A lost wake-up affects all sensors, so the method waits for only one of them.
             spoke = sensor.read() if silent is None else sensor.read_arrived()
             if not spoke:
                 silent = silent or sensor

@@ -34,7 +34,7 @@ class Supervisor:
         self._services = Services(node_name)
 
     def set_mode(self, mode: Mode) -> None:
-        """Set how time passes.
+        """Set the mode in which time passes.
 
         Raises:
             WrongData: also if the simulator refuses the mode.
@@ -50,7 +50,7 @@ class Supervisor:
 
     def reload(self) -> None:
         """Reload the world; controllers restart, and all connections must be opened again."""
-        # The answer may be lost, because its controller restarts too.
+        # The response may be lost, because the controller that sends it restarts too.
         with contextlib.suppress(SimulatorDead):
             self._services.ask("supervisor/world_reload", "get_bool")
         self._observer.close()
@@ -104,7 +104,7 @@ class Supervisor:
 
         Raises:
             ConfigurationError: the field holds nodes.
-            WrongData: also if there is no such node, field or index.
+            WrongData: also if the node, field or index does not exist.
         """
         where = f"{name}.{field}"
         kind = kind_of(self._observer.field_type(name, field), where)
@@ -112,11 +112,11 @@ class Supervisor:
         return kind.from_wire(service(field=self._observer.field(name, field), index=index).value)
 
     def set_field(self, name: str, field: str, value: Value, index: int = 0) -> None:
-        """Write a field of the node with DEF `name`; `value` is what `get_field` returns.
+        """Write a field of the node with DEF `name`; `value` has the form that `get_field` returns.
 
         Raises:
             ConfigurationError: the field holds nodes, or values of another type.
-            WrongData: also if there is no such node or field, or the simulator refuses the write.
+            WrongData: also if the node or field does not exist, or the simulator refuses the write.
         """
         where = f"{name}.{field}"
         kind = kind_of(self._observer.field_type(name, field), where)
@@ -125,10 +125,10 @@ class Supervisor:
         service(field=self._observer.field(name, field), index=index, value=wire)
 
     def set_joint(self, name: str, position: float) -> None:
-        """Put the joint with DEF `name` to radians or meters; it is at rest there.
+        """Move the joint with DEF `name` to a position in radians or meters; it is at rest there.
 
         Raises:
-            WrongData: also if there is no such joint, or it has stops before that position.
+            WrongData: also if the joint does not exist, or its stops exclude that position.
         """
         service = self._services.get("supervisor/node/set_joint_position", "node_set_joint_position")
         service(node=self._observer.node(name), position=position, index=1)

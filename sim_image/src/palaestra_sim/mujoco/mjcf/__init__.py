@@ -1,15 +1,15 @@
-"""Worlds in MJCF: MuJoCo simulates the model as it is, and the front answers for its robot.
+"""Worlds in MJCF: MuJoCo simulates the model unchanged, and `ros_controller` serves its robot.
 
-- `loading`: from a file to a simulation, with its mistakes
+- `loader`: loads a file as a simulation, and reports its mistakes
 - `model`: the compiled model, and its state between two steps
 - `motors`: actuators as motors
 - `sensors`: sensors and cameras as devices
-- `own`: sensors and actuators that Webots has no device for
-- `eye`: what cameras see
+- `generic_devices`: sensors and actuators for which Webots has no device
+- `camera`: the images of cameras
 - `robot`: the robot with all devices
 - `tree`: bodies, joints and devices as nodes
-- `places`: where bodies are
-- `motion`: how bodies move
+- `body_frame`: the frames of bodies
+- `motion`: the motion of bodies
 - `states`: saved states of bodies
-- `simulation`: the Backend of the front
+- `simulation`: the Backend for `ros_controller`
 """

@@ -1,4 +1,4 @@
-"""The place of a body of MuJoCo's model."""
+"""The frame of a body of MuJoCo's model."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from palaestra_sim.scene.geometry import (
 class BodyFrame(Frame):
     """The frame of a body, which MuJoCo moves.
 
-    A client may put a body somewhere that is free, or that stands in the world without a joint. Others are
-    where their joints are.
+    A client may set the pose of a body that is free, or that has no joint and whose parent is the world.
+    Joints determine the poses of all other bodies.
     """
 
     def __init__(self, parent: Frame | None, model: Model, body: int) -> None:
@@ -30,7 +30,7 @@ class BodyFrame(Frame):
 
     @property
     def placeable(self) -> bool:
-        """Whether it is free, or stands in the world without a joint."""
+        """Whether the body is free, or has no joint and the world as its parent."""
         stands = self.parent is None and not self._model.joints_of(self._body)
         return self._free is not None or stands
 
@@ -69,7 +69,7 @@ class BodyFrame(Frame):
         return self.world_pose.position
 
     def return_to_start(self) -> None:
-        """Stay: a reset of the model returns it."""
+        """Do nothing: a reset of the model also resets the frame."""
 
     def _put(self, pose: Pose) -> None:
         x, y, z, w = to_quaternion(pose.rotation)

@@ -1,4 +1,4 @@
-"""A camera of a model: see `Eye`. What it sees are the geoms, materials and lights of the model."""
+"""A camera of a model: see `CameraInterface`. It shows the geoms, materials and lights of the model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_GEOMS: Final = 10_000
 
 
 class ModelCamera:
-    """The pictures that one camera of a model takes."""
+    """The images that one camera of a model takes."""
 
     def __init__(self, model: Model, number: int, lens: Lens) -> None:
         self._model = model
@@ -32,10 +32,10 @@ class ModelCamera:
         self._scene: Any = None
 
     def open(self) -> None:
-        """Get ready to draw.
+        """Prepare to render.
 
         Raises:
-            UnsimulatedError: this machine cannot draw.
+            UnsimulatedError: this machine cannot render.
         """
         canvas()
 
@@ -62,11 +62,11 @@ class ModelCamera:
         raise UnsimulatedError("a camera of a model measures no distances; add <rangefinder> sensors")
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
-        """Return nothing: a camera of a model has no Recognition node."""
+        """Return an empty mapping: a camera of a model has no Recognition node."""
         del owner
         return {}
 
     def painted(self, color: Callable[[SceneNode], bytes | None]) -> memoryview:
-        """Return the picture as it is: a camera of a model has no Recognition node."""
+        """Return the unchanged image: a camera of a model has no Recognition node."""
         del color
         return self.colors()

@@ -1,7 +1,7 @@
 """Sensors and actuators of a model for which Webots has no device.
 
-They are devices too, below `mujoco/`, where no device of Webots has its name. A sensor publishes its numbers
-as MuJoCo has them; an actuator takes MuJoCo's control.
+They are devices too, with names below `mujoco/`, which no device of Webots has. A sensor publishes its
+numbers unchanged; an actuator takes MuJoCo's control.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.ros_interfaces import Fields, Row
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 
-FOLDER: Final = "mujoco/"  # of the names of such devices
+FOLDER: Final = "mujoco/"  # prefix of the names of such devices
 _BODY: Final = int(mujoco.mjtTrn.mjTRN_BODY)
 _MUSCLE: Final = int(mujoco.mjtGain.mjGAIN_MUSCLE)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MujocoSensor:
-    """A sensor of several numbers; `value` has those of the last sample.
+    """A sensor of several numbers; `value` holds those of the last sample.
 
     Attributes:
         type_name: of the sensor in the model, such as framelinvel.
@@ -35,18 +35,18 @@ class MujocoSensor:
     value: tuple[float, ...] = ()
 
     def sample(self) -> None:
-        """Take the numbers of this moment."""
+        """Copy the numbers of this moment."""
         self.value = tuple(self.numbers.tolist())
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class MujocoActuator:
-    """An actuator that is no motor, such as a muscle or an adhesion.
+    """An actuator that is not a motor, such as a muscle or an adhesion.
 
     Attributes:
         controls: of all actuators of the model.
         number: of this one among them.
-        low, high: the least and the greatest control; infinite if the model has no limits.
+        low, high: the minimum and the maximum control; infinite if the model has no limits.
     """
 
     name: str
@@ -59,7 +59,7 @@ class MujocoActuator:
 
     @property
     def control(self) -> float:
-        """Its control, as the last command or else the model has it."""
+        """Its control: the last command, or else the model's value."""
         return float(self.controls[self.number]) if self._wanted is None else self._wanted
 
     def set_control(self, value: float) -> bool:
@@ -80,7 +80,7 @@ class MujocoActuator:
 
 
 def actuator_of(model: Any, data: Any, number: int, name: str) -> MujocoActuator:
-    """Return the device of an actuator that is no motor."""
+    """Return the device of an actuator that is not a motor."""
     low, high = -math.inf, math.inf
     if model.actuator_ctrllimited[number]:
         low, high = model.actuator_ctrlrange[number].tolist()
@@ -88,13 +88,13 @@ def actuator_of(model: Any, data: Any, number: int, name: str) -> MujocoActuator
 
 
 def type_name_of(model: Any, number: int) -> str:
-    """Return the type of a sensor as a model has it, such as framelinvel."""
+    """Return the type of a sensor as the model names it, such as framelinvel."""
     name: str = mujoco.mjtSensor(int(model.sensor_type[number])).name
     return name.removeprefix("mjSENS_").lower()
 
 
 def actuator_type_of(model: Any, number: int) -> str:
-    """Return the type of an actuator that is no motor: adhesion, muscle or general."""
+    """Return the type of an actuator that is not a motor: adhesion, muscle or general."""
     if model.actuator_trntype[number] == _BODY:
         return "adhesion"
     return "muscle" if model.actuator_gaintype[number] == _MUSCLE else "general"

@@ -1,4 +1,4 @@
-"""From an MJCF file to a simulation; every mistake in it is an error with its place."""
+"""Load an MJCF file as a simulation; every mistake in it is an error with its place."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _LINE: Final = re.compile(r"\bline (\d+)")
 def load(
     world_path: Path, mode: Mode, leave_out: LeaveOut | None = None, *, root: Path | None = None
 ) -> MjcfSimulation:
-    """Return the simulation of an MJCF world, which runs in that mode at first.
+    """Return the simulation of an MJCF world, which starts in that mode.
 
-    The model may name files in `root`; None: in the nearest folder that holds all of them.
+    The model may name files in `root`; if it is None, in the nearest folder that holds all of them.
 
     Raises:
-        WorldError: the file is wrong, or has something that no client could use.
+        WorldError: the file is wrong, or no client could use its model.
         OSError: it cannot be read.
     """
     source = read_bounded(world_path)
@@ -72,7 +72,7 @@ def _robot(tree: ModelTree, equipment: Equipment, description: Description, leav
     )
     return Robot(
         parts, 0, MujocoPhysics(), View(tree.scene.root)
-    )  # nothing asks this physics: sensors read the model
+    )  # this physics is never used: sensors read the model
 
 
 def _compiled(world_path: Path) -> Any:

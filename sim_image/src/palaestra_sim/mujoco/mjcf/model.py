@@ -12,19 +12,19 @@ from palaestra_sim.scene.geometry import Pose
 HINGE: Final = int(mujoco.mjtJoint.mjJNT_HINGE)
 SLIDE: Final = int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
-_POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}  # numbers of a joint; 1 of the others
+_POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}  # numbers of a joint; 1 for other types
 _SPEEDS: Final = {FREE: 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
 
 
 class Model:
-    """One model, and where everything in it is now.
+    """One model, and the current state of everything in it.
 
     MuJoCo computes poses and sensors at the beginning of a step. `settle` computes them for the state after
-    the last one, and changes nothing on which the next step depends.
+    the last step, and changes nothing on which the next step depends.
 
     Args:
         model: of MuJoCo.
-        keyframe: the number of the keyframe at which the world begins; None: the model's own positions.
+        keyframe: the number of the keyframe at which the world begins; None for the model's own positions.
 
     Attributes:
         model, data: of MuJoCo.
@@ -33,7 +33,7 @@ class Model:
     def __init__(self, model: Any, keyframe: int | None = None) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
-        # Numbers that are not finite reach the sensors as a fault; MuJoCo would reset silently.
+        # Values that are not finite must reach the sensors as a fault; MuJoCo would reset silently.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._keyframe = keyframe
         self._starts = (model.body_pos.copy(), model.body_quat.copy())
@@ -41,7 +41,7 @@ class Model:
         self.reset()
 
     def step(self, count: int) -> None:
-        """Let MuJoCo take so many steps."""
+        """Let MuJoCo make `count` steps."""
         mujoco.mj_step(self.model, self.data, nstep=count)
         self._settled = False
 
@@ -55,11 +55,11 @@ class Model:
         self._settled = False
 
     def changed(self) -> None:
-        """Compute everything anew when it is next asked for: the state was written."""
+        """Record that the state was written, so that the next `settle` computes again."""
         self._settled = False
 
     def settle(self) -> None:
-        """Compute poses, velocities and sensors of this moment."""
+        """Compute poses, velocities and sensors of this moment, if they are out of date."""
         if not self._settled:
             warm_start = self.data.qacc_warmstart.copy()
             mujoco.mj_forward(self.model, self.data)
@@ -67,14 +67,14 @@ class Model:
             self._settled = True
 
     def pose(self, body: int) -> Pose:
-        """Return where a body is in the world."""
+        """Return the pose of a body in the world."""
         self.settle()
         x, y, z = self.data.xpos[body].tolist()
         a, b, c, d, e, f, g, h, i = self.data.xmat[body].tolist()
         return Pose((x, y, z), (a, b, c, d, e, f, g, h, i))
 
     def velocity(self, kind: int, number: int) -> tuple[list[float], list[float]]:
-        """Return the velocity of an object in m/s and its turning in rad/s, in world axes."""
+        """Return the velocity of an object in m/s and its angular velocity in rad/s, in world axes."""
         self.settle()
         found = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, kind, number, found, 0)
@@ -86,7 +86,7 @@ class Model:
         return range(first, first + int(self.model.body_jntnum[body]))
 
     def free_joint_of(self, body: int) -> int | None:
-        """Return the number of the free joint of a body; None if it has none."""
+        """Return the number of the free joint of a body; None if it has no free joint."""
         return next((it for it in self.joints_of(body) if self.model.jnt_type[it] == FREE), None)
 
     def positions(self, joint: int) -> Any:

@@ -1,4 +1,4 @@
-"""How bodies of a model move, and what pushes them, as a supervisor has it."""
+"""The motion of a model's bodies, and the forces on them, for a supervisor."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class BodyMotion:
     """The motion of the bodies of one model.
 
     Args:
-        model: see above.
-        bodies: the number of the body of a node.
+        model: the model.
+        bodies: maps a node to the number of its body.
     """
 
     def __init__(self, model: Model, bodies: Mapping[SceneNode, int]) -> None:
@@ -27,10 +27,10 @@ class BodyMotion:
         self._pushed = False
 
     def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
-        """Return the velocity of a body in m/s and its turning in rad/s.
+        """Return the velocity of a body in m/s and its angular velocity in rad/s.
 
         Raises:
-            UnsimulatedError: the node is no body.
+            UnsimulatedError: the node is not a body.
         """
         (vx, vy, vz), (wx, wy, wz) = self._model.velocity(mujoco.mjtObj.mjOBJ_XBODY, self._body(node))
         return (vx, vy, vz), (wx, wy, wz)
@@ -39,7 +39,7 @@ class BodyMotion:
         """Give a free body a velocity.
 
         Raises:
-            UnsimulatedError: joints move it.
+            UnsimulatedError: the body is not free.
         """
         free = self._model.free_joint_of(self._body(node))
         if free is None:
@@ -50,7 +50,7 @@ class BodyMotion:
         self._model.changed()
 
     def halt(self, node: SceneNode) -> None:
-        """Stop a body and all that is on it."""
+        """Stop a body and all bodies on it."""
         numbers = (self._bodies[it] for it in (node, *node.descendants()) if it in self._bodies)
         for number in numbers:
             for joint in self._model.joints_of(number):
@@ -60,7 +60,7 @@ class BodyMotion:
     def add_force(
         self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
     ) -> None:
-        """Let a force in N act in the next basic step; see `Motion`."""
+        """Apply a force in N in the next basic step; see `Motion`."""
         body = self._body(node)
         pose = self._model.pose(body)
         world = np.array(pose.turned(force) if relative else force)
@@ -70,12 +70,12 @@ class BodyMotion:
         self._push(body, world, torque)
 
     def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
-        """Let a torque in N m act in the next basic step."""
+        """Apply a torque in N m in the next basic step."""
         body = self._body(node)
         self._push(body, np.zeros(3), np.array(self._model.pose(body).turned(torque) if relative else torque))
 
     def clear(self) -> None:
-        """End the forces of the last basic step."""
+        """Remove the forces of the last basic step."""
         if self._pushed:
             self._model.data.xfrc_applied[:] = 0.0
             self._pushed = False
@@ -88,5 +88,5 @@ class BodyMotion:
     def _body(self, node: SceneNode) -> int:
         number = self._bodies.get(node)
         if number is None:
-            raise UnsimulatedError(f"a {node.type_name} has no motion; ask for a Robot or Solid")
+            raise UnsimulatedError(f"a {node.type_name} has no motion; use a Robot or Solid")
         return number

@@ -1,8 +1,8 @@
-"""Actuators as motors: what a command of Webots is for MuJoCo's `ctrl`.
+"""Actuators as motors: translate commands of Webots to MuJoCo's `ctrl`.
 
-An actuator is a servo for a position, a servo for a velocity, or a force. A motor takes the commands of its
-actuator; a servo for a velocity also turns to a target as Webots does. Until a client commands a motor,
-MuJoCo's own value stays, 0 or that of the keyframe.
+An actuator is a position servo, a velocity servo, or a force. A motor accepts the commands of its actuator;
+a velocity servo also turns to a target as Webots does. Until a client commands a motor, MuJoCo's own value
+stays, 0 or that of the keyframe.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TURNED: Final = (*_JOINTS, int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.m
 
 
 class Control(Enum):
-    """What the control of an actuator is."""
+    """The quantity that the control of an actuator sets."""
 
     POSITION = "position"
     VELOCITY = "velocity"
@@ -41,9 +41,9 @@ class ModelActuator:
     """One actuator of a model.
 
     Attributes:
-        control: what its control is.
+        control: the quantity that its control sets.
         scale: its control for a position, velocity or force of 1 at the joint.
-        length: returns the position of its joint or tendon, in rad or m; None if it has none.
+        length: returns the position of its joint or tendon, in rad or m; None if the actuator has neither.
         read: returns its control.
         write: sets its control.
         force: returns the force or torque at the joint, in N or N m.
@@ -68,17 +68,17 @@ class ActuatorMotor(Motor):
         self.forceful = True  # MuJoCo moves everything by forces
 
     def reset(self) -> None:
-        """Return to the state of a new world, without a command; the model has returned to its start."""
+        """Return to the initial state, without a command; call this after the model was reset."""
         super().reset()
         self._commanded = False
         if self._actuator.length is not None:
             self.angle_rad = self.target_rad = self.asked_rad = self._actuator.length()
         if self._actuator.control is Control.POSITION:
             self.target_rad = self.asked_rad = self._actuator.read() / self._actuator.scale
-        self._aim: float | None = None  # where a servo for a position is to be now
+        self._aim: float | None = None  # current target of a position servo
 
     def put(self, angle_rad: float) -> None:
-        """Take the position to which a client has put the joint; a motor with a command holds it."""
+        """Handle a joint position that a client has set; a motor with a command holds that position."""
         if self._commanded and self._actuator.control is not Control.FORCE:
             super().put(angle_rad)
         self._aim = None
@@ -96,13 +96,13 @@ class ActuatorMotor(Motor):
         self._commanded = True
 
     def set_acceleration(self, acceleration_rad_s2: float) -> None:
-        """Limit the acceleration of a servo for a velocity; see `Motor`."""
+        """Limit the acceleration of a velocity servo; see `Motor`."""
         if self._actuator.control is not Control.VELOCITY and acceleration_rad_s2 != -1.0:
             raise UnsimulatedError(f"{self._what()}, whose acceleration MuJoCo does not limit")
         super().set_acceleration(acceleration_rad_s2)
 
     def set_effort(self, torque_nm: float) -> None:
-        """Let a force in N or a torque in N m act from now on; see `Motor`.
+        """Apply a force in N or a torque in N m from now on; see `Motor`.
 
         Raises:
             UnsimulatedError: the actuator is a servo.
@@ -113,7 +113,7 @@ class ActuatorMotor(Motor):
         self._commanded = self.effort_nm is not None
 
     def set_available_torque(self, torque_nm: float) -> None:
-        """Refuse a limit of the force, which is the model's.
+        """Raise an error, because the model limits the force.
 
         Raises:
             UnsimulatedError: always.
@@ -122,23 +122,23 @@ class ActuatorMotor(Motor):
         raise UnsimulatedError(f"{self._what()}, whose force the model limits; write forcerange there")
 
     def set_control_pid(self, p: float, i: float, d: float) -> None:
-        """Set the gains with which a servo for a velocity turns to a target; see `Motor`.
+        """Set the gains with which a velocity servo turns to a target; see `Motor`.
 
         Raises:
-            UnsimulatedError: the model has the gains.
+            UnsimulatedError: the gains are those of the model.
         """
         if self._actuator.control is not Control.VELOCITY and (p, i, d) != self.spec.gains:
             raise UnsimulatedError(f"{self._what()}, whose gains the model has; write kp and kv there")
         super().set_control_pid(p, i, d)
 
     def feel(self) -> None:
-        """Take position and force of this moment."""
+        """Copy the position and force of this moment."""
         if self._actuator.length is not None:
             self.angle_rad = self._actuator.length()
         self.feedback_nm = self._actuator.force()
 
     def command(self, step_s: float) -> None:
-        """Set the control for the next basic step, as the last command has it."""
+        """Set the control for the next basic step, by the last command."""
         if self._actuator.length is not None:
             self.angle_rad = self._actuator.length()
         if self._commanded:
@@ -156,7 +156,7 @@ class ActuatorMotor(Motor):
         return self.speed_rad_s
 
     def _next_aim(self, aim: float, step_s: float) -> float:
-        """Return where a servo for a position is to be after a basic step at the commanded velocity."""
+        """Return the target of a position servo after a basic step at the commanded velocity."""
         reach = abs(self.velocity_rad_s) * step_s
         if math.isfinite(self.target_rad):
             return max(aim - reach, min(aim + reach, self.target_rad))
@@ -175,7 +175,7 @@ class ActuatorMotor(Motor):
 
 
 def control_of(model: Any, index: int) -> tuple[Control, float] | None:
-    """Return what the control of an actuator is, and its value for one unit at the joint; None: neither."""
+    """Return the kind of an actuator's control, and its value for one unit at the joint; None if unknown."""
     gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index]
     dynamics = int(model.actuator_dyntype[index])
     known = (
@@ -198,13 +198,13 @@ def control_of(model: Any, index: int) -> tuple[Control, float] | None:
 
 
 def kind_of(model: Any, index: int) -> str:
-    """Return a word for what the control of an actuator is."""
+    """Return a word for the kind of an actuator's control."""
     control = control_of(model, index)
     return "actuator" if control is None else control[0].name.lower()
 
 
 def gear_of(model: Any, index: int) -> float:
-    """Return the force at the joint for a force of 1 of the actuator; at a site, in its direction."""
+    """Return the force at the joint for an actuator force of 1; for a site, in the direction of its gear."""
     gear: list[float] = model.actuator_gear[index].tolist()
     if model.actuator_trntype[index] in _TURNED:
         return gear[0]
@@ -212,7 +212,7 @@ def gear_of(model: Any, index: int) -> float:
 
 
 def length_of(model: Model, index: int) -> Callable[[], float] | None:
-    """Return a function that returns the position of an actuator's joint or tendon; None if it has none."""
+    """Return a function for the position of an actuator's joint or tendon; None if it has neither."""
     joint = joint_of(model.model, index)
     if joint is not None:
         positions = model.positions(joint)
@@ -224,7 +224,7 @@ def length_of(model: Model, index: int) -> Callable[[], float] | None:
 
 
 def force_of(model: Model, index: int) -> Callable[[], float]:
-    """Return a function that returns the force of an actuator at its joint, in N or N m."""
+    """Return a function for the force of an actuator at its joint, in N or N m."""
     gear, forces = gear_of(model.model, index), model.data.actuator_force
     return lambda: float(forces[index]) * gear
 
@@ -238,7 +238,7 @@ def joint_of(model: Any, index: int) -> int | None:
 
 
 def spec_of(model: Any, index: int, name: str, control: Control, scale: float) -> MotorSpec:
-    """Return the limits of a motor: those that the model has, else none."""
+    """Return the specification of a motor, with the limits of the model, if it has any."""
     low, high = 0.0, 0.0
     limit = math.inf
     if model.actuator_ctrllimited[index]:

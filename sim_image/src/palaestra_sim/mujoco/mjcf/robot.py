@@ -31,10 +31,10 @@ class Equipment:
 
     Attributes:
         devices: by name.
-        joints: the number of the joint of each device that is on one, by name.
-        motors: those of actuators.
-        actuators: those that are no motors.
-        samples: give the sensors their values.
+        joints: the number of the joint of each device on a joint, by name.
+        motors: the actuators that are motors.
+        actuators: the actuators that are not motors.
+        samples: functions that set the values of the sensors.
         refused: mistakes with devices, each with its place.
         left_out: sensors and actuators without a device in Webots, which the user left out.
     """
@@ -54,9 +54,9 @@ def equip(model: Model, description: Description, leave_out: LeaveOut) -> Equipm
 
 
 def body_of(model: Any) -> int | None:
-    """Return the number of the body that is the robot: at the top, under which an actuator moves a joint.
+    """Return the number of the robot's body: a top-level body under which an actuator moves a joint.
 
-    None if nothing is moved but tendons; then it is the first body.
+    If actuators move only tendons, it is the first body. None if the model has no body.
     """
     for index in range(model.nu):
         joint, site = motors.joint_of(model, index), int(model.actuator_trnid[index][0])
@@ -81,7 +81,7 @@ class _Fitter:
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
-        self._model.settle()  # motors read the lengths of tendons
+        self._model.settle()  # before motors read the lengths of tendons
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):
@@ -173,10 +173,10 @@ class _Fitter:
         return True
 
     def _name(self, section: str, default: str, other: str, folder: str = "") -> str | None:
-        """Return the name of a device, below `folder`; None if the robot shall not have it.
+        """Return the name of a device, below `folder`; None if the user left the device out.
 
-        Names in a model are unique in a section; a device whose name another section has too gets `other`.
-        MuJoCo allows all characters in names, ROS few.
+        Names in a model are unique within a section; if a device of another section has the name, this device
+        gets `other`. MuJoCo allows all characters in names, ROS only a few.
         """
         key = f"{section}/{default}"
         self._known.add(key)
@@ -187,7 +187,7 @@ class _Fitter:
         return None if name == LEFT_OUT else f"{folder}{name}"
 
     def _is_left_out(self, section: str, given: str, name: str, type_name: str) -> bool:
-        """Return whether the user leaves out a type that Webots does not have, and note it if so."""
+        """Return whether the user leaves out this type, which Webots does not have; record it if so."""
         if type_name not in self._leave_out.types:
             return False
         fact = f"the {section} {name!r} of type {type_name} has no device in Webots"
@@ -195,7 +195,7 @@ class _Fitter:
         return True
 
     def _unknown(self) -> Iterator[WorldError]:
-        """Yield an error for each name in `custom` of a device that the model does not have."""
+        """Yield an error for each device name in `custom` that the model does not have."""
         for key in self._names:
             if key not in self._known:
                 section = key.partition("/")[0] + "/"
@@ -208,7 +208,7 @@ class _Fitter:
 
     def _shaft(self, joint: int) -> Shaft:
         slides = self._model.model.jnt_type[joint] == SLIDE
-        axis = (1.0, 0.0, 0.0)  # MuJoCo moves it
+        axis = (1.0, 0.0, 0.0)  # any axis, because MuJoCo moves the joint
         return self._shafts.setdefault(joint, Shaft(joint=Joint(axis=axis, slides=bool(slides))))
 
     def _reader(self, index: int) -> Callable[[], float]:
@@ -227,8 +227,8 @@ class _Fitter:
 def _actuator_names(model: Any) -> list[str]:
     """Return the name of each actuator: its own, else that of its joint, else its number.
 
-    Several actuators of one joint without names, such as a position and a velocity servo, have their kinds in
-    their names, or else their numbers.
+    If several actuators of one joint have no names, such as a position and a velocity servo, their names end
+    with their kinds, or else with their numbers.
     """
     joints = [motors.joint_of(model, index) for index in range(model.nu)]
     plain = [

@@ -1,7 +1,7 @@
 """Sensors and cameras of a model as devices of Webots.
 
-A sensor whose value is one number has the interface of a PositionSensor. Those with more numbers have a
-device of their own; if Webots has none, see `own`.
+A sensor whose value is one number has the interface of a PositionSensor. Sensors with more numbers have
+devices of their own; if Webots has no such device, see `generic_devices`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.lookup_table import LookupTable
 
-_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # MuJoCo measures, not a place
+_NOWHERE: Final = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # unused, because MuJoCo measures
 _PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
-_FORCE: Final = 1  # what `get_type` of a touch sensor answers
-_PIXELS: Final = (64, 64)  # Webots' own, for a camera without a resolution
+_FORCE: Final = 1  # the value that `get_type` of a touch sensor returns
+_PIXELS: Final = (64, 64)  # Webots' default, for a camera without a resolution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """A device, its row of the table of devices, and what gives it its value."""
+    """A device, its row of the table of devices, and the function that sets its value."""
 
     kind: DeviceType[Any]
     device: Any
@@ -49,11 +49,11 @@ class ModelSensor:
     """A sensor of the model.
 
     Attributes:
-        model: with all else.
+        model: the whole model.
         number: of the sensor.
         name: of the device.
         numbers: a view of its value.
-        shaft: the joint that it measures; a new one without devices if there is none.
+        shaft: the joint that it measures; a new one without devices if it does not measure a joint.
     """
 
     model: Model
@@ -75,7 +75,7 @@ def measured(sensor: ModelSensor) -> Measured:
 
 
 def camera(parent: Model, number: int, name: str) -> Measured:
-    """Return the device of a camera, which shows the model as MuJoCo draws it."""
+    """Return the device of a camera, which shows the model as MuJoCo renders it."""
     model = parent.model
     width, height = model.cam_resolution[number].tolist()
     size = (width, height) if width > 1 and height > 1 else _PIXELS
@@ -93,7 +93,7 @@ def camera(parent: Model, number: int, name: str) -> Measured:
 
 
 def _by_model(_devices: Sequence[Any], _robot: Carrier) -> Sample:
-    """Sample nothing here: the simulation samples what the model measures."""
+    """Return a function without effect: the simulation itself samples the sensors of the model."""
     return lambda: None
 
 
@@ -123,7 +123,7 @@ def _number(sensor: ModelSensor) -> Measured:
 
 
 def _distance(sensor: ModelSensor) -> Measured:
-    """Return a distance sensor, which measures its whole reach where it meets nothing."""
+    """Return a distance sensor, which reports its whole reach if it meets nothing."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
     device = DistanceSensor(
@@ -212,7 +212,7 @@ _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
 _MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
-_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # it has its eye already
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # its camera interface is already set
 _OF_ONE: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,

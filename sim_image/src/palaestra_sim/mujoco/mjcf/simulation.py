@@ -1,6 +1,6 @@
 """The Backend of an MJCF world: MuJoCo's own model, with one robot that has all devices.
 
-The same world and commands give the same values, bit for bit, also after a reset.
+The same world and commands give the same values, bit for bit, even after a reset.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ class MjcfSimulation:
     """One loaded MJCF world; see `Backend`.
 
     Args:
-        model: at its start.
+        model: in its initial state.
         tree: its nodes.
         equipment: the devices of the robot.
         robot: the robot itself.
         basic_step_ms: a whole number of MuJoCo's steps.
-        mode: how it runs at first.
+        mode: the mode at the start.
     """
 
     def __init__(
@@ -69,10 +69,10 @@ class MjcfSimulation:
         self._reset_asked = False
 
     def step(self, duration_ms: int) -> None:
-        """Simulate for `duration_ms`, then give the sensors their values.
+        """Simulate for `duration_ms`, then set the values of the sensors.
 
         Raises:
-            ValueError: the duration is no positive multiple of the basic step.
+            ValueError: the duration is not a positive multiple of the basic step.
         """
         self.advance(duration_ms)
         self.sample()
@@ -81,7 +81,7 @@ class MjcfSimulation:
         """Simulate for `duration_ms`; the sensors keep their values.
 
         Raises:
-            ValueError: the duration is no positive multiple of the basic step.
+            ValueError: the duration is not a positive multiple of the basic step.
         """
         count, rest = divmod(duration_ms, self.basic_step_ms)
         if rest or count < 1:
@@ -91,7 +91,7 @@ class MjcfSimulation:
             self._basic_step()
 
     def sample(self) -> None:
-        """Give every sensor its value of this moment."""
+        """Set the value of every sensor to that of this moment."""
         self._model.settle()
         for motor in self._equipment.motors:
             motor.feel()
@@ -103,7 +103,7 @@ class MjcfSimulation:
         self._pending.append(change)
 
     def changed(self, node: SceneNode, field: str) -> None:
-        """Put a body where its field has it."""
+        """Set the pose of a body to that of its field."""
         if node.place is None:
             return
         if field == "translation":
@@ -123,7 +123,7 @@ class MjcfSimulation:
         self._model.changed()
 
     def quit(self, status: int) -> None:
-        """Ask for the end of the simulator."""
+        """Request the end of the simulator."""
         self.quit_status = status
 
     def robot_of(self, node: SceneNode) -> Robot | None:
@@ -131,22 +131,22 @@ class MjcfSimulation:
         return self.robots[0] if node is self._nodes.robot else None
 
     def add(self, text: str, field: NodeField, index: int) -> Never:
-        """Refuse: a model is compiled once."""
+        """Raise an error: a model is compiled once."""
         del text, field, index
         raise UnsimulatedError(_FIXED)
 
     def remove(self, node: SceneNode) -> Never:
-        """Refuse: a model is compiled once."""
+        """Raise an error: a model is compiled once."""
         del node
         raise UnsimulatedError(_FIXED)
 
     def export_image(self, path: str, quality: int) -> bool:
-        """Return False: there are no pictures of models yet."""
+        """Return False: images of models are not supported yet."""
         del path, quality
         return False
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
-        """Return where a body touches others: points in meters, each with the number of its node."""
+        """Return a body's contact points: positions in meters, each with the number of its node."""
         self._model.settle()
         asked = {node, *node.descendants()} if descendants else {node}
         touching = {self._nodes.bodies[it]: it.number for it in asked if it in self._nodes.bodies}
@@ -164,7 +164,7 @@ class MjcfSimulation:
         self._states.save(node, name)
 
     def load_state(self, node: SceneNode, name: str) -> None:
-        """Return a node to a saved state, at rest; "__init__" is that of the world file.
+        """Return a node to a saved state, at rest; "__init__" is the state in the world file.
 
         Raises:
             UnsimulatedError: no state of that name was saved.
@@ -172,10 +172,10 @@ class MjcfSimulation:
         self._states.load(node, name)
 
     def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
-        """Put a hinge or slider to a position within its range, in rad or m, at rest.
+        """Set the position of a hinge or slider within its range, in rad or m, at rest.
 
         Raises:
-            UnsimulatedError: the node is no such joint, or has no axis `index`, counted from 1.
+            UnsimulatedError: the node is not such a joint, or has no axis `index`, counted from 1.
         """
         joint = self._nodes.joints.get(node)
         model = self._model.model
@@ -213,7 +213,7 @@ class MjcfSimulation:
         self._reset_asked = False
         self.time_ms = 0
         self._model.reset()
-        self._model.settle()  # motors read the lengths of tendons
+        self._model.settle()  # before motors read the lengths of tendons
         for motor in self._equipment.motors:
             motor.reset()
         for actuator in self._equipment.actuators:

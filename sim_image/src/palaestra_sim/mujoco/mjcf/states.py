@@ -16,8 +16,8 @@ class BodyStates:
     """The states that clients have saved.
 
     Args:
-        model: at its start.
-        bodies: the number of the body of a node.
+        model: in its initial state.
+        bodies: maps a node to the number of its body.
     """
 
     def __init__(self, model: Model, bodies: Mapping[SceneNode, int]) -> None:
@@ -27,14 +27,14 @@ class BodyStates:
         self._saved: dict[tuple[int, str], Any] = {}
 
     def save(self, node: SceneNode, name: str) -> None:
-        """Save the positions of the joints of a node, and of all inside it."""
+        """Save the positions of the joints of a node, and of all nodes inside it."""
         self._saved[node.number, name] = self._model.data.qpos.copy()
 
     def load(self, node: SceneNode, name: str) -> None:
         """Return these joints to a state.
 
         Raises:
-            UnsimulatedError: none of that name was saved.
+            UnsimulatedError: no state of that name was saved.
         """
         positions = self._start if name == _INITIAL else self._saved.get((node.number, name))
         if positions is None:
@@ -46,7 +46,7 @@ class BodyStates:
         for joint, saved in wanted.items():
             self._model.positions(joint)[:] = saved
             self._model.speeds(joint)[:] = 0.0
-        # The solver begins anew too, so what follows depends on the state and not on what was before.
+        # The solver restarts too, so that the motion depends on the loaded state and not on earlier motion.
         self._model.data.qacc_warmstart[:] = 0.0
         self._model.changed()
 

@@ -1,7 +1,7 @@
 """The nodes of a model: its bodies as Solids, its joints, and its devices, for a supervisor.
 
-A body has its name as DEF. The body of the robot is a Robot, with all devices that are on no joint. A joint
-has its name as DEF too, with `_joint` appended if a body has the same.
+The DEF of a body is its name. The body of the robot is a Robot, with all devices that are not on a joint. The
+DEF of a joint is its name too, with `_joint` appended if a body has the same name.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_sim.world import Item, Node, Value, World
 from palaestra_sim.world.mjcf import Description
 from palaestra_sim.world.tokens import Tokens
 
-_JOINTS: Final = {1: "BallJoint", 2: "SliderJoint", 3: "HingeJoint"}  # by mjtJoint; a free body has none
+_JOINTS: Final = {1: "BallJoint", 2: "SliderJoint", 3: "HingeJoint"}  # by mjtJoint; a free joint has no node
 _PARAMETERS: Final = {"HingeJoint": "HingeJointParameters", "SliderJoint": "JointParameters"}
 
 
@@ -31,8 +31,8 @@ class ModelTree:
     Attributes:
         scene: all nodes.
         robot: its node.
-        bodies: the number of the body of a node.
-        joints: the number of the joint of a node.
+        bodies: maps a node to the number of its body.
+        joints: maps a node to the number of its joint.
     """
 
     scene: SceneTree
@@ -44,7 +44,7 @@ class ModelTree:
 def grow(
     model: Model, description: Description, equipment: Equipment, body: int, basic_step_ms: int
 ) -> ModelTree:
-    """Return the nodes of a model, with their places; `body` is the robot.
+    """Return the nodes of a model, with their frames; `body` is the robot.
 
     The devices of the equipment get their nodes.
     """
@@ -66,7 +66,7 @@ def grow(
 
 
 def _place(model: Model, tree: ModelTree) -> None:
-    """Give the bodies their places, parents first."""
+    """Give the bodies their frames, parents first."""
     places: dict[int, BodyFrame] = {}
     for node, number in sorted(tree.bodies.items(), key=lambda pair: pair[1]):
         parent = places.get(int(model.model.body_parentid[number]))
@@ -74,10 +74,10 @@ def _place(model: Model, tree: ModelTree) -> None:
 
 
 class _Builder:
-    """Writes nodes; the span of each is a number of its own, by which it is found in the tree.
+    """Builds nodes; the span of each is a unique number, by which it is found in the tree.
 
     Attributes:
-        kinds: what each node is of, by that number.
+        kinds: maps that number to the object of the model that the node stands for.
     """
 
     def __init__(self, model: Model, description: Description, equipment: Equipment, body: int) -> None:
@@ -90,7 +90,7 @@ class _Builder:
         self._body_names = {model.model.body(it).name for it in range(model.model.nbody)}
 
     def world(self, basic_step_ms: int) -> World:
-        """Return the nodes as those of a world file."""
+        """Return the nodes in the form of a world file."""
         model = self._model.model
         info = self._node(
             "WorldInfo",
@@ -109,7 +109,7 @@ class _Builder:
         return tuple(node for number in numbers for node in self._body(number))
 
     def _body(self, number: int) -> tuple[Node, ...]:
-        """Return a body, at the end of its last joint; the other joints stand before that."""
+        """Return a body as the end point of its last joint, preceded by its other joints."""
         name = self._model.model.body(number).name
         children = list(self._children(number))
         fields: dict[str, Value] = {"name": _value(name or f"body{number}")}

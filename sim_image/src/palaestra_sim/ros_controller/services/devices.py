@@ -1,4 +1,4 @@
-"""Devices over ROS: the services of each, and the feeds that publish values once they are enabled."""
+"""Devices over ROS: the services of each, and the feeds that publish values after the device is enabled."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from palaestra_sim.scene.nodes.types import type_number
 class Feed:
     """One topic of a device.
 
-    A period that differs from those before adds a second publisher of the same topic, as in the controller;
+    A period that differs from earlier ones adds a second publisher of the same topic, as in the controller;
     the messages of the two are mixed.
 
     Attributes:
-        constants: the other fields, as they are when the topic begins.
-        reading: the field of the value; "" is the last one.
+        constants: the other fields, with the values that they have when the topic begins.
+        reading: the field of the value; "" for the last one.
         many: whether the value is a sequence, with a message for each of its items.
-        whole: whether a value has all fields by name.
+        whole: whether the value is a mapping of all fields.
         stamped: whether the messages have a header.
         publishers: by period in ms.
     """
@@ -50,7 +50,7 @@ class Feed:
     publishers: dict[int, PublisherInterface] = field(default_factory=dict)
 
     def begin(self, node: NodeInterface, period_ms: int) -> None:
-        """Publish every `period_ms` too."""
+        """Start to publish every `period_ms`, in addition to the other periods."""
         if period_ms not in self.publishers:
             template = {**self.template, **self.constants}
             self.publishers[period_ms] = node.advertise(
@@ -66,7 +66,7 @@ class Feed:
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, by each publisher that is due.
 
-        Without a subscriber the value is not read: a picture takes time to draw.
+        Without a subscriber the value is not read, because rendering an image takes time.
         """
         source = self.source
         if source is None:
@@ -88,14 +88,14 @@ class Feed:
 
 
 class Outlet:
-    """All topics of one device, which its `enable` begins and ends together.
+    """All topics of one device; its `enable` starts and stops them together.
 
     Args:
-        node: that publishes.
+        node: the node that publishes.
         device_name: as in the world.
         topics: of the device.
-        accepts: whether it accepts a period.
-        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+        accepts: returns whether the device accepts a period.
+        enabled: called after a change with the sampling period in ms; 0 means that the device is off.
         prefix: of `enable` and `get_sampling_period`, below the device.
 
     Attributes:
@@ -137,7 +137,7 @@ class Outlet:
         """Publish every `period_ms`; 0 stops. Return whether the device accepts the period.
 
         Raises:
-            UnsimulatedError: the device cannot begin, as a camera on a machine that cannot draw.
+            UnsimulatedError: the device cannot start, for example a camera on a machine that cannot render.
         """
         if period_ms == 0:
             self._periods_ms.clear()
@@ -169,13 +169,13 @@ class Outlet:
 
 
 def stream_outlet(node: NodeInterface, device_name: str, stream: Stream) -> Outlet:
-    """Return the outlet of topics that have an `enable` of their own."""
+    """Return the outlet of topics that have their own `enable`."""
     accepts = never if stream.silent else whole_steps
     return Outlet(node, device_name, stream.topics, accepts, stream.enabled, stream.prefix)
 
 
 def device_services(kind: DeviceType[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
-    """Return the services of a device beside `enable` and `get_sampling_period`; `shaft` is its joint."""
+    """Return a device's services besides `enable` and `get_sampling_period`; `shaft` is its joint."""
     rows: tuple[Row, ...] = (
         ("get_model", "get_string", lambda _: {"value": device.model}),
         ("get_name", "get_string", lambda _: {"value": device.name}),
@@ -192,7 +192,7 @@ def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
 
 
 def _neighbors(kind: DeviceType[Any], shaft: Shaft | None) -> tuple[Row, ...]:
-    """Return the services that answer the names of the other devices of a joint."""
+    """Return the services that report the names of the other devices of a joint."""
     if shaft is None:
         return ()
     names = shaft.names

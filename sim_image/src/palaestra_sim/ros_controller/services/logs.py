@@ -1,6 +1,7 @@
 """The log of a controller over ROS: `/rosout`, and the services with which rqt_logger_level sets its level.
 
-Every roscpp node has them. The simulator logs what it refuses; the rest of roscpp's log is about itself.
+Every roscpp node has them. The simulator logs the requests that it refuses; the rest of roscpp's log would be
+about roscpp itself.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ class NodeLog:
     """The log of one node.
 
     Args:
-        node: that logs.
-        clock: seconds of real time since 1970.
+        node: the node that logs.
+        clock: returns seconds of real time since 1970.
     """
 
     def __init__(self, node: NodeInterface, clock: Callable[[], float] = time.time) -> None:
@@ -43,7 +44,7 @@ class NodeLog:
         self._publisher = self._node.advertise("/rosout", "rosgraph_msgs/Log")
 
     def error(self, text: str) -> None:
-        """Publish an error, unless the level is higher."""
+        """Publish an error, unless the log level is above `error`."""
         if self._publisher is None or _LEVELS[self._levels[_LOGGER]] > _LEVELS["error"]:
             return
         seconds, rest_s = divmod(self._clock(), 1.0)
@@ -58,7 +59,7 @@ class NodeLog:
         )
 
     def reporting(self, path: str, handler: Handler) -> Handler:
-        """Return a handler that logs its failures, with our errors turned into failures of the service."""
+        """Return a handler that logs its failures, and turns our errors into failures of the service."""
 
         def handle(request: Any) -> Any:
             try:

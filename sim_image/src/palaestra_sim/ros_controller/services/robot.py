@@ -14,11 +14,11 @@ from palaestra_sim.scene.robot import Robot
 
 Fields = dict[str, Any]
 
-_MOST_TEXTS: Final = 100  # that wait for the controller
+_MOST_TEXTS: Final = 100  # maximum number of texts that wait for the controller
 
 
 class RobotServices:
-    """The services of one robot about itself, but for `time_step` and `get_device_list`."""
+    """The services of one robot about itself, except `time_step` and `get_device_list`."""
 
     def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
         self._host = host
@@ -27,7 +27,7 @@ class RobotServices:
         self._from_window: deque[str] = deque()
 
     def table(self) -> tuple[Service, ...]:
-        """Return the services, with their paths below the robot's name."""
+        """Return the services, with their paths relative to the robot."""
         own = Service("palaestra/window/send_text", "webots_ros/set_string", self._send_as_window)
         rows = (*self._constants(), *self._actions())
         return (*(Service(f"robot/{name}", f"webots_ros/{type_}", it) for name, type_, it in rows), own)
@@ -63,7 +63,7 @@ class RobotServices:
         )
 
     def device_list(self) -> Service:
-        """Return the service that is advertised last, so that a client that finds it finds all."""
+        """Return the service that is advertised last: a client that finds it finds all services."""
         names = list(self._robot.parts.devices.names)
         return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
 

@@ -1,7 +1,7 @@
 """Services under `supervisor/field/`: read and write typed values by handle.
 
-A write of a value that a field cannot hold answers success 1, as in the controller. A write that would have
-no effect here alone fails with a sentence that says so. A read of the wrong type answers 0 or "" where
+A write of a value that a field cannot hold returns success 1, as in the controller. If only this simulator
+would ignore a write, the call fails with the reason. A read of the wrong type returns 0 or "" where
 libController has such a value. It fails where libController has a null pointer (vectors, rotations, colors),
 which crashes the real controller.
 """
@@ -22,7 +22,7 @@ Fields = dict[str, Any]
 
 
 class _Codec(NamedTuple):
-    """The conversion of a type's values: to a message, from a message, and the value for none."""
+    """The conversion of a type's values to and from messages, and the value that stands for no value."""
 
     type: FieldType
     write: Callable[[Any], Any]
@@ -63,7 +63,7 @@ class FieldServices:
         self._handles = handles
 
     def table(self) -> tuple[Service, ...]:
-        """Return the services, with their paths below the robot's name."""
+        """Return the services, with their paths relative to the robot."""
         rows: list[Row] = [
             ("get_name", "field_get_name", self._get_name),
             ("get_type", "field_get_type", self._get_type),

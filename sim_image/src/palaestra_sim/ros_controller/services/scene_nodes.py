@@ -1,7 +1,7 @@
-"""Services under `supervisor/node/`: a node's type, its place, and changes to it.
+"""Services under `supervisor/node/`: a node's type, its position, and changes to it.
 
-A request for something that the simulator lacks, such as forces in the stub, fails with a sentence that says
-so, instead of a success that did nothing.
+If the simulator does not support a request, such as forces in the stub, the call fails with the reason. It
+does not return success without an effect.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class NodeServices:
         self._handles = handles
 
     def table(self) -> tuple[Service, ...]:
-        """Return the services, with their paths below the robot's name."""
+        """Return the services, with their paths relative to the robot."""
         return tuple(
             Service(f"supervisor/node/{name}", f"webots_ros/{type_name}", handler)
             for name, type_name, handler in (*self._what(), *self._where(), *self._changes())
@@ -96,7 +96,7 @@ class NodeServices:
         return {"type": type_number(self._node(request).type_name)}
 
     def _get_type_name(self, request: Any) -> Fields:
-        """Answer the name of its PROTO, if the node is an instance of one."""
+        """Return the name of the node's PROTO, or its type if it is not an instance of a PROTO."""
         node = self._node(request)
         return {"name": node.proto_name or node.type_name}
 
@@ -119,7 +119,7 @@ class NodeServices:
         return {"orientation": _quaternion(_pose(self._node(request)))}
 
     def _get_pose(self, request: Any) -> Fields:
-        """Answer the pose of `from_node` relative to `node`, swapped as in the controller.
+        """Return the pose of `from_node` relative to `node`, swapped as in the controller.
 
         Webots crashes for a `from_node` of 0; here the call fails.
         """
@@ -136,7 +136,7 @@ class NodeServices:
         }
 
     def _get_center_of_mass(self, request: Any) -> Fields:
-        """Answer the origin of the node, because nothing has a mass here."""
+        """Return the origin of the node, because nodes have no masses here."""
         return {"centerOfMass": _point(_place(self._node(request)).world_position)}
 
     def _get_static_balance(self, request: Any) -> Fields:
@@ -200,7 +200,7 @@ class NodeServices:
         return {"value": len(kinds_of(node)) if _has_fields(node, request) else -1}
 
     def _export_string(self, request: Any) -> Fields:
-        """Answer the node as the world file has it."""
+        """Return the node's text in the world file."""
         origin = self._node(request).origin
         if origin is None:
             return {"value": self._handles.tree.source.decode()}
@@ -235,13 +235,13 @@ class NodeServices:
         return {"success": 1}
 
     def _accept(self, request: Any) -> Fields:
-        """Accept a hint that affects only the speed of Webots' answers, or its drawing."""
+        """Accept a hint that affects only the speed of Webots' responses, or its rendering."""
         self._node(request)
         return {"success": 1}
 
 
 def _has_fields(node: SceneNode, request: Any) -> bool:
-    """Return whether a node has fields of that sort; those inside of a PROTO are only in its instances."""
+    """Return whether a node has fields of the requested sort; only instances of PROTOs have inner fields."""
     return bool(node.proto_name) or not request.proto
 
 
@@ -251,9 +251,9 @@ def _pose(node: SceneNode) -> Pose:
 
 
 def _place(node: SceneNode) -> Frame:
-    """Return the place of a node; in Webots a node without one crashes the controller."""
+    """Return the frame of a node; in Webots a node without a frame crashes the controller."""
     if node.place is None:
-        raise ServiceFailed(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
+        raise ServiceFailed(f"a {node.type_name} has no position; use a Pose, Solid or Robot")
     return node.place
 
 

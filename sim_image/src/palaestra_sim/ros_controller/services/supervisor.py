@@ -1,6 +1,6 @@
-"""Services under `supervisor/`: the simulation as a whole, and the first handle of everything.
+"""Services under `supervisor/`: the simulation as a whole, and the first handles of nodes.
 
-Pictures and movies are saved if the simulator draws. Animations fail.
+Images and movies are saved if the simulator renders. Animations fail.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class SupervisorServices:
         self._robot = robot
 
     def table(self) -> tuple[Service, ...]:
-        """Return the services, with their paths below the robot's name."""
+        """Return the services, with their paths relative to the robot."""
         return tuple(
             Service(f"supervisor/{name}", f"webots_ros/{type_name}", handler)
             for name, type_name, handler in (
@@ -121,7 +121,7 @@ class SupervisorServices:
         return {"value": self._handles.of(self._robot.parts.node)}
 
     def _get_from_def(self, request: Any) -> Fields:
-        """Look for a DEF anywhere, or inside the instance of a PROTO."""
+        """Find a DEF anywhere, or inside the instance of a PROTO."""
         within = self._handles.node(request.proto) if request.proto else None
         if within is not None and not within.proto_name:
             return {"node": 0}
@@ -154,7 +154,7 @@ def _refuse_get(_request: Any) -> Fields:
 
 
 def _no_headset(_request: Any) -> Fields:
-    raise ServiceFailed("no virtual-reality headset is used; virtual_reality_headset_is_used answers so")
+    raise ServiceFailed("no virtual-reality headset is used; check virtual_reality_headset_is_used first")
 
 
 def _nothing_selected(_request: Any) -> Fields:

@@ -5,22 +5,22 @@ its services, its topics with their messages, and the rule of its `enable`. The 
 `wrong_value` follows from the topic. A new device is one file in this package and one line in `DEVICES`;
 CONTRIBUTING.md has the steps.
 
-- `kind`: what a row is
-- `distance_sensor`, `touch_sensor`: the rows of what feels obstacles
-- `motors`, `brake`, `position_sensor`: the rows of joints
-- `lidar`: the row of many rays
-- `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: the rows of what measures place and motion
-- `altimeter`, `light_sensor`: the rows of what measures the surroundings
-- `emitter`, `receiver`: the rows of radio
-- `connector`: the row of what feels another of its kind
-- `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
-- `camera`, `range_finder`: the rows of what sees
-- `pictures`, `recognition`: the lens that both have, and the objects that a camera finds
-- `radar`: the row of what measures the distances of targets
-- `vacuum_gripper`: the row of what would hold things
-- `skin`: the row of meshes that move, of which there are none
-- `response`: lookup tables, resolution and axes, which several of them have
-- `imu`: the topic of those that send a sensor_msgs/Imu
+- `device_type`: the definition of a row
+- `distance_sensor`, `touch_sensor`: rows of sensors for obstacles
+- `motors`, `brake`, `position_sensor`: rows of devices on joints
+- `lidar`: the row of a sensor with many rays
+- `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: rows of sensors for position and motion
+- `altimeter`, `light_sensor`: rows of sensors for height and light
+- `emitter`, `receiver`: rows of radio devices
+- `connector`: the row of a device that detects another of its kind
+- `led`, `speaker`, `pen`, `display`: rows of devices that only store the values that a program sets
+- `camera`, `range_finder`: rows of devices with images
+- `camera_common`, `recognition`: the lens that both share, and the objects that a camera recognizes
+- `radar`: the row of a sensor for the distances of targets
+- `vacuum_gripper`: the row of a gripper, which never holds an object here
+- `skin`: the row of animated meshes, which are not loaded here
+- `sensor_response`: lookup tables, resolution and axes, which several sensors share
+- `imu_topic`: the topic of sensors that send a sensor_msgs/Imu
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ from palaestra_sim.scene.devices.speaker import SPEAKER
 from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR
 from palaestra_sim.scene.devices.vacuum_gripper import VACUUM_GRIPPER
 
-# By the type of the node. Robots sample in this order, so a new row goes to the end: a row in between would
-# change the noise of the sensors behind it.
+# By the type of the node. Robots sample in this order, so append new rows: a row in between would change the
+# noise of the later sensors.
 DEVICES: Final[Mapping[str, DeviceType[Any]]] = {
     kind.node: kind
     for kind in (

@@ -1,6 +1,6 @@
 """Accelerometer: the change of its velocity over the last basic step, and the reaction to gravity.
 
-At rest it shows WorldInfo.gravity upward. Webots takes the change over the sensor's period, which is the same
+At rest it shows WorldInfo.gravity upward. Webots uses the change over the sensor's period, which is the same
 for a period of one basic step. Source: WbAccelerometer.cpp of Webots.
 """
 
@@ -21,7 +21,7 @@ from palaestra_sim.scene.geometry import Vector, transposed, turn
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Accelerometer:
-    """An accelerometer of up to three axes; `value` is in m/s2, or as its lookup table has it."""
+    """An accelerometer of up to three axes; `value` is in m/s2, or in the unit of its lookup table."""
 
     name: str
     model: str

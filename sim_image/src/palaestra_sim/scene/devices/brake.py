@@ -1,8 +1,8 @@
 """Brake: the damping of a joint, which limits the speed that its motor reaches.
 
-A damper takes a torque of its constant times the speed of the shaft. A motor with a limited torque therefore
-turns no faster than the torque divided by the constant. A joint without a motor moves only by forces, which
-not every physics has.
+The torque of a damper is its constant times the speed of the shaft. So a motor with a limited torque turns no
+faster than the torque divided by the constant. A joint without a motor moves only by forces, which not every
+physics has.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Camera: its settings, and the picture that it sees if the simulator draws.
+"""Camera: its settings, and its images if the simulator renders.
 
-Otherwise `enable` and what saves a picture answer failure. Distortion, focus, exposure, motion blur and noise
-have no effect.
+If it does not, `enable` and the services that save images return failure. Distortion, focus, exposure, motion
+blur and noise have no effect.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class Camera:
 
     Attributes:
         place: its frame.
-        lens: with the field of view that the world or a client set.
-        spherical: whether its picture would be that of a sphere.
-        exposure: as the world or a client set it.
+        lens: its field of view is that of the world, or the one that a client set.
+        spherical: whether its image would be spherical.
+        exposure: that of the world, or the one that a client set.
         focus: focal length, distance, and its highest and lowest value, in meters; None without a Focus node.
-        zoom: least and greatest field of view in rad; None without a Zoom node.
+        zoom: minimum and maximum field of view in rad; None without a Zoom node.
         recognition: None without a Recognition node.
-        eye: None if it sees nothing.
+        eye: the camera interface; None if the simulator does not render.
     """
 
     name: str
@@ -51,20 +51,20 @@ class Camera:
 
     @property
     def value(self) -> bytes | memoryview:
-        """The picture of this moment: blue, green, red and alpha of each pixel."""
+        """The image of this moment: blue, green, red and alpha of each pixel."""
         return b"" if self.eye is None else self.eye.colors()
 
     def attach(self, robot: Carrier) -> None:
-        """Look from a robot."""
+        """Connect the camera to the robot that carries it."""
         self.eye = None if self.spherical else robot.eye(self.place, self.lens)
         if self.recognition is not None:
             self.recognition.eye = self.eye
 
     def enabled(self, period_ms: int) -> None:
-        """Get ready to draw.
+        """Prepare to render.
 
         Raises:
-            UnsimulatedError: this machine cannot draw.
+            UnsimulatedError: this machine cannot render.
         """
         if period_ms and self.eye is not None:
             self.eye.open()
@@ -150,7 +150,7 @@ def _zoom_info(camera: Camera) -> Fields:
 
 def _fov_setter(camera: Camera) -> Handler:
     def set_fov(request: Any) -> Fields:
-        """Zoom, within the limits of the Zoom node; otherwise nothing changes, as in Webots."""
+        """Set the field of view, within the limits of the Zoom node; otherwise ignore it, as in Webots."""
         if camera.zoom is not None and camera.zoom[0] <= request.value <= camera.zoom[1]:
             camera.lens.field_of_view_rad = request.value
         return {"success": True}
@@ -160,7 +160,7 @@ def _fov_setter(camera: Camera) -> Handler:
 
 def _focus_setter(camera: Camera) -> Handler:
     def set_focal_distance(request: Any) -> Fields:
-        """Focus, within the limits of the Focus node; otherwise nothing changes, as in Webots."""
+        """Set the focal distance, within the limits of the Focus node; otherwise ignore it, as in Webots."""
         if camera.focus is not None:
             length, _, highest, lowest = camera.focus
             if lowest <= request.value <= highest:

@@ -1,4 +1,4 @@
-"""What Camera and RangeFinder share: the lens, the topic of a picture, and saving it."""
+"""The common parts of Camera and RangeFinder: the lens, the topic of images, and the service to save them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.camera_interface import MOST_PIXELS, Lens
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, ValueSource
 
-PIXEL_BYTES: Final = 4  # of a color, and of a distance
+PIXEL_BYTES: Final = 4  # for a color, and for a distance
 
 
 def read_lens(part: DevicePart, near_m: float, far_m: float) -> Lens:
-    """Return the lens of a device; one with no pixels, or with too many, is a mistake."""
+    """Return the lens of a device; too few or too many pixels are a mistake in the world."""
     width, height = int(part.number("width", 64.0)), int(part.number("height", 64.0))
     if not 0 < width <= MOST_PIXELS or not 0 < height <= MOST_PIXELS:
         part.refuse(f"a {part.node.type_name} of {width} by {height} pixels", f"use 1 to {MOST_PIXELS}")
@@ -30,7 +30,7 @@ def read_lens(part: DevicePart, near_m: float, far_m: float) -> Lens:
 def picture_topic(
     name: str, source: ValueSource, lens: Lens, encoding: str, *, many: bool = False
 ) -> DeviceTopic:
-    """Return the topic of pictures of four bytes a pixel."""
+    """Return the topic of images with four bytes per pixel."""
     width, height = lens.size
     constants = {"height": height, "width": width, "encoding": encoding, "step": PIXEL_BYTES * width}
     return DeviceTopic(
@@ -44,7 +44,7 @@ def picture_topic(
 
 
 def saver(lens: Lens, silent: Callable[[], bool], pixels: Callable[[], bytes | memoryview]) -> Handler:
-    """Return a handler that saves a picture; while the device is silent it answers failure."""
+    """Return a handler that saves an image; while the device is silent, it returns failure."""
 
     def save_image(request: Any) -> Fields:
         saved = not silent() and picture_files.save(

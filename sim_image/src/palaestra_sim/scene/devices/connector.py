@@ -1,6 +1,6 @@
-"""Connector: whether another one is near enough to connect. Two that would be joined cannot be locked.
+"""Connector: whether another one is near enough to connect. If so, `lock` fails, because nothing is joined.
 
-Two connectors face each other along their x axes, which point out of them.
+Two connectors that fit face each other; their x axes point outward.
 Source: WbConnector.cpp of Webots.
 """
 
@@ -16,7 +16,7 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.old_axes import pointing
 
-_PASSIVE: Final = -1  # the presence that a passive connector reads, which has no sensor
+_PASSIVE: Final = -1  # the presence of a passive connector, which has no sensor
 _MATCHING: Final = {"symmetric": "symmetric", "active": "passive", "passive": "active"}
 
 
@@ -26,12 +26,12 @@ class Connector:
 
     Attributes:
         kind: "symmetric", "active" or "passive".
-        reach_m: largest distance to another one.
-        tilt_rad: largest angle between the axes.
-        turns: number of rotations about the axis in which it fits; 0 is all.
-        twist_rad: largest rotation off one of these.
+        reach_m: maximum distance to another one.
+        tilt_rad: maximum angle between the axes.
+        turns: number of rotations about the axis in which it fits; 0 means any rotation.
+        twist_rad: maximum deviation from one of these rotations.
         others: all connectors of the world.
-        locked: as a client set it.
+        locked: the state that a client set.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Connector:
 
     @property
     def value(self) -> int:
-        """1 if it could connect to another one, 0 if not, -1 for a passive one."""
+        """1 if another connector is in reach, 0 if not, -1 for a passive one."""
         if self.kind == "passive":
             return _PASSIVE
         return int(any(self._fits(other) for other in self.others if other is not self))
@@ -56,7 +56,7 @@ class Connector:
         """Lock or unlock it.
 
         Raises:
-            UnsimulatedError: it would hold another one.
+            UnsimulatedError: it would join another one.
         """
         if locked and self.value > 0:
             raise UnsimulatedError(

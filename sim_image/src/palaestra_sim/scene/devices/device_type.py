@@ -1,6 +1,7 @@
-"""What the table of devices has of each type, and what a device of it is.
+"""The definition of a row in the table of devices, and of a device of that type.
 
-Nothing here knows a wire: services are data (`seam`), and a message is its type and its fields.
+Nothing here depends on a wire protocol: services are data (`ros_interfaces`), and a message is its type and
+its fields.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class Shaft:
     """A joint, for the devices on it.
 
     Attributes:
-        joint: the joint itself; None for a device that is on none.
+        joint: the joint itself; None for a device that is not on a joint.
         motor: the first motor on it.
         names: of the first device of each role.
     """
@@ -61,12 +62,12 @@ class Shaft:
 
     @property
     def type_number(self) -> int:
-        """What `get_type` of its devices answers: 0 for a hinge, 1 for a slider."""
+        """The response of `get_type` of its devices: 0 for a hinge, 1 for a slider."""
         return int(self.joint is not None and self.joint.slides)
 
     @property
     def position(self) -> float:
-        """Where it is, in rad or m."""
+        """Its position, in rad or m."""
         if self.motor is not None:
             return self.motor.angle_rad
         return 0.0 if self.joint is None else self.joint.now
@@ -78,12 +79,12 @@ class DevicePart:
 
     Attributes:
         reading: of the world.
-        lacks: notes that a node of the robot cannot be simulated.
+        lacks: records that a node of the robot cannot be simulated.
         node: of the device.
-        name: as the world file has it, else the default of its type.
+        name: as in the world file, else the default of its type.
         place: its frame in the robot's; of a device on a joint, the frame of the joint.
-        shaft: the joint that it is a device of.
-        outline: the shapes with which the robot runs into things.
+        shaft: the joint to which it belongs.
+        outline: the shapes with which the robot collides.
         measured: the parts of the robot whose force on it is measured.
         forces: whether the physics has forces.
     """
@@ -103,7 +104,7 @@ class DevicePart:
         return self.reading.number(self.node, name, default)
 
     def text(self, name: str, default: str = "") -> str:
-        """Return the text of a field, `default` if it has none."""
+        """Return the text of a field; `default` if it is absent."""
         return self.node.text(name) or default
 
     def inner(self, name: str) -> SceneNode | None:
@@ -116,7 +117,7 @@ class DevicePart:
         return default if world_info is None else self.reading.vector(world_info, name, default)
 
     def world_text(self, name: str, default: str) -> str:
-        """Return the text of a field of WorldInfo, `default` if it has none."""
+        """Return the text of a field of WorldInfo; `default` if it is absent."""
         world_info = self.reading.world_info
         return default if world_info is None else world_info.text(name) or default
 
@@ -125,21 +126,21 @@ class DevicePart:
         return self.reading.system.index(letter)
 
     def refuse(self, fact: str, remedy: str) -> None:
-        """Note a mistake in the world."""
+        """Record a mistake in the world."""
         self.reading.refuse(self.node, fact, remedy)
 
     def lack(self, fact: str) -> None:
-        """Note that this device cannot be simulated."""
+        """Record that this device cannot be simulated."""
         self.lacks(self.node, fact)
 
     def take_outline(self) -> list[Shape]:
-        """Return the shapes of its boundingObject, which become part of the robot's outline."""
+        """Return the shapes of its boundingObject, after adding them to the robot's outline."""
         shapes = list(bounding_shapes(self.reading, self.node, self.place))
         self.outline += shapes
         return shapes
 
     def measure(self) -> Link:
-        """Return this device as a part whose force on the robot is measured."""
+        """Return this device's link, after adding it to the parts whose force on the robot is measured."""
         link = Link(node=self.node, place=self.place, joint=None)
         self.measured.append(link)
         return link
@@ -149,7 +150,7 @@ class Carrier(Protocol):
     """The robot that carries a device, for sampling.
 
     Attributes:
-        body: None if nothing can run into the robot.
+        body: None if nothing can collide with the robot.
     """
 
     body: Body | None
@@ -159,31 +160,31 @@ class Carrier(Protocol):
         ...
 
     def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each beam travels now, in meters."""
+        """Return a function for the distance that each beam travels now, in meters."""
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return the same for beams that meet what is visible, and pass the robot itself."""
+        """Return the same function for beams that meet visible objects and pass through the robot itself."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function that returns what each infra-red beam meets now."""
+        """Return a function for the object that each infra-red beam meets now."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
-        """Return a camera at a place; None if this simulator draws nothing."""
+        """Return a camera at a frame; None if this simulator does not render."""
         ...
 
     def device(self, name: str) -> object | None:
-        """Return one of its devices; None if it has none of that name."""
+        """Return one of the robot's devices; None if no device has that name."""
         ...
 
     def motion(self, place: Frame) -> Motion:
-        """Return how a place on the robot moves in the world."""
+        """Return the motion in the world of a frame on the robot."""
         ...
 
     def follow(self, place: Frame) -> Callable[[], Vector]:
-        """Return a function that returns the acceleration of a place, in world axes, in m/s2."""
+        """Return a function for the acceleration of a frame, in world axes, in m/s2."""
         ...
 
 
@@ -192,7 +193,7 @@ class ValueSource(Protocol):
 
     @property
     def value(self) -> Any:
-        """Of the last step: a number, or as many as the last field of the message has."""
+        """The value of the last step: a number, or as many numbers as the message's last field has."""
         ...
 
 
@@ -201,14 +202,14 @@ class DeviceTopic:
     """A topic of one device.
 
     Attributes:
-        name: below the device's name.
+        name: relative to the device's name.
         type_name: of its messages.
         source: of the reading; None if it never has one.
         constants: the other fields.
-        reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
+        reading: the field of the value; "" is the last one, which must consist of numbers and is the fastest.
         many: whether `value` is a sequence, with a message for each of its items.
-        whole: whether a value has all fields but the header, by name.
-        stamped: whether the messages begin with a header; without one, `reading` names the field.
+        whole: whether the value is a mapping of all fields except the header.
+        stamped: whether the messages begin with a header; without a header, `reading` must name the field.
     """
 
     name: str
@@ -223,13 +224,13 @@ class DeviceTopic:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stream:
-    """Topics of a device that have an `enable` of their own, beside the device's.
+    """Topics of a device with their own `enable`, in addition to the device's.
 
     Attributes:
-        prefix: of `enable` and `get_sampling_period`, below the name of the device.
-        topics: that it begins.
-        silent: whether no period is accepted.
-        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+        prefix: of `enable` and `get_sampling_period`, relative to the name of the device.
+        topics: the topics that it starts.
+        silent: returns whether all periods are refused.
+        enabled: called after a change with the sampling period in ms; 0 means off.
     """
 
     prefix: str
@@ -248,7 +249,7 @@ def whole_steps(period_ms: int, step_ms: int) -> bool:
 
 
 def never(_period_ms: int, _step_ms: int) -> bool:
-    """Accept no period: Webots publishes readings of this device, and the simulator has none."""
+    """Refuse every period: in Webots this device publishes readings, but here it does not."""
     return False
 
 
@@ -258,22 +259,24 @@ class DeviceType(Generic[DeviceT]):
 
     Attributes:
         node: the type of its node.
-        name: of a device whose node has none.
-        fields: of the node, written as in `catalogue`, beside `name` and, if it is one, those of a Solid.
-        without_effect: those of them that Webots applies and no simulator here does, with blanks between.
-        solid: whether a node off joints is a Solid.
-        role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
+        name: of a device whose node has no name.
+        fields: of the node, in the syntax of `field_types`, without `name` and, if it is a Solid, those of a
+            Solid.
+        without_effect: those fields that have an effect in Webots but in no simulator here, separated by
+            spaces.
+        solid: whether a node that is not on a joint is a Solid.
+        role: one of `ROLES` for a device of a joint; "" for one with its own frame on the robot.
         read: returns the device of a node.
-        sampler: returns a function that gives devices of one robot their values; None: they have none.
-        services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
-            others of the joint; and, with topics, `enable` and `get_sampling_period`.
-        topics: returns those that `enable` begins to publish.
-        streams: returns the other topics, each with an `enable` of its own.
-        attach: connects a device with the robot that carries it.
-        enable: whether a period is accepted; 0, which ends publishing, always is.
-        silent: whether a device that is attached has no readings, so that no period is accepted.
-        enabled: called with a device and its sampling period in ms, 0 for none, after that has changed.
-        sensor: the path of `enable` below the name of the device, "" for the name itself.
+        sampler: returns a function that sets the values of one robot's devices; None if they have no values.
+        services: returns the services other than these: `get_model`, `get_name`, `get_node_type`; on joints,
+            the names of the joint's other devices; and, with topics, `enable` and `get_sampling_period`.
+        topics: returns the topics that `enable` starts.
+        streams: returns the other topics, each with its own `enable`.
+        attach: connects a device to the robot that carries it.
+        enable: returns whether a period is accepted; 0, which stops publishing, always is.
+        silent: returns whether an attached device has no readings, so that all periods are refused.
+        enabled: called after a change with a device and its sampling period in ms; 0 means off.
+        sensor: the path of `enable` relative to the name of the device, "" for the name itself.
     """
 
     node: str
@@ -304,7 +307,7 @@ class DeviceType(Generic[DeviceT]):
 
     @property
     def body(self) -> bool:
-        """Whether its node is a Solid, which others may run into."""
+        """Whether its node is a Solid, with which others may collide."""
         return self.solid and not self.on_joint
 
 
@@ -324,7 +327,7 @@ class Devices:
     _by_topic: dict[str, str] = field(default_factory=dict)
 
     def add(self, name: str, kind: DeviceType[Any], device: Any) -> None:
-        """Add a device, or exchange that of the same name."""
+        """Add a device, or replace the one of the same name."""
         self.rows[name] = kind, device
         self._by_topic[topic_name(name)] = name
 
@@ -344,7 +347,7 @@ class Devices:
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
 
     def trouble_with(self, name: str) -> str | None:
-        """Return the reason to refuse another device of that name, None if there is none."""
+        """Return the reason to refuse another device of that name; None to accept it."""
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):

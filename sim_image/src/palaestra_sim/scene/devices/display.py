@@ -1,6 +1,6 @@
-"""Display: a picture that a program draws, also on top of what a camera sees.
+"""Display: an image that a program draws, optionally on top of the image of a camera.
 
-A text has the letters of Pillow's own font, whatever font a client asks for. No camera sees a display.
+Text uses Pillow's built-in font, whatever font a client requests. Cameras do not see displays.
 Source: WbDisplay.cpp of Webots.
 """
 
@@ -18,8 +18,8 @@ from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceT
 from palaestra_sim.scene.image_buffer import BLACK, OPAQUE, Color, ImageBuffer, Point, on_background
 from palaestra_sim.scene.text_rendering import Font, letters
 
-_LARGEST: Final = 4096  # pixels in a row or column; a display of Webots is a texture
-# Where blue, green, red and alpha are in a pixel of each format. Source: webots/display.h
+_LARGEST: Final = 4096  # pixels in a row or column; in Webots a display is a texture
+# Indices of blue, green, red and alpha in a pixel of each format. Source: webots/display.h
 _FORMATS: Final = {
     3: (2, 1, 0, None),
     4: (2, 1, 0, 3),
@@ -37,11 +37,11 @@ class Display:
 
     Attributes:
         picture: the pixels that were drawn.
-        color: blue, green, red and alpha of what is drawn next.
-        opacity: of what is drawn next, from 0 to 255.
-        font: of texts.
-        images: pictures that clients keep, by their handles.
-        camera: whose picture is the background; None: there is none.
+        color: blue, green, red and alpha for the next drawing.
+        opacity: for the next drawing, from 0 to 255.
+        font: for text.
+        images: stored images of clients, by their handles.
+        camera: the camera whose image is the background; None without a background.
     """
 
     name: str
@@ -56,21 +56,21 @@ class Display:
 
     @property
     def shown(self) -> ImageBuffer:
-        """What it shows: what was drawn, on top of what the camera sees now."""
+        """The visible image: the drawing, on top of the camera's current image."""
         camera = self.camera
         return self.picture if camera is None else on_background(self.picture, camera.value)
 
     def mount(self, robot: Carrier) -> None:
-        """Take the robot that carries it."""
+        """Connect the display to the robot that carries it."""
         self._robot = robot
 
     def attach(self, name: str) -> bool:
-        """Show what a camera of the robot sees behind what is drawn; return whether there is that device.
+        """Show the image of one of the robot's cameras as background; return whether that device exists.
 
         Where nothing was drawn, the display becomes transparent. A second camera changes nothing.
 
         Raises:
-            UnsimulatedError: the camera sees nothing, or has another size.
+            UnsimulatedError: the simulator does not render, or the camera has another size.
         """
         camera = None if self._robot is None else self._robot.device(name)
         if camera is None or self.camera is not None:
@@ -90,16 +90,16 @@ class Display:
         return True
 
     def keep(self, image: ImageBuffer) -> Fields:
-        """Keep a picture, and return its handle."""
+        """Store an image, and return its handle."""
         handle = max(self.images, default=0) + 1
         self.images[handle] = image
         return {"ir": handle}
 
     def image(self, handle: int) -> ImageBuffer | None:
-        """Return a picture by its handle; None for 0, the handle of a picture that could not be made.
+        """Return an image by its handle; None for 0, the handle of an image that could not be created.
 
         Raises:
-            UnsimulatedError: no picture has that handle; Webots would read memory that is not its own.
+            UnsimulatedError: no image has that handle; Webots would read invalid memory.
         """
         if handle and handle not in self.images:
             raise UnsimulatedError(f"no image {handle}; make one with image_new or image_copy")
@@ -147,7 +147,7 @@ def _ink(display: Display) -> tuple[Row, ...]:
         return {"success": True}
 
     def set_font(request: Any) -> Fields:
-        """Take the size of a font; Webots prints an error about one that is not positive."""
+        """Set the size of the font; ignore one that is not positive, for which Webots prints an error."""
         if request.size > 0:
             display.font = Font(min(request.size, _LARGEST), bool(request.antiAliasing))
         return {"success": 1}
@@ -206,7 +206,7 @@ def _corners(request: Any) -> list[Point]:
 
 
 def _require_small(request: Any) -> None:
-    """Check that nobody draws what takes minutes."""
+    """Refuse numbers beyond the size of any display, because such a drawing could take minutes."""
     for name, value in request._asdict().items():
         numbers = value if isinstance(value, list | tuple) else [value]
         if any(isinstance(number, int) and abs(number) > _LARGEST for number in numbers):
@@ -242,7 +242,7 @@ def _images(display: Display) -> tuple[Row, ...]:
         return {"ir": 0} if image is None else display.keep(image)
 
     def image_save(request: Any) -> Fields:
-        """Save an image, or with the handle 0 what is shown."""
+        """Save an image, or the visible image for the handle 0."""
         image = display.image(request.ir) or display.shown
         size = image.width, image.height
         return {"success": int(picture_files.save(request.filename, size, image.pixels, alpha=True))}
@@ -258,9 +258,9 @@ def _images(display: Display) -> tuple[Row, ...]:
 
 
 def _image_of(request: Any) -> ImageBuffer | None:
-    """Return the picture of a request for a new one; None if Webots makes none either.
+    """Return the image for a request to create one; None if Webots does not create one either.
 
-    Bytes that are missing are 0. Webots takes what lies in its memory behind the others.
+    Missing bytes are 0. Webots would read the memory after the others.
     """
     width, height, places = request.width, request.height, _FORMATS.get(request.format)
     if places is None or width < 1 or height < 1:

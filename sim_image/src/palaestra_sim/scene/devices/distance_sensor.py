@@ -1,12 +1,12 @@
-"""DistanceSensor: its rays, and the lookup table that their length goes through.
+"""DistanceSensor: its rays, and the lookup table that converts their length.
 
-Several rays are a cone around the first axis. A sonar measures the nearest one. The others measure the
-average, in which a ray counts less the more it is off the axis. Infra-red rays meet shapes, the others
-boundingObjects; the darker what they meet is, the farther it seems. Source: reference/distancesensor.md
+Several rays form a cone around the first axis. A sonar measures the nearest hit. The others measure the
+average, in which a ray counts less the farther it is off the axis. Infra-red rays meet visible shapes, the
+others boundingObjects; a darker shape appears farther away. Source: reference/distancesensor.md
 and WbDistanceSensor.cpp of Webots.
 
-A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four rays beside
-it measure that angle, so no physics has to know normals.
+A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four additional
+rays next to it measure that angle, so a physics does not have to provide normals.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
 _MOST_RAYS: Final = 10_000  # each is cast at every step
-_BESIDE_M: Final = 1e-4  # how far the rays are beside that of a sonar
-_BEAMS_OF_SONAR: Final = 5  # of each ray
-_STEEPEST: Final = math.tan(math.pi / 8.0)  # of a surface that returns a sonar's ray
+_BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
+_BEAMS_OF_SONAR: Final = 5  # for each ray
+_STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-# For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
-# aperture.
+# For 1 to 10 rays: the rings, each with its number of rays, its rotation as a fraction of their spacing, and
+# its share of the aperture.
 _RINGS: Final = (
     ((1, 0.0, 0.0),),
     ((2, 0.5, 1.0),),
@@ -48,7 +48,7 @@ _RINGS: Final = (
 
 
 class DistanceSensorType(IntEnum):
-    """The answers of `get_type`."""
+    """The numbers that `get_type` returns."""
 
     GENERIC = 0
     INFRA_RED = 1
@@ -56,7 +56,7 @@ class DistanceSensorType(IntEnum):
     LASER = 3
 
 
-# In any case of letters.
+# In lower case, because the case of letters does not matter.
 _TYPES: Final = {
     "generic": DistanceSensorType.GENERIC,
     "infra-red": DistanceSensorType.INFRA_RED,
@@ -70,7 +70,7 @@ _TYPES: Final = {
 class DistanceSensor:
     """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
 
-    A sonar has five beams for each ray: the ray itself, and two pairs beside it.
+    A sonar has five beams for each ray: the ray itself, and two pairs next to it.
     """
 
     name: str
@@ -108,7 +108,7 @@ def _read(part: DevicePart) -> DistanceSensor:
 
 
 def _beams(pose: Pose, cone: Sequence[Vector], reach_m: float, *, sonar: bool) -> Iterator[Beam]:
-    """Yield the beams of rays in the frame of a sensor."""
+    """Yield the beams of a sensor's rays; `pose` is the sensor's frame in the robot's."""
     for direction in cone:
         yield beam_along(pose, direction, reach_m)
         if sonar:
@@ -146,14 +146,14 @@ def _many(count: int) -> list[tuple[float, float]]:
         left -= rings[-1]
     polar: list[tuple[float, float]] = []
     for ring, size in enumerate(rings):
-        first = len(polar)  # Webots counts on through the rings
+        first = len(polar)  # Webots does not restart the count at each ring
         share = ring / (len(rings) - 1)
         polar += [(2.0 * math.pi * (first + index) / size, share) for index in range(size)]
     return polar
 
 
 def _direction(alpha: float, theta: float) -> Vector:
-    """Return the direction at `theta` from the axis; `alpha` turns about it, 0 is up."""
+    """Return the direction at the angle `theta` to the axis; `alpha` rotates it about the axis, 0 is up."""
     alpha += math.pi / 2.0
     return math.cos(theta), math.sin(theta) * math.sin(alpha), -math.sin(theta) * math.cos(alpha)
 
@@ -192,7 +192,7 @@ def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
 
 
 def _with_infrared(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
-    """Return the sample of sensors of which some are infra-red."""
+    """Return the sample function for sensors of which some are infra-red."""
     infrared = [it for it in sensors if it.type is DistanceSensorType.INFRA_RED]
     others = [it for it in sensors if it.type is not DistanceSensorType.INFRA_RED]
     cast: Callable[[], Sequence[float]] = tuple
@@ -223,7 +223,7 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 def _returned(distances_m: Sequence[float]) -> Iterator[float]:
     """Yield the distances of a sonar's rays that meet a surface at a small enough angle to return.
 
-    Beyond an edge, the ray on the other side decides.
+    At an edge, the two rays of a pair may differ; the one with the smaller difference decides.
     """
     for first in range(0, len(distances_m), _BEAMS_OF_SONAR):
         distance, left, right, below, above = distances_m[first : first + _BEAMS_OF_SONAR]
@@ -234,7 +234,7 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, divided by the average share of the light that comes back."""
+    """Return the average distance, divided by the average share of reflected light."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
     return _measured(sensor, [it.distance_m for it in glances]) / light
 

@@ -1,4 +1,4 @@
-"""Emitter: sends packets by radio; receivers of its channel have them after the next basic step."""
+"""Emitter: sends packets by radio; receivers on its channel get them after the next basic step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.old_axes import pointing
 
-EVERYWHERE: Final = -1  # as a range: without limit; as a channel: to or from all
+EVERYWHERE: Final = -1  # as a range: without limit; as a channel: to or from all channels
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -20,9 +20,9 @@ class Emitter:
     """An emitter.
 
     Attributes:
-        range_m: how far packets reach; -1 is without limit.
-        channel: on which they are sent; -1 is to all receivers.
-        outbox: texts with the channel and the range at which each was sent.
+        range_m: the maximum distance of receivers; -1 is without limit.
+        channel: of its packets; -1 means all receivers.
+        outbox: texts, each with the channel and the range at which it was sent.
     """
 
     name: str
@@ -35,13 +35,13 @@ class Emitter:
     outbox: list[tuple[str, int, float]] = field(default_factory=list)
 
     def send(self, text: str) -> None:
-        """Queue a packet; one that the buffer cannot hold is dropped, as in Webots."""
+        """Queue a packet; drop it if the buffer has no room for it, as in Webots."""
         waiting = sum(len(packet.encode()) for packet, _, _ in self.outbox)
         if self.buffer_size == EVERYWHERE or waiting + len(text.encode()) <= self.buffer_size:
             self.outbox.append((text, self.channel, self.range_m))
 
     def set_range(self, range_m: float) -> None:
-        """Set the range, up to the limit; a negative one is ignored, except -1, which is the limit."""
+        """Set the range, up to the limit; a negative one is ignored, except -1, which means the limit."""
         if range_m == EVERYWHERE:
             self.range_m = self.max_range_m
         elif range_m >= 0.0:
@@ -49,13 +49,13 @@ class Emitter:
             self.range_m = min(range_m, limit)
 
     def set_channel(self, channel: int) -> None:
-        """Set the channel; below -1 there is none."""
+        """Set the channel; one below -1 is not valid."""
         if channel >= EVERYWHERE:
             self.channel = channel
 
 
 def require_radio(part: DevicePart) -> None:
-    """Note that the stub simulates no medium but radio waves."""
+    """Record that the simulator supports only radio as a medium."""
     medium = part.text("type", "radio")
     if medium != "radio":
         part.lack(f"the type {medium!r} of {part.node.type_name}")
@@ -86,7 +86,7 @@ def _services(emitter: Emitter) -> tuple[Row, ...]:
 
 
 def _setter(command: Callable[[Any], None]) -> Handler:
-    """Return a handler that answers success even if the value is ignored, as the controller does."""
+    """Return a handler that returns success even if the value is ignored, as the controller does."""
 
     def handle(request: Any) -> Fields:
         command(request.value)

@@ -1,4 +1,4 @@
-"""GPS: where it is, in meters, and how fast it moves.
+"""GPS: its position in meters, and its speed.
 
 Its coordinates are those of the world plus WorldInfo.gpsReference (the system "local"). Latitude and
 longitude (WGS84) are refused. Source: WbGps.cpp of Webots.
@@ -17,13 +17,13 @@ from palaestra_sim.scene.devices.sensor_response import Gauss, discrete
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 
-_LOCAL: Final = 0  # what `get_coordinate_system` answers; WGS84 is 1
+_LOCAL: Final = 0  # the value that `get_coordinate_system` returns; WGS84 is 1
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
 
 
 @dataclass(slots=True)
 class _Speed:
-    """The speed in m/s; `value` is one number, or three of its vector."""
+    """The speed in m/s; `value` is one number, or the three of its vector."""
 
     value: float | Vector
 
@@ -115,7 +115,7 @@ def _services(_gps: Gps) -> tuple[Row, ...]:
 
 
 def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
-    """Cut each part toward zero, as Webots does, so that those of a negative angle are all negative."""
+    """Round each part toward zero, as Webots does, so that all parts of a negative angle are negative."""
     angle = request.decimalDegrees
     if not math.isfinite(angle):
         angle = 0.0
@@ -127,7 +127,7 @@ def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
 
 def _topics(gps: Gps) -> tuple[DeviceTopic, ...]:
     point = "geometry_msgs/PointStamped"
-    # Webots leaves the frame of the speed empty.
+    # Webots leaves the frame_id of the speed empty.
     no_frame: Fields = {"header": {}}
     return (
         DeviceTopic(name="values", type_name=point, source=gps),

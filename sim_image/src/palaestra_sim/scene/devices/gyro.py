@@ -1,7 +1,7 @@
-"""Gyro: how fast it turns about its own axes, in rad/s.
+"""Gyro: its angular velocity about its own axes, in rad/s.
 
-Webots measures the turning of the nearest Solid with physics; here every motor that carries the sensor
-counts. Source: WbGyro.cpp of Webots.
+Webots measures the angular velocity of the nearest Solid with physics; here every motor that carries the
+sensor counts. Source: WbGyro.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from palaestra_sim.scene.geometry import Vector, transposed, turn
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Gyro:
-    """A gyro of up to three axes; `value` is in rad/s, or as its lookup table has it."""
+    """A gyro of up to three axes; `value` is in rad/s, or in the unit of its lookup table."""
 
     name: str
     model: str

@@ -7,7 +7,7 @@ from typing import Final
 from palaestra_sim.scene.devices.device_type import DeviceTopic, ValueSource
 
 _PARTS: Final = ("orientation", "angular_velocity", "linear_acceleration")
-_NOT_MEASURED: Final = (-1.0, *(0.0,) * 8)  # a covariance that begins with -1: the part has no data
+_NOT_MEASURED: Final = (-1.0, *(0.0,) * 8)  # a covariance that begins with -1 means that the part has no data
 
 
 def imu_topic(name: str, source: ValueSource, part: str) -> DeviceTopic:

@@ -27,7 +27,7 @@ class InertialUnit:
 
     Attributes:
         noise: standard deviation of the noise about each axis, as a fraction of pi.
-        resolution: of each number of the quaternion; -1: as fine as can be.
+        resolution: of each number of the quaternion; -1 for exact values.
     """
 
     name: str
@@ -65,7 +65,7 @@ def _sampler(units: Sequence[InertialUnit], robot: Carrier) -> Sample:
 
 
 def _shaken(deviation_rad: float, gauss: Gauss) -> Matrix:
-    """Return a random turn: about x, then y, then z."""
+    """Return a random rotation: about x, then y, then z."""
     roll, pitch, yaw = (from_axis_angle((*axis, deviation_rad * gauss(0.0, 1.0))) for axis in _AXES)
     return multiply(yaw, multiply(pitch, roll))
 

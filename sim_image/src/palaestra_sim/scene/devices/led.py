@@ -1,4 +1,4 @@
-"""LED: a light that the robot's program sets, and that nobody sees here."""
+"""LED: a light that the robot's program sets; cameras do not see it here."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from palaestra_sim.scene.devices.device_type import DevicePart, DeviceType
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Led:
-    """An LED; `state` is 0 for off, else the number of a color, or a color of an LED that is gradual."""
+    """An LED; `state` is 0 for off, else the number of a color, or a color if the LED is gradual."""
 
     name: str
     model: str

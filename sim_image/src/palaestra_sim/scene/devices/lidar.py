@@ -1,8 +1,8 @@
-"""Lidar: layers of rays, as a range image, laser scans and a cloud of points.
+"""Lidar: layers of rays, as a range image, laser scans and a point cloud.
 
-A layer is a row of the image, from the top down; in a row, the rays go from left to right. Every ray is cast
-at each step while the lidar is enabled, and none otherwise: they cost time. Something nearer than `minRange`
-is not seen, and neither is anything beyond `maxRange`: the distance is infinite.
+A layer is a row of the image, from the top down; in a row, the rays go from left to right. All rays are cast
+at each step while the lidar is enabled, and none otherwise, because they cost time. The distance of an object
+nearer than `minRange` or beyond `maxRange` is infinite.
 Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
@@ -43,14 +43,14 @@ class Lidar:
     """A lidar.
 
     Attributes:
-        info: what `get_info` answers.
-        frequency: the same of `get_frequency_info`.
-        noise: standard deviation as a share of the greatest range.
-        resolution: of a distance; -1: as fine as can be.
+        info: the response of `get_info`.
+        frequency: the response of `get_frequency_info`.
+        noise: standard deviation as a fraction of the maximum range.
+        resolution: of a distance; -1 for exact values.
         directions: of the rays of each layer, unit vectors in the frame of the sensor.
         beams: the rays of each layer, in the frame of the robot.
-        period_ms: how often it is sampled; 0 while it is not enabled.
-        clouded: whether the cloud of points is enabled.
+        period_ms: its sampling period; 0 while it is not enabled.
+        clouded: whether the point cloud is enabled.
         layers: the distances of the last step in meters, by layer.
         timing: `scan_time` and `time_increment` of its scans.
     """
@@ -74,13 +74,13 @@ class Lidar:
         return b"".join(layer.tobytes() for layer in self.layers)
 
     def enabled(self, period_ms: int) -> None:
-        """Take the period at which it is sampled."""
+        """Set the sampling period."""
         self.period_ms = period_ms
         scan_s = period_ms / 1000.0
         self.timing.update(scan_time=scan_s, time_increment=scan_s / self.info["horizontalResolution"])
 
     def points(self, layer: int) -> Iterator[Vector]:
-        """Yield the points of a layer in the frame of the sensor; infinite where nothing was seen."""
+        """Yield the points of a layer in the frame of the sensor; infinite where a ray met nothing."""
         for distance_m, (x, y, z) in zip(self.layers[layer], self.directions[layer], strict=True):
             if math.isinf(distance_m):
                 yield math.inf, math.inf, math.inf
@@ -102,7 +102,7 @@ class _Scan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cloud:
-    """The cloud of points, as a list of one; empty while it is not enabled."""
+    """The point cloud, as a list with one item; empty while it is not enabled."""
 
     lidar: Lidar
 
@@ -227,7 +227,7 @@ def _layer_points(lidar: Lidar, layer: int) -> Fields:
 
 
 def _require(lidar: Lidar, layer: int) -> None:
-    """Check that there is such a layer; Webots would read a null pointer."""
+    """Check that the layer exists; Webots would read a null pointer."""
     count = len(lidar.layers)
     if not 0 <= layer < count:
         raise UnsimulatedError(f"no layer {layer}; use one of 0 to {count - 1}")
@@ -248,7 +248,7 @@ def _topics(lidar: Lidar) -> tuple[DeviceTopic, ...]:
         constants=_image(lidar, layers),
         reading="data",
     )
-    # Programs for older versions of Webots know the scans by the names of their layers.
+    # Programs for older versions of Webots use topics with the names of the layers.
     scans = [(f"laser_scan/layer{layer}", layer) for layer in range(layers)]
     if layers == 1:
         scans.append(("laser_scan", 0))

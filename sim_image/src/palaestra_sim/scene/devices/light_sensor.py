@@ -1,6 +1,7 @@
-"""LightSensor: in a world without lights, what its lookup table has for darkness.
+"""LightSensor: its reading is that of its lookup table for darkness.
 
-The stub simulates no light, so a world with a light is refused: its sensors would measure it in Webots.
+Light is not simulated. So in a world with lights the sensor is refused, because in Webots it would measure
+it.
 Source: WbLightSensor.cpp of Webots.
 """
 
@@ -23,7 +24,7 @@ _TABLE: Final = ((0.0, 0.0, 0.0), (1.0, 1000.0, 0.0))  # the default of LightSen
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class LightSensor:
-    """A light sensor; `value` is in the unit of its lookup table, which is None if it has no rows."""
+    """A light sensor; `value` is in the unit of its lookup table, which is None if the world has no rows."""
 
     name: str
     model: str

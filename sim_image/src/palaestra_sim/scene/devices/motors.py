@@ -1,6 +1,6 @@
-"""RotationalMotor and LinearMotor: every setter answers success, even if the motor ignores the value.
+"""RotationalMotor and LinearMotor: every setter returns success, even if the motor ignores the value.
 
-Torques and forces are for motors that the physics moves by forces; others refuse them.
+Torques and forces require a motor that the physics moves by forces; for others the services fail.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from palaestra_sim.ros_interfaces import Handler, Row, UnsimulatedError
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, DeviceType
 from palaestra_sim.scene.motors import Motor, MotorSpec
 
-_ROTATIONAL: Final = 0  # what `get_type` answers
+_ROTATIONAL: Final = 0  # the value that `get_type` returns
 _LINEAR: Final = 1
 _FIELDS: Final = """
     acceleration SFFloat -1; consumptionFactor SFFloat 10;
@@ -35,7 +35,7 @@ def _reader(limit: str) -> Callable[[DevicePart], Motor]:
                 min_rad=number("minPosition", 0.0),
                 max_rad=number("maxPosition", 0.0),
                 max_torque_nm=number(limit, 10.0),
-                multiplier=number("multiplier", 1.0) or 1.0,  # Webots takes 1 for 0
+                multiplier=number("multiplier", 1.0) or 1.0,  # Webots uses 1 instead of 0
                 gains=_gains(part),
                 model=part.text("model"),
                 forces=part.forces,
@@ -51,7 +51,7 @@ def _gains(part: DevicePart) -> tuple[float, float, float]:
 
 
 def _services(effort: str, type_number: int) -> Callable[[Motor], tuple[Row, ...]]:
-    """Return the function that lists the services of a motor; `effort` is "torque" or "force"."""
+    """Return a function that lists the services of a motor; `effort` is "torque" or "force"."""
 
     def services(motor: Motor) -> tuple[Row, ...]:
         return (
@@ -84,7 +84,7 @@ def _commands(motor: Motor, effort: str) -> tuple[Row, ...]:
 
 
 def _no_feedback(effort: str) -> tuple[Row, ...]:
-    """Return the services of a feedback that has no topic."""
+    """Return the feedback services of a motor whose feedback has no topic."""
     return (
         (f"{effort}_feedback_sensor/enable", "set_int", lambda request: {"success": request.value == 0}),
         (f"{effort}_feedback_sensor/get_sampling_period", "get_int", lambda _: {"value": 0}),
@@ -104,7 +104,7 @@ class Feedback:
 
 
 def _topics(effort: str) -> Callable[[Motor], tuple[DeviceTopic, ...]]:
-    """Return the function that lists the topics of a motor; `effort` is "torque" or "force"."""
+    """Return a function that lists the topics of a motor; `effort` is "torque" or "force"."""
 
     def topics(motor: Motor) -> tuple[DeviceTopic, ...]:
         if not motor.forceful:
@@ -152,12 +152,12 @@ def _gains_setter(motor: Motor) -> Handler:
 
 
 def _has_effort(motor: Motor) -> bool:
-    """Return whether the torque or force of a motor changes how it moves."""
+    """Return whether the torque or force of a motor affects its motion."""
     return motor.forceful or motor.kinematic
 
 
 def _switch(motor: Motor, effort: str) -> Handler:
-    """Return the service of a motor that moves with all of its torque or with none of it."""
+    """Return the service of a motor that moves with its whole torque or with none."""
     done = {"success": True}
     most = motor.spec.max_torque_nm
 

@@ -1,4 +1,4 @@
-"""Pen: whether it writes, and with which ink. It draws on textures, which only people and cameras see."""
+"""Pen: whether it writes, and its ink. It draws on textures, which only people and cameras see."""
 
 from __future__ import annotations
 

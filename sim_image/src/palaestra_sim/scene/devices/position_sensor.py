@@ -21,7 +21,7 @@ from palaestra_sim.scene.devices.sensor_response import discrete
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PositionSensor:
-    """The position of a joint in rad, of a slider in m; a joint without a motor stays where it is put."""
+    """The position of a hinge in rad, of a slider in m; a joint without a motor stays where it is set."""
 
     name: str
     shaft: Shaft

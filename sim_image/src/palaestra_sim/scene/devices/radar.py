@@ -1,7 +1,7 @@
-"""Radar: how far the Solids with a `radarCrossSection` in its field of view are, and how fast they approach.
+"""Radar: distances and speeds of the Solids with a `radarCrossSection` in its field of view.
 
-A speed is the change of place since the sample before, so it is 0 in the first one.
-Without limits in the world, Webots sees only what moves away at 1 to 2 m/s; both limits 0 are none.
+A speed is the change of position since the previous sample, so it is 0 in the first sample.
+With the default limits, Webots detects only targets that move away at 1 to 2 m/s; limits of 0 mean no limits.
 Source: WbRadar.cpp of Webots.
 """
 
@@ -28,15 +28,15 @@ _Gauss = Callable[[float, float], float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RadarLimits:
-    """What a radar detects.
+    """The limits of a radar's detection.
 
     Attributes:
-        range_m: lowest and highest distance.
+        range_m: minimum and maximum distance.
         field_of_view_rad: horizontal and vertical.
-        radial_m_s: lowest and highest speed at which a target moves away; None: any.
-        absolute_m_s: lowest speed, in either direction.
-        cell: distance in m and speed in m/s below which two targets are one; a speed of 0 does not matter.
-        power_w: the weakest signal.
+        radial_m_s: minimum and maximum speed at which a target moves away; None for any speed.
+        absolute_m_s: minimum speed, in either direction.
+        cell: distance in m and speed in m/s below which two targets are merged; a speed of 0 is ignored.
+        power_w: the weakest detectable signal.
         noise: standard deviations of distance, speed and azimuth.
     """
 
@@ -57,7 +57,7 @@ class RadarLimits:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """One target as a radar sees it: meters, watts, m/s and rad; to the right is positive."""
+    """One target as a radar detects it: meters, watts, m/s and rad; an azimuth to the right is positive."""
 
     distance: float
     power_w: float
@@ -82,9 +82,9 @@ class Radar:
     Attributes:
         place: its frame; it looks along x.
         node: of the device.
-        limits: what it detects.
-        gain_w_m2: the power that comes back from 1 m2 at 1 m.
-        occlusion: whether things hide others.
+        limits: of its detection.
+        gain_w_m2: the power reflected by 1 m2 at a distance of 1 m.
+        occlusion: whether shapes hide targets.
         seen: the targets of the last sample.
     """
 
@@ -109,19 +109,19 @@ class Radar:
         return [echo.message() for echo in self.seen]
 
     def show(self, echoes: RadarTargets, now_ms: Callable[[], int]) -> None:
-        """Take what is there to see; `now_ms` returns the time of the simulation."""
+        """Set the targets of the world; `now_ms` returns the simulated time."""
         self._echoes, self._now_ms = echoes, now_ms
         robot = next((it for it in self.node.ancestors() if it.type_name == "Robot"), self.node)
         self._robot = frozenset((robot, *robot.descendants()))
 
     def enabled(self, period_ms: int) -> None:
-        """Begin or end sampling."""
+        """Start or stop sampling."""
         self._enabled = period_ms > 0
         self._before = {}
         self.seen = []
 
     def sample(self, gauss: _Gauss) -> None:
-        """See what is there now, while it is enabled; `gauss` returns noise from mean and deviation."""
+        """Detect the current targets, while it is enabled; `gauss` returns noise from mean and deviation."""
         if not self._enabled:
             return
         targets = [it for it in self._echoes.targets if it.place is not self.place]
@@ -133,7 +133,7 @@ class Radar:
         self._before_ms = self._now_ms()
 
     def _echo(self, target: RadarTarget, passed_s: float, gauss: _Gauss) -> Echo | None:
-        """Return a target as it is now; None if it is not detected."""
+        """Return a target in its current state; None if it is not detected."""
         limits = self.limits
         radar = self.place.ground_pose
         bounds = target.seen_from(radar, limits.field_of_view_rad)
@@ -152,14 +152,14 @@ class Radar:
         return Echo(distance, power_w, speed, azimuth)
 
     def _hidden(self, target: RadarTarget, eye: Vector, bounds: Bounds) -> bool:
-        """Return whether something is in the way, more than half the depth of the target before it."""
+        """Return whether a shape hides the target, more than half the target's depth in front of it."""
         if not self.occlusion:
             return False
         free = self._echoes.free_path(target, eye, self._robot)
         return math.dist(eye, target.place.ground_pose.position) - free > bounds.size[0] / 2.0
 
     def _distance(self, bounds: Bounds, gauss: _Gauss) -> float | None:
-        """Return the distance of a target, as it is reported; None if it is too near or too far."""
+        """Return the reported distance of a target; None if it is too near or too far."""
         low, high = self.limits.range_m
         distance, slack = math.hypot(*bounds.middle), bounds.size[0] / 2.0
         if distance > high + slack:
@@ -168,7 +168,7 @@ class Radar:
         return None if distance < low - slack else max(low, min(high, distance))
 
     def _speed(self, place: Frame, passed_s: float) -> float:
-        """Return how fast a target moves away; 0 if it, or the time, was not seen before."""
+        """Return the speed at which a target moves away; 0 if it has no previous sample."""
         if passed_s <= 0.0 or place not in self._before or self.place not in self._before:
             return 0.0
         now = place.ground_pose.position, self.place.ground_pose.position
@@ -179,7 +179,7 @@ class Radar:
 
 
 def merged(echoes: Sequence[Echo], cell: tuple[float, float]) -> list[Echo]:
-    """Return targets, of which those that are in one cell are one, by the mean of their powers."""
+    """Return targets after merging those in one cell, with means weighted by their powers."""
     rest = list(echoes)
     at = 0
     while cell[0] > 0.0 and at < len(rest):
@@ -237,7 +237,7 @@ def _read(part: DevicePart) -> Radar:
 
 
 def _limits(part: DevicePart) -> RadarLimits:
-    """Return what a radar detects; ranges that are empty are those that Webots then takes."""
+    """Return the limits of a radar; an empty range is replaced as in Webots."""
     number = part.number
     low, high = number("minRange", 1.0), number("maxRange", 50.0)
     if high <= low:

@@ -1,6 +1,6 @@
-"""RangeFinder: its settings, and the distances that it sees if the simulator draws.
+"""RangeFinder: its settings, and its distances if the simulator renders.
 
-Otherwise `enable` and `save_image` answer failure. Distortion, motion blur and noise have no effect.
+If it does not, `enable` and `save_image` return failure. Distortion, motion blur and noise have no effect.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class RangeFinder:
 
     Attributes:
         place: its frame.
-        lens: its far end is the greatest range.
-        least_m: the least range.
-        resolution_m: of a distance; -1: as fine as can be.
-        spherical: whether its picture would be that of a sphere.
-        eye: None if it sees nothing.
+        lens: its far end is the maximum range.
+        least_m: the minimum range.
+        resolution_m: of a distance; -1 for exact values.
+        spherical: whether its image would be spherical.
+        eye: the camera interface; None if the simulator does not render.
     """
 
     name: str
@@ -43,12 +43,12 @@ class RangeFinder:
 
     @property
     def value(self) -> bytes | memoryview:
-        """The distances of this moment, a float32 each; infinite outside of the range."""
+        """The distances of this moment, a float32 each; infinite outside the range."""
         return b"" if self.eye is None else self.eye.depths(self.least_m, self.resolution_m)
 
     @property
     def info(self) -> Fields:
-        """What `get_info` answers."""
+        """The response of `get_info`."""
         width, height = self.lens.size
         return {
             "width": width,
@@ -59,20 +59,20 @@ class RangeFinder:
         }
 
     def attach(self, robot: Carrier) -> None:
-        """Look from a robot."""
+        """Connect the camera to the robot that carries it."""
         self.eye = None if self.spherical else robot.eye(self.place, self.lens)
 
     def enabled(self, period_ms: int) -> None:
-        """Get ready to draw.
+        """Prepare to render.
 
         Raises:
-            UnsimulatedError: this machine cannot draw.
+            UnsimulatedError: this machine cannot render.
         """
         if period_ms and self.eye is not None:
             self.eye.open()
 
     def gray(self) -> bytes:
-        """Return the distances as pixels: black is near, white is the greatest range or beyond."""
+        """Return the distances as pixels: black is near, white is the maximum range or beyond."""
         share = _WHITE / self.lens.far_m
         distances = array("f", bytes(self.value))
         levels = bytes(

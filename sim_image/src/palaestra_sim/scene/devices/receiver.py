@@ -1,4 +1,4 @@
-"""Receiver: a queue of the packets that emitters of the same channel have sent while it was enabled."""
+"""Receiver: a queue of the packets that emitters on the same channel have sent while it was enabled."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Receiver:
     """A receiver.
 
     Attributes:
-        listening: whether it is enabled; otherwise it takes nothing.
-        channel: on which it listens; -1 is all.
-        queue: what arrived, the oldest first.
+        listening: whether it is enabled; otherwise it receives nothing.
+        channel: on which it listens; -1 means all channels.
+        queue: the packets that arrived, the oldest first.
     """
 
     name: str
@@ -42,17 +42,17 @@ class Receiver:
 
     @property
     def value(self) -> str:
-        """The text of the oldest packet, "" if there is none."""
+        """The text of the oldest packet; "" if the queue is empty."""
         return self.queue[0].text if self.queue else ""
 
     def take(self, packet: Packet) -> None:
-        """Queue a packet; one that the buffer cannot hold is lost, as in Webots."""
+        """Queue a packet; drop it if the buffer has no room for it, as in Webots."""
         held = sum(len(waiting.text.encode()) for waiting in self.queue)
         if self.buffer_size == EVERYWHERE or held + len(packet.text.encode()) <= self.buffer_size:
             self.queue.append(packet)
 
     def listen(self, period_ms: int) -> None:
-        """Listen from now on; with 0, stop and forget what arrived."""
+        """Listen from now on; with 0, stop and drop the queue."""
         self.listening = period_ms > 0
         if not self.listening:
             self.queue.clear()

@@ -1,8 +1,8 @@
-"""What a camera recognizes: solids with `recognitionColors` that are at least partly visible.
+"""The objects that a camera recognizes: solids with `recognitionColors` that are at least partly visible.
 
-An object is where its solid is, in the frame of the camera. Its place in the picture is the middle of the
-rectangle around what is visible of it. The image of segments has each object in its first
-color, before black.
+The position of an object is that of its solid, in the frame of the camera. Its position in the image is the
+middle of the rectangle around its visible part. The segmentation image shows each object in its first color,
+on black.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Recognition:
     Attributes:
         place, lens: of the camera.
         reach_m: objects are recognized within this distance.
-        most: how many at most, the nearest first; -1: all.
+        most: maximum number of objects, the nearest first; -1 for all.
         segments: whether it has `segmentation`.
-        segmenting: whether the image of segments is published.
-        eye: None if the camera sees nothing.
+        segmenting: whether the segmentation image is published.
+        eye: the camera interface; None if the simulator does not render.
     """
 
     place: Frame
@@ -59,22 +59,22 @@ class Recognition:
 
     @property
     def picture(self) -> bytes | memoryview:
-        """The image of segments of this moment: blue, green, red and alpha of each pixel."""
+        """The segmentation image of this moment: blue, green, red and alpha of each pixel."""
         return b"" if self.eye is None else self.eye.painted(_paint)
 
     def silent(self) -> bool:
-        """Return whether there is no image of segments."""
+        """Return whether it has no segmentation image."""
         return self.eye is None or not self.segments
 
     def segment(self, *, on: bool) -> bool:
-        """Publish the image of segments or not; return whether that is so now."""
+        """Turn the publication of the segmentation image on or off; return whether that succeeded."""
         self.segmenting = on and not self.silent()
         return self.segmenting is on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Segments:
-    """The image of segments, as a list of one; empty while it is not enabled."""
+    """The segmentation image, as a list with one item; empty while it is not enabled."""
 
     recognition: Recognition
 
@@ -84,7 +84,7 @@ class _Segments:
 
 
 def read_recognition(part: DevicePart, place: Frame, lens: Lens) -> Recognition | None:
-    """Return the Recognition node of a camera; None if it has none."""
+    """Return the Recognition node of a camera; None if the camera has no such node."""
     node = part.inner("recognition")
     if node is None:
         return None
@@ -98,7 +98,7 @@ def read_recognition(part: DevicePart, place: Frame, lens: Lens) -> Recognition 
 
 
 def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
-    """Return the services of a camera that recognizes objects, beside those of its stream."""
+    """Return the services of a camera that recognizes objects, besides those of its stream."""
     save = saver(recognition.lens, recognition.silent, lambda: recognition.picture)
     return (
         ("recognition_enable_segmentation", "get_bool", lambda _: {"value": recognition.segment(on=True)}),
@@ -109,7 +109,7 @@ def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
 
 
 def recognition_stream(recognition: Recognition) -> Stream:
-    """Return the topics that `recognition_enable` begins."""
+    """Return the topics that `recognition_enable` starts."""
     objects = DeviceTopic(
         name="recognition_objects",
         type_name="webots_ros/RecognitionObjects",
@@ -133,12 +133,12 @@ def _begin(recognition: Recognition, period_ms: int) -> None:
 
 
 def _owner(shape: SceneNode) -> SceneNode | None:
-    """Return the solid with colors that a shape is part of; None if there is none."""
+    """Return the solid with colors that contains a shape; None if no such solid contains it."""
     return next((it for it in (shape, *shape.ancestors()) if _colors(it)), None)
 
 
 def _paint(shape: SceneNode) -> bytes | None:
-    """Return blue, green, red and alpha of the object that a shape is part of; None if it is of none."""
+    """Return blue, green, red and alpha of the object that contains a shape; None without an object."""
     owner = _owner(shape)
     if owner is None:
         return None

@@ -1,4 +1,4 @@
-"""From what a sensor measures to what it reports: resolution, lookup table, and the axes of a vector."""
+"""The response of a sensor to its measurement: resolution, lookup table, and the axes of a vector."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 
 Gauss = Callable[[float, float], float]
 
-# The fields of a sensor with three axes, beside `name` and those of a Solid.
+# The fields of a sensor with three axes, besides `name` and those of a Solid.
 AXES_FIELDS = """lookupTable MFVec3f; xAxis SFBool TRUE; yAxis SFBool TRUE; zAxis SFBool TRUE;
     resolution SFFloat -1"""
 
 
 def discrete(value: float, resolution: float) -> float:
-    """Return the multiple of the resolution that is nearest; without a resolution, -1, the value itself."""
+    """Return the nearest multiple of the resolution; the value itself for -1, which means no resolution."""
     return resolution * round(value / resolution) if resolution > 0.0 else value
 
 
 def table_rows(part: DevicePart, default: Sequence[TableRow] = (), first: str = "inputs") -> list[TableRow]:
-    """Return the lookup table, by growing input; `first` names the first numbers of the rows in errors."""
+    """Return the lookup table, by increasing input; `first` names the first column of the rows in errors."""
     if "lookupTable" not in part.node.fields:
         return list(default)
     numbers = part.node.numbers("lookupTable")
@@ -42,12 +42,12 @@ def table_rows(part: DevicePart, default: Sequence[TableRow] = (), first: str = 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Axes:
-    """How a sensor with three axes responds.
+    """The response of a sensor with three axes.
 
     Attributes:
-        table: that each axis goes through; None: the value stays.
+        table: applied to each axis; None leaves the values unchanged.
         on: whether x, y and z are measured; if not, the value is NaN.
-        resolution: of each value; -1: as fine as can be.
+        resolution: of each value; -1 for exact values.
     """
 
     table: LookupTable | None
@@ -84,6 +84,6 @@ def read_axes(part: DevicePart) -> Axes:
 
 
 def table_service(rows: Sequence[TableRow]) -> tuple[Row, ...]:
-    """Return the service that answers a lookup table."""
+    """Return the service that returns a lookup table."""
     table = [number for row in rows for number in row]
     return (("get_lookup_table", "get_float_array", lambda _: {"value": table}),)

@@ -1,4 +1,4 @@
-"""Skin: no meshes are loaded, so a skin has no bones here; each service that needs one fails."""
+"""Skin: meshes are not loaded, so a skin has no bones here; each service that needs a bone fails."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _read(part: DevicePart) -> Skin:
 
 
 def _without_bones(name: str) -> Handler:
-    # Webots dereferences a null pointer for the name or the place of a bone that does not exist.
+    # Webots dereferences a null pointer for the name or the position of a bone that does not exist.
     def fail(request: Any) -> dict[str, Any]:
         raise UnsimulatedError(f"{name} has no bone {request.index}: no meshes of skins are loaded")
 

@@ -1,4 +1,4 @@
-"""Speaker: what it plays and says. Nothing is heard: only a sound that loops lasts longer than its call."""
+"""Speaker: its sounds and speech. It makes no sound; only a looping sound lasts longer than its call."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LANGUAGES: Final = {
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Speaker:
-    """A speaker; `looping` has the sounds that play until they are stopped."""
+    """A speaker; `looping` holds the sounds that play until they are stopped."""
 
     name: str
     model: str
@@ -26,7 +26,7 @@ class Speaker:
     looping: set[str] = field(default_factory=set)
 
     def stop(self, sound: str) -> None:
-        """Stop a sound, "" for all."""
+        """Stop a sound; "" stops all sounds."""
         if sound:
             self.looping.discard(sound)
         else:

@@ -1,7 +1,7 @@
-"""TouchSensor: a bumper around its robot, or a part whose force on the robot is measured.
+"""TouchSensor: a bumper, or a part whose force on the robot is measured.
 
-A sensor of type `force` measures what presses it along its x axis, one of type `force-3d` the force in its
-own axes; both have to have physics, and a physics with forces. Source: WbTouchSensor.cpp of Webots.
+A sensor of type `force` measures the pressure along its x axis, one of type `force-3d` the force in its own
+axes. Both need a Physics node, and a physics with forces. Source: WbTouchSensor.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.shapes import Shape
 
-_TYPES: Final = ("bumper", "force", "force-3d")  # by what `get_type` answers
+_TYPES: Final = ("bumper", "force", "force-3d")  # by the number that `get_type` returns
 _BUMPER, _FORCE, _FORCE_3D = range(3)
 _TABLE: Final = ((0.0, 0.0, 0.0), (5000.0, 50000.0, 0.0))  # the default of TouchSensor.lookupTable
 _NOTHING: Final = (0.0, 0.0, 0.0)
@@ -26,16 +26,16 @@ _NOTHING: Final = (0.0, 0.0, 0.0)
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class TouchSensor:
-    """A sensor of touch.
+    """A touch sensor.
 
     Attributes:
         outline: its shapes.
-        type: one of `_TYPES`, by its number.
+        type: the number of one of `_TYPES`.
         link: the part whose force is measured; None for a bumper.
-        table: through which each force goes; None: the force itself.
-        resolution: of a force; -1: as fine as can be.
-        value: of a bumper, whether its robot touched anything since the sensor was last sampled; of others
-            the force, or three of them.
+        table: applied to each force; None for the force itself.
+        resolution: of a force; -1 for exact values.
+        value: of a bumper, whether it was touched since the sensor was last sampled; of the others the force,
+            as one or three numbers.
     """
 
     name: str
@@ -49,12 +49,12 @@ class TouchSensor:
     of_old_axes: bool = False
 
     def feel(self, gauss: Gauss) -> None:
-        """Take the force of this moment."""
+        """Set the value to the force of this moment."""
         x, y, z = _NOTHING if self.link is None else self.link.force
         if self.of_old_axes:
             x, y, z = z, x, y
         if self.type == _FORCE:
-            self.value = self._response(max(0.0, -x), gauss)  # a pull is no pressure
+            self.value = self._response(max(0.0, -x), gauss)  # a pull does not count as pressure
         else:
             self.value = tuple(self._response(part, gauss) for part in (x, y, z))
 
@@ -72,7 +72,7 @@ class Wrench:
 
     @property
     def value(self) -> dict[str, Any]:
-        """Of the last sample."""
+        """The force of the last sample."""
         return {"force": self.sensor.value, "torque": _NOTHING}
 
 
@@ -81,7 +81,7 @@ def _read(part: DevicePart) -> TouchSensor:
     kind = _TYPES.index(type_name) if type_name in _TYPES else _BUMPER
     if type_name != "bumper" and not part.forces:
         part.lack("a touch sensor that measures force")
-    # Without physics of its own, a bumper is part of the robot in Webots too.
+    # A bumper without a Physics node is part of the robot in Webots too.
     sensor = TouchSensor(
         name=part.name,
         model=part.text("model"),
@@ -99,9 +99,9 @@ def _read(part: DevicePart) -> TouchSensor:
 
 
 def _sampler(sensors: Sequence[TouchSensor], robot: Carrier) -> Sample:
-    """Sample the bumpers that reach the robot's rim; one inside the body is never touched.
+    """Sample the bumpers that are part of the body's outline; others are never touched.
 
-    All of them are read before the contacts are forgotten, so that each hears of its own.
+    All of them are read before the contacts are cleared, so that each gets its own contacts.
     """
     body, gauss = robot.body, robot.gauss
     forces = [sensor for sensor in sensors if sensor.link is not None]

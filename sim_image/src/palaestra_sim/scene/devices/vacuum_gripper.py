@@ -1,6 +1,6 @@
-"""VacuumGripper: nothing is held, so one that could hold something cannot be switched on.
+"""VacuumGripper: holding is not simulated, so a gripper that could hold an object cannot be switched on.
 
-A gripper holds what touches its boundingObject; without one it holds nothing in Webots either.
+A gripper holds an object that touches its boundingObject; without one it holds nothing in Webots either.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class VacuumGripper:
 
     Attributes:
         on: whether it is switched on.
-        touches: whether something could touch it, so that it would hold that.
-        value: whether it holds something.
+        touches: whether an object could touch it, so that the gripper would hold the object.
+        value: whether it holds an object.
     """
 
     name: str
@@ -29,10 +29,10 @@ class VacuumGripper:
     value: bool = False
 
     def turn(self, *, on: bool) -> None:
-        """Switch it.
+        """Switch it on or off.
 
         Raises:
-            UnsimulatedError: it could hold something.
+            UnsimulatedError: it could hold an object.
         """
         if on and self.touches:
             raise UnsimulatedError(

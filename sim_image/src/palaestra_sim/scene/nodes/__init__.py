@@ -1,7 +1,7 @@
-"""The nodes of a world that is loaded, and how they grow from files.
+"""The nodes of a loaded world, and their creation from files.
 
-- `scene_node`: one node: fields as they are now, place, the nodes inside
+- `scene_node`: one node: its current fields, its frame, the nodes inside it
 - `scope`: `DEF`, `USE` and `IS`, by file
-- `growing`: from files to nodes; PROTOs are expanded here
-- `types`: the types of Webots that are no PROTOs, with their numbers
+- `instantiate`: creates nodes from files, and expands PROTOs
+- `types`: the base types of Webots, with their numbers
 """

@@ -1,7 +1,7 @@
-"""Grow the tree of a world: from the nodes of files to nodes that live.
+"""Create the tree of a world: from the nodes in files to nodes of the scene.
 
-A node that is `USE`d becomes a node of its own, as in Webots. An instance of a PROTO becomes the PROTO's
-node, with the values of the instance. It keeps the DEF name and the place in the file of the instance.
+Each `USE` of a node becomes a node of its own, as in Webots. An instance of a PROTO becomes the PROTO's node,
+with the values of the instance. It keeps the DEF name and the place in the file of the instance.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ _SHAPES: Final = {
     "sphere": ("Sphere", ("radius",)),
     "plane": ("Plane", ("size",)),
 }
-MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots have three
-MAX_NODES: Final = 250_000  # PROTOs with two of each other grow to a million in 20 steps
+MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots need three
+MAX_NODES: Final = 250_000  # a PROTO that contains two of another, and so on, reaches a million in 20 levels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descriptions:
-    """What types of nodes mean that are no base types.
+    """The definitions of node types that are not base types.
 
     Attributes:
         protos: PROTOs without templates, by name.
-        stand_ins: simple solids in place of other PROTOs, by name; these come first.
-        unusable: why local PROTOs cannot be expanded, by name.
+        stand_ins: simple solids in place of other PROTOs, by name; these are preferred.
+        unusable: the errors of local PROTOs that cannot be expanded, by name.
     """
 
     protos: Mapping[str, Proto] = field(default_factory=dict)
@@ -46,12 +46,13 @@ class Descriptions:
 
 
 class Instantiator:
-    """Makes nodes, and numbers them.
+    """Creates nodes, and numbers them.
 
     Attributes:
         nodes: all nodes, by number.
         refused: mistakes that were found.
-        ignored: fields that do not matter, as Webots ignores them: those that a PROTO no longer has.
+        ignored: fields that have no effect, such as those that a PROTO no longer has; Webots ignores them
+            too.
     """
 
     def __init__(self, descriptions: Descriptions) -> None:
@@ -70,12 +71,12 @@ class Instantiator:
         return root
 
     def grow(self, written: Iterable[Node], scope: Scope, parent: SceneNode) -> list[Content]:
-        """Return the nodes for `written`, inside `parent`; one with a mistake is noted and missing."""
+        """Return the nodes for `written`, inside `parent`; one with a mistake is recorded and left out."""
         grown = (self._grow(node, scope, parent) for node in written)
         return [node for node in grown if node is not None]
 
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
-        if len(self.nodes) > MAX_NODES:  # the first such place ends the reading: there may be 2 to the 60th
+        if len(self.nodes) > MAX_NODES:  # stop at the first one, because 2 to the 60th may follow
             fact = f"the world has more than {MAX_NODES} nodes"
             raise scope.error(written, fact, "break a circle of PROTOs or of USE, or use fewer")
         try:
@@ -140,7 +141,7 @@ class Instantiator:
         return node
 
     def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:
-        """Return a Solid of the size of an instance, with the fields of its PROTO."""
+        """Return a Solid with the size of an instance, and with the fields of its PROTO."""
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name

@@ -1,7 +1,7 @@
-"""One node of a world that is loaded: its type, its fields as they are now, its place, the nodes inside it.
+"""One node of a loaded world: its type, its current fields, its frame, the nodes inside it.
 
-A node has an identity of its own, `number`. It does not depend on bytes of a file, so that a node of a
-PROTO, a node that is `USE`d, and a node that a client imports each have one.
+Each node has its own identity, `number`. It does not depend on the bytes of a file, so a node inside a PROTO,
+a node of a `USE`, and a node that a client imports each have a number.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class FieldContent:
     """The values of a field: numbers, booleans, strings, nodes, None for NULL.
 
     Attributes:
-        items: in order; a vector is as many numbers as it has.
+        items: in order; a vector has as many items as numbers.
         bracketed: whether the file has them in brackets.
     """
 
@@ -33,7 +33,7 @@ class FieldContent:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a node was written: its node in the tree of a file, and the bytes of that file."""
+    """The place where a node was written: its node in the tree of a file, and the bytes of that file."""
 
     node: Node
     source: Source
@@ -47,19 +47,20 @@ class SceneNode:
     """One node of the tree.
 
     Attributes:
-        number: the answer of `get_id`; 0 is the root.
+        number: the response of `get_id`; 0 is the root.
         origin: where it was written; None for the root.
         type_name: of the node, such as "Solid".
-        proto_name: the PROTO that it is an instance of, "" if none.
-        def_name: "" if it has none.
+        proto_name: the PROTO of which it is an instance; "" if it is not an instance.
+        def_name: its DEF name; "" without one.
         parent: None for the root.
         fields: those that were written or set, by name.
-        twins: this node and those that are the same one in the file, `DEF` and `USE`: a write reaches all.
-        place: its frame; None for a node without one, such as an appearance.
+        twins: this node and those that are the same node in the file, by `DEF` and `USE`: a write changes
+            all.
+        place: its frame; None for a node without a frame, such as an appearance.
         outline: whether it, or a twin, is part of a boundingObject.
-        shipped: whether it is an instance of a PROTO of Webots, which a file of today describes.
-        stand_in: whether it is a simple solid in the place of a PROTO.
-        unusable: why its PROTO cannot be expanded; "" if that is not the case.
+        shipped: whether it is an instance of a Webots PROTO whose built-in file has the current axes.
+        stand_in: whether it is a simple solid in place of a PROTO.
+        unusable: the reason why its PROTO cannot be expanded; "" without a reason.
         left_out: whether it is not simulated, because the user left it out.
     """
 
@@ -88,7 +89,7 @@ class SceneNode:
         return numbers if len(numbers) == len(content.items) else None
 
     def text(self, name: str) -> str | None:
-        """Return the first string of a field; None if there is none."""
+        """Return the first string of a field; None if the field has no string."""
         return next(iter(self.texts(name)), None)
 
     def texts(self, name: str) -> tuple[str, ...]:
@@ -96,7 +97,7 @@ class SceneNode:
         return tuple(item for item in self._items(name) if isinstance(item, str))
 
     def flag(self, name: str, default: bool) -> bool:  # noqa: FBT001 - reads as in the world
-        """Return the TRUE or FALSE of a field, or `default` if it has none."""
+        """Return the TRUE or FALSE of a field; `default` if the field has neither."""
         return next((item for item in self._items(name) if isinstance(item, bool)), default)
 
     def nodes(self, name: str = "children") -> tuple[SceneNode, ...]:
@@ -109,13 +110,13 @@ class SceneNode:
             yield from (item for item in content.items if isinstance(item, SceneNode))
 
     def descendants(self) -> Iterator[SceneNode]:
-        """Yield every node inside, parents before children."""
+        """Yield all nodes inside it at any depth, parents before children."""
         for node in self.inside():
             yield node
             yield from node.descendants()
 
     def ancestors(self) -> Iterator[SceneNode]:
-        """Yield the nodes around it, from the inside out, the root last."""
+        """Yield the nodes around it, from the inside out; the root is the last."""
         node = self.parent
         while node is not None:
             yield node

@@ -1,7 +1,7 @@
 """The file in which a node is written: its `DEF`s, and the fields of the PROTO that it defines.
 
-`USE name` means the last `DEF` of that name before it, in the same file. In a PROTO, `IS name` means a value
-that the instance gives, and that was written in another file. So a value is looked up with its scope.
+`USE name` refers to the last `DEF` of that name before it, in the same file. In a PROTO, `IS name` refers to
+a value of the instance, which was written in another file. So a value is looked up together with its scope.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Scope:
         source: the bytes of the file.
         defs: its nodes with a DEF name, by that name, in the order of the file.
         bindings: of a PROTO: the value of each field, with the scope in which it is written.
-        depth: how many instances of PROTOs it is inside of.
+        depth: the number of PROTO instances around it.
     """
 
     source: Source
@@ -45,7 +45,7 @@ class Scope:
         """Return the node itself, or the one that it `USE`s.
 
         Raises:
-            WorldError: no node of that name stands before it.
+            WorldError: no node with that DEF name precedes it.
         """
         if node.uses is None:
             return node
@@ -64,7 +64,7 @@ class Scope:
 
 
 def definitions(nodes: Iterable[Node]) -> dict[str, list[Node]]:
-    """Return the nodes with a DEF name by that name, those inside others too."""
+    """Return the nodes with a DEF name by that name, including nested nodes."""
     found: dict[str, list[Node]] = {}
     for node in walk(tuple(nodes)):
         if node.def_name is not None:

@@ -1,4 +1,4 @@
-"""The types of nodes that Webots has by itself, with the numbers of webots/nodes.h, R2023b."""
+"""The base types of nodes in Webots, with the numbers of webots/nodes.h, R2023b."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _NUMBERS: Final = {name: number for number, name in enumerate(_NUMBERED.split())
 
 
 def type_number(type_name: str) -> int:
-    """Return the number that `supervisor/node/get_type` answers; 0 for an unknown type."""
+    """Return the number that `supervisor/node/get_type` returns; 0 for an unknown type."""
     return _NUMBERS.get(type_name, 0)
 
 
 def is_base_type(type_name: str) -> bool:
-    """Return whether Webots has a type of this name, so that it is no PROTO."""
+    """Return whether Webots has a base type of this name, so that it is not a PROTO."""
     return type_name in _NUMBERS

@@ -1,8 +1,8 @@
 """Node types as a supervisor sees them: their fields, and the type of each field.
 
-Fields and defaults are those of resources/nodes/*.wrl, R2023b.
-Only the types of the stub's worlds are listed, those of devices in `devices`. A field that is not listed is
-known where a world sets it, with the type that its value shows.
+Fields and defaults are those of resources/nodes/*.wrl, R2023b. Only the types in the stub's worlds are
+listed, those of devices in `devices`. A field that is not listed exists if a world sets it; its type follows
+from its value.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ class FieldKind(NamedTuple):
 
     @property
     def number(self) -> int:
-        """The number that `supervisor/field/get_type` answers."""
+        """The number that `supervisor/field/get_type` returns."""
         return self.type | (MULTIPLE if self.multiple else 0)
 
     @property
     def name(self) -> str:
-        """The name that `supervisor/field/get_type_name` answers, e.g. "SFVec3f"."""
+        """The name that `supervisor/field/get_type_name` returns, e.g. "SFVec3f"."""
         return ("MF" if self.multiple else "SF") + _NAMES[self.type]
 
 
@@ -147,11 +147,11 @@ _WITHOUT_EFFECT: Final = {
 }
 
 
-_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of such fields with which nothing differs
+_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of such fields for which the simulators agree with Webots
 
 
 def without_effect(node: SceneNode) -> list[str]:
-    """Return the fields of a node that Webots applies and no simulator here does, except at defaults."""
+    """Return the fields of a node that have an effect in Webots but not here, unless they have defaults."""
     kind = DEVICES.get(node.type_name)
     names = (kind.without_effect if kind else _WITHOUT_EFFECT.get(node.type_name, "")).split()
     kinds = _kinds(node.type_name)
@@ -161,7 +161,7 @@ def without_effect(node: SceneNode) -> list[str]:
 
 
 def _is_plain(name: str, kind: FieldKind, content: FieldContent) -> bool:
-    """Return whether a field has its default, or the value with which nothing differs."""
+    """Return whether a field has its default, or a value for which the simulators agree with Webots."""
     items = [item for item in content.items if item not in {None, ""}]
     if items == _AS_SIMULATED.get(name):
         return True
@@ -173,7 +173,7 @@ def _is_plain(name: str, kind: FieldKind, content: FieldContent) -> bool:
 
 
 def field_kinds(type_name: str) -> dict[str, FieldKind]:
-    """Return the fields of a node type in the order that indices count; {} for an unknown type."""
+    """Return the fields of a node type in the order of their indices; {} for an unknown type."""
     kinds: dict[str, FieldKind] = {}
     for entry in _declared(type_name).split(";"):
         words = entry.split(maxsplit=2)
@@ -192,7 +192,7 @@ def _declared(type_name: str) -> str:
 
 
 def kinds_of(node: SceneNode) -> dict[str, FieldKind]:
-    """Return the fields of a node in the order of their indices; those not in the catalogue come last."""
+    """Return the fields of a node in the order of their indices; fields that are not listed come last."""
     known = _kinds(node.type_name)
     return known | {name: _guessed(content) for name, content in node.fields.items() if name not in known}
 
@@ -203,7 +203,7 @@ def _kinds(type_name: str) -> dict[str, FieldKind]:
 
 
 def _guessed(content: FieldContent) -> FieldKind:
-    """Return the kind of a field that is not in the catalogue, from its value in the world file."""
+    """Return the kind of a field that is not listed, from its value in the world file."""
     items, bracketed = content.items, content.bracketed
     if not items or items[0] is None or isinstance(items[0], SceneNode):
         return FieldKind(FieldType.NODE, bracketed)
@@ -214,5 +214,5 @@ def _guessed(content: FieldContent) -> FieldKind:
     if bracketed:
         return FieldKind(FieldType.FLOAT, True)
     by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
-    # A rotation is the widest value, so more numbers are several values.
+    # A rotation is the widest single value, so more numbers are several values.
     return FieldKind(by_width.get(len(items), FieldType.FLOAT), len(items) > max(by_width))

@@ -1,8 +1,9 @@
 """Fields of nodes: typed values that a supervisor reads and writes.
 
-The next read answers a written value at once; the simulation sees it when the next basic step begins.
-`translation` and `rotation` move things, `customData` reaches the robot, and a field that only draws has no
-effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
+A read after a write returns the written value at once; the simulation applies it at the beginning of the next
+basic step. `translation` and `rotation` move objects, `customData` reaches the robot, and a field that is
+only visible has no effect on the simulation in Webots either. Every other write is refused: a client would
+read the value back, but it would change nothing (`write_rules`).
 
 As in Webots, a value that is invalid for the field is ignored without an error.
 """
@@ -25,14 +26,14 @@ class NoValueError(SimError, LookupError):
 
 
 class Changes(Protocol):
-    """The simulation, to which the writes of fields come."""
+    """The simulation, which receives the writes of fields."""
 
     def before_next_step(self, change: Callable[[], None], /) -> None:
         """Call `change` at the beginning of the next basic step."""
         ...
 
     def changed(self, node: SceneNode, field: str, /) -> None:
-        """Take the effect of a field that has a new value."""
+        """Apply the effect of a field that has a new value."""
         ...
 
 
@@ -51,17 +52,17 @@ class NodeField:
         self.kind = kind
         self._changes = changes
         self._values = _initial(node, name, kind)
-        self._writes = 0  # written, not yet seen by the simulation
+        self._writes = 0  # pending writes, which the simulation has not yet applied
 
     @property
     def count(self) -> int:
-        """Return the number of values, like `get_count`: -1 for a field of exactly one."""
+        """Return the number of values, like `get_count`: -1 for a field with exactly one value."""
         return len(self._current()) if self.kind.multiple else -1
 
     def get(self, type_: FieldType, index: int = 0) -> Any:
-        """Return the value at `index` (ignored by a field of exactly one).
+        """Return the value at `index`, which is ignored for a field with exactly one value.
 
-        A bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
+        It is a bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
 
         Raises:
             NoValueError: the field has another type, or no value at that index.
@@ -73,7 +74,7 @@ class NodeField:
         return values[at]
 
     def set(self, type_: FieldType, index: int, value: Any) -> None:
-        """Write a value: visible at once, in effect from the next basic step on.
+        """Write a value: it is readable at once, and takes effect at the next basic step.
 
         Raises:
             UnsimulatedError: it would have no effect.
@@ -93,7 +94,7 @@ class NodeField:
         self._changes.before_next_step(self._take_effect)
 
     def room(self, index: int) -> int | None:
-        """Return where a node inserted at `index` comes to be, -1 for the end; None if that is impossible."""
+        """Return the position of a node inserted at `index`, -1 for the end; None if that is impossible."""
         size = len(self._current())
         if self.kind.type is not FieldType.NODE:
             return None
@@ -116,7 +117,7 @@ class NodeField:
         return True
 
     def remove(self, index: int) -> bool:
-        """Remove the value at `index`; return False if there is none, or if it must stay.
+        """Remove the value at `index`; return False if it does not exist, or if it cannot be removed.
 
         Raises:
             UnsimulatedError: it would have no effect.
@@ -133,7 +134,7 @@ class NodeField:
         require_effect(self.node, self.name)
 
     def _current(self) -> list[Any]:
-        """Return the values: those written last, else those of the simulation."""
+        """Return the values: the pending ones, else those of the simulation."""
         if self.kind.type is FieldType.NODE:
             return _initial(self.node, self.name, self.kind)
         if self._writes == 0:
@@ -149,7 +150,7 @@ class NodeField:
         return self._values
 
     def _take_effect(self) -> None:
-        """Hand the written values to the simulation; of several writes the last one counts."""
+        """Pass the written values to the simulation; of several pending writes, only the last one counts."""
         self._writes -= 1
         if self._writes == 0:
             for twin in self.node.twins:
@@ -161,7 +162,7 @@ def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngl
     """Return the axis and angle that the controller computes from a quaternion, with its RosMathUtils bug.
 
     An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
-    so a zero rotation that was read cannot be written back. If |w| > 1, the angle is NaN.
+    so a client cannot write back a zero rotation that it has read. If |w| > 1, the angle is NaN.
     """
     angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
     if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils
@@ -182,13 +183,13 @@ def _acceptable(type_: FieldType, value: Any) -> bool:
 
 
 def _positive(value: Any) -> bool:
-    """Return whether a size is one; Webots refuses others."""
+    """Return whether all numbers of a size are positive; Webots refuses others."""
     numbers: tuple[float, ...] = value if isinstance(value, tuple) else (value,)
     return min(numbers) > 0.0
 
 
 def _initial(node: SceneNode, name: str, kind: FieldKind) -> list[Any]:
-    """Return the values that the world file gives, or the default."""
+    """Return the values in the world file, or the default."""
     written = node.fields.get(name)
     if kind.type is FieldType.NODE:
         inside: list[Any] = [] if written is None else list(written.items)
@@ -209,7 +210,7 @@ def _default(kind: FieldKind) -> list[Any]:
 
 
 def _flat(values: list[Any]) -> list[Any]:
-    """Return the values as a world file has them: a vector as its numbers, every number a float."""
+    """Return the values in the form of a world file: a vector as its numbers, every number a float."""
     items: list[Any] = []
     for value in values:
         items += value if isinstance(value, tuple) else [value]

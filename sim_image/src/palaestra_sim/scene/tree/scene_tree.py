@@ -1,4 +1,4 @@
-"""The tree of a world that is loaded: nodes found by DEF or number, and their fields."""
+"""The tree of a loaded world: nodes by DEF or number, and their fields."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from palaestra_sim.scene.tree.fields import Changes, NodeField
 from palaestra_sim.world import World, parse_nodes
 from palaestra_sim.world.source import Source
 
-_TEXT: Final = "node"  # the name of an imported text in errors
+_TEXT: Final = "node"  # name of an imported text in errors
 
 
 class SceneTree:
     """All nodes of one load of a world.
 
     Args:
-        world: as read.
+        world: the parsed world.
         name: of its file, in errors.
-        descriptions: of the types that are no base types.
+        descriptions: of the types that are not base types.
 
     Attributes:
         source: the bytes of the world.
         nodes: by number.
         root: a Group that has the nodes of the file as its children.
-        refused: mistakes in the file that make a node impossible, such as `USE` of a missing name.
+        refused: mistakes in the file that prevent a node, such as `USE` of a missing name.
         ignored: fields that a PROTO does not have, each with its place.
     """
 
@@ -44,10 +44,10 @@ class SceneTree:
         _mark_outlines(self.nodes.values())
 
     def grow(self, text: str, parent: SceneNode) -> list[SceneNode]:
-        """Return the nodes that `text` describes; they know `parent`, but no field of it has them yet.
+        """Return the nodes that `text` describes; they refer to `parent`, but are not yet in its fields.
 
         Raises:
-            WorldError: the text is wrong; it has all mistakes.
+            WorldError: the text is wrong; the error lists all mistakes.
         """
         world = parse_nodes(text, _TEXT)
         known = len(self.refused)
@@ -61,27 +61,27 @@ class SceneTree:
         return grown
 
     def attach(self, nodes: Sequence[SceneNode], field: str, index: int) -> None:
-        """Put nodes into a field of their parent, before `index`."""
+        """Insert nodes into a field of their parent, before `index`."""
         for node in nodes:
             content = _of_parent(node).fields.setdefault(field, FieldContent([], bracketed=True))
             content.items[index:index] = [node]
             index += 1
 
     def remove(self, node: SceneNode) -> None:
-        """Take a node, and all inside it, out of the tree."""
+        """Remove a node, and all nodes inside it, from the tree."""
         for content in _of_parent(node).fields.values():
             content.items = [item for item in content.items if item is not node]
         self.forget([node])
 
     def forget(self, nodes: Iterable[SceneNode]) -> None:
-        """Let the numbers of nodes, and of all inside them, mean nothing."""
+        """Remove nodes, and all nodes inside them, from the numbered nodes."""
         for node in nodes:
             for gone in (node, *node.descendants()):
                 gone.twins.remove(gone)
                 self.nodes.pop(gone.number, None)
 
     def field_of(self, node: SceneNode, name: str, changes: Changes) -> NodeField | None:
-        """Return a node's field; None if a node of this type has none of that name."""
+        """Return a node's field; None if this node type does not have it."""
         found = self._fields.get((node.number, name))
         kind = kinds_of(node).get(name) if found is None else None
         if kind is not None:
@@ -89,7 +89,7 @@ class SceneTree:
         return found
 
     def of_def(self, path: str, within: SceneNode | None = None) -> SceneNode | None:
-        """Return the first node with a DEF name, inside `within`; dots lead inside, as in "ROBOT.ARM"."""
+        """Return the first node with a DEF name, inside `within`; "ROBOT.ARM" is an ARM inside a ROBOT."""
         found: SceneNode | None = within or self.root
         for name in path.split("."):
             if found is None or not name:

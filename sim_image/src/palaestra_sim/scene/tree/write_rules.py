@@ -1,7 +1,7 @@
-"""Refuse writes of fields that have an effect in Webots but none here.
+"""Refuse writes of fields that have an effect in Webots but not here.
 
-Otherwise a client that randomizes a world would read back its writes, but train in a world that stays the
-same.
+Otherwise a client that randomizes a world would read back its writes, but train in a world that does not
+change.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 
-# Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
+# Nodes that affect the physics. All others are only visible, unless they are part of a boundingObject.
 _ACTING: Final = DEVICES.keys() | frozenset(
     (
         "ContactProperties",
@@ -30,10 +30,10 @@ _ACTING: Final = DEVICES.keys() | frozenset(
         "WorldInfo",
     )
 )
-# A running controller has taken the names of its devices already.
+# A running controller has already read the names of its devices.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "write it into the world file, or use driver webots"
-_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # they act only by what is inside
+_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # they have an effect only by their contents
 _PLACING: Final = frozenset(("translation", "rotation"))
 _SIZES: Final = {
     "Box": ("size",),
@@ -62,10 +62,10 @@ def require_effect(node: SceneNode, field: str) -> None:
 
 
 def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> None:
-    """Check that nodes, added to the node's field `field`, act as in Webots.
+    """Check that nodes, added to the node's field `field`, have the same effect as in Webots.
 
     Raises:
-        UnsimulatedError: they would not.
+        UnsimulatedError: they do not.
     """
     where = f"{node.type_name}.{field}"
     if node.outline or len(node.twins) > 1:
@@ -81,10 +81,10 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
 
 
 def require_removable(node: SceneNode) -> None:
-    """Check that the node can be removed with the effect that this has in Webots.
+    """Check that a removal of the node has the same effect as in Webots.
 
     Raises:
-        UnsimulatedError: that is not the case.
+        UnsimulatedError: it does not.
     """
     if node.parent is None or node.type_name in {"WorldInfo", "Viewpoint"}:
         raise UnsimulatedError(f"the {node.type_name} of a world cannot be removed; keep it")
@@ -109,7 +109,7 @@ def _acts(node: SceneNode) -> bool:
 
 
 def resizes(node: SceneNode, field: str) -> bool:
-    """Return whether a write changes the size of a standing obstacle, and of nothing on a robot."""
+    """Return whether a write changes the size of a fixed obstacle, and of nothing on a robot."""
     return field in _SIZES.get(node.type_name, ()) and not any(_on_robot(twin) for twin in node.twins)
 
 
@@ -122,7 +122,7 @@ def _reaches_robot(node: SceneNode, field: str) -> bool:
 
 
 def _moves(node: SceneNode, field: str) -> bool:
-    """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
+    """Return whether a write of a node's pose moves it; rays and outlines of a robot cannot be moved."""
     if field not in _PLACING or node.place is None or not node.place.placeable:
         return False
     if node.type_name == "Robot" or not _on_robot(node):

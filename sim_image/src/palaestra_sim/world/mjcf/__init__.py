@@ -1,12 +1,12 @@
 """Worlds in MJCF, the XML of MuJoCo: the description of the robot, checks, and names.
 
-MuJoCo itself is not needed to check or to name such a world. All but `project` is pure text.
+MuJoCo itself is not needed to check or to name such a world. All modules except `project` only handle text.
 
 - `elements`: the elements of an XML file with their places
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
-- `project`: these files on a disk, and the folder that holds them
-- `growing`: elements that would take all memory
+- `project`: these files on disk, and the folder that holds them
+- `size_checks`: checks for elements that would need too much memory
 - `checks`: the mistakes that make a world unusable
 - `naming`: the world of one simulator
 """

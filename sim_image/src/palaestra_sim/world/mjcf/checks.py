@@ -1,4 +1,4 @@
-"""Checks for MJCF worlds that are XML, but from which no simulator's world can be made.
+"""Checks for MJCF worlds that are valid XML, but from which no simulator's world can be generated.
 
 Each check finds one kind of mistake, at all its places, as those of `.wbt` worlds do.
 """
@@ -32,14 +32,14 @@ Check = Callable[[Description], Iterator[WorldError]]
 
 
 def no_actuator(found: Description) -> Iterator[WorldError]:
-    """Nothing moves the robot; what another file of the model has is not seen here."""
+    """The model has no actuator; an included file may have one, which this check does not see."""
     if not any(it.children for it in found.root.named("actuator")) and not parts(found.root):
         fact = "the model has no actuator, so a trainer can move nothing"
         yield found.source.error(found.root.start, fact, "add <actuator> with a motor, position or velocity")
 
 
 def repeated(found: Description) -> Iterator[WorldError]:
-    """Two texts or numbers have the same name, of which MuJoCo takes none."""
+    """Two texts or numbers have the same name, so MuJoCo uses neither of them."""
     for tag in ("text", "numeric"):
         seen = set()
         for name, element in custom(found.root, tag):
@@ -67,9 +67,9 @@ def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
 
 
 def unfit_step(found: Description) -> Iterator[WorldError]:
-    """The basic step is no whole number of milliseconds and of MuJoCo's steps.
+    """The basic step is not a whole number of milliseconds and of MuJoCo's steps.
 
-    Another file of the model may set the timestep; then MuJoCo's own model decides, when it is loaded.
+    Another file of the model may set the timestep; then the loader checks it in MuJoCo's compiled model.
     """
     if parts(found.root):
         return
@@ -90,7 +90,7 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
 
 
 def unknown_devices(found: Description) -> Iterator[WorldError]:
-    """A text that renames a device has another form, or gives no name."""
+    """The name of a text that renames a device has a wrong form, or the text has no new name."""
     for key, name in found.devices.items():
         kind, slash, old = key.partition("/")
         if kind not in DEVICE_KINDS or not slash or not old or not name:
@@ -102,17 +102,17 @@ def unknown_devices(found: Description) -> Iterator[WorldError]:
 
 
 def too_large(found: Description) -> Iterator[WorldError]:
-    """An element would grow to more than memory holds when MuJoCo reads it."""
+    """An element would need more memory than there is when MuJoCo reads it."""
     yield from growing(found.source, found.root)
 
 
 def absolute_path(found: Description) -> Iterator[WorldError]:
-    """A name of a file does not count from the folder of the world."""
+    """The name of a file is not relative to the folder of the world."""
     yield from absolutes(found.source, found.root)
 
 
 def relative_address(found: Description) -> Iterator[WorldError]:
-    """The model names a file, but the world has none and so no folder."""
+    """The model names a file, but the world is not in a file, so it has no folder."""
     for element, path in named_files(found.root):
         if is_relative(path):
             fact = f"{path!r} is relative to the file of the world, and this one has none"
@@ -132,7 +132,7 @@ CHECKS: Final[tuple[Check, ...]] = (
 """The checks for every MJCF world."""
 
 CHECKS_WITHOUT_FILE: Final[tuple[Check, ...]] = (*CHECKS, relative_address)
-"""The additional checks for a world without a file, which has no files beside it."""
+"""The additional check for a world without a file, which has no files next to it."""
 
 
 def checked(source: bytes, name: str = "world", *, relative_addresses: bool) -> Description:
@@ -151,7 +151,7 @@ def checked(source: bytes, name: str = "world", *, relative_addresses: bool) -> 
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the MJCF world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
+    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
     names.
 
     Raises:

@@ -8,7 +8,7 @@
       <text name="device:sensor/debug" data="-"/>
     </custom>
 
-Each of them may be missing. MuJoCo itself ignores them.
+All of them are optional. MuJoCo itself ignores them.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ ROBOT: Final = "robot"
 BASIC_STEP: Final = "basicTimeStep"
 KEYFRAME: Final = "keyframe"
 DEVICE: Final = "device:"
-LEFT_OUT: Final = "-"  # the name of a device that the robot shall not have
+LEFT_OUT: Final = "-"  # name for a device that the user leaves out
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
-_LONGEST_MS: Final = 100  # of a basic step that no world asks for; robots move a few times as often
-_MOST_STEPS: Final = 10_000  # of MuJoCo in a basic step: more take seconds each
-_SHORTEST_PART: Final = 99  # of a millisecond: what a message recommends as a timestep
-_NEAR: Final = 1e-4  # relative: 0.0041666 s is 1/240 s
+_LONGEST_MS: Final = 100  # of a default basic step; robots are stepped several times as often
+_MOST_STEPS: Final = 10_000  # of MuJoCo in a basic step; more would take seconds
+_SHORTEST_PART: Final = 99  # the shortest timestep that a message recommends is 1 / (99 + 1) ms
+_NEAR: Final = 1e-4  # relative tolerance: 0.0041666 s counts as 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
@@ -45,8 +45,8 @@ class Description:
     Attributes:
         source: its bytes.
         root: its elements.
-        texts: the elements `text` of `custom` that have a name, by name; the first of a name.
-        numbers: the elements `numeric` in the same way.
+        texts: the named elements `text` of `custom`, by name; the first one with each name.
+        numbers: the elements `numeric`, in the same way.
     """
 
     source: Source
@@ -56,7 +56,7 @@ class Description:
 
     @property
     def robot(self) -> str:
-        """The name of the robot: its own, else that of the model, else "robot"."""
+        """The name of the robot: from `custom`, else that of the model, else "robot"."""
         return self._text(ROBOT) or self.root.attributes.get("model") or "robot"
 
     @property
@@ -76,18 +76,18 @@ class Description:
 
     @property
     def timestep_s(self) -> float:
-        """The time that MuJoCo takes in one step, as far as this file sets it."""
+        """The length of one MuJoCo step in seconds; the default if this file does not set it."""
         given = [it.attributes["timestep"] for it in self.root.named("option") if "timestep" in it.attributes]
         return _number(given[-1]) if given else _TIMESTEP_S
 
     @property
     def basic_step_ms(self) -> float | None:
-        """The basic step that the world sets, in ms; None: none."""
+        """The basic step that the world sets, in ms; None if it sets none."""
         element = self.numbers.get(BASIC_STEP)
         return None if element is None else _number(element.attributes.get("data", ""))
 
     def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
-        """Return an error at the element of a name in a section, such as "sensor"; else at the root."""
+        """Return an error at the element of that name in a section such as "sensor", else at the root."""
         elements = (it for section_ in self.root.named(section) for it in section_.walk())
         start = next((it.start for it in elements if name and it.attributes.get("name") == name), 0)
         return self.source.error(start or self.root.start, fact, remedy)
@@ -106,7 +106,7 @@ def describe(source: bytes, name: str = "world") -> Description:
     """Return the description of an MJCF world.
 
     Raises:
-        WorldError: the bytes are no such file.
+        WorldError: the bytes are not such a file.
     """
     origin = Source(data=source, name=name, kind="world")
     root = read(origin)
@@ -129,7 +129,7 @@ def custom(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
 
 
 def whole_step_ms(timestep_s: float) -> int | None:
-    """Return the shortest time of whole milliseconds and whole steps of MuJoCo; None if it is too long."""
+    """Return the shortest time of whole milliseconds and whole MuJoCo steps; None if it is too long."""
     return next((step_ms for step_ms in range(1, _LONGEST_MS + 1) if fits(step_ms, timestep_s)), None)
 
 
@@ -142,7 +142,7 @@ def fits(step_ms: float, timestep_s: float) -> bool:
 
 
 def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
-    """Return the nearest shorter and longer timestep of which some make a short basic step."""
+    """Return the nearest shorter and longer timestep that fits a short basic step of whole milliseconds."""
     ms = timestep_s * 1000.0
     if ms >= 1.0:
         return int(ms) / 1000.0, (int(ms) + 1) / 1000.0
@@ -151,9 +151,9 @@ def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
 
 
 def with_parts(description: Description, parts: Iterable[Element]) -> Description:
-    """Return the description of a model that consists of more files, whose `custom` counts too.
+    """Return the description of a model with several files; the `custom` of each counts.
 
-    An element of another file has its place at the root of this one, in errors.
+    In errors, an element of another file has the place of this file's root.
     """
     texts, numbers = dict(description.texts), dict(description.numbers)
     for root in parts:
@@ -171,7 +171,7 @@ def _by_name(root: Element, tag: str) -> dict[str, Element]:
 
 
 def _number(text: str) -> float:
-    """Return the number of a text, NaN for another text."""
+    """Return the number in a text; NaN if the text is not one finite number."""
     words = re.findall(r"\S+", text)
     try:
         number = float(words[0]) if len(words) == 1 else math.nan

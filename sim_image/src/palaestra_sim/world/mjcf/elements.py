@@ -1,7 +1,7 @@
 """The elements of an XML file, each with its bytes.
 
-The file comes from people who are not trusted. A document type is refused, so that no entity can name a
-file or grow without end.
+The author of the file is not trusted. A document type is refused, so that no entity can name a file or expand
+without end.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def walk(self) -> Iterator[Element]:
-        """Yield the element and all inside it, parents before children."""
+        """Yield the element and all elements inside it, parents before children."""
         waiting: list[Element] = [self]
         while waiting:
             element = waiting.pop()
@@ -43,7 +43,7 @@ class Element:
             waiting.extend(reversed(element.children))
 
     def named(self, *tags: str) -> Iterator[Element]:
-        """Yield what is inside by a path of tags: `named("custom", "text")`."""
+        """Yield the elements at a path of tags: `named("custom", "text")`."""
         for child in self.children:
             if child.tag == tags[0]:
                 yield from child.named(*tags[1:]) if tags[1:] else (child,)
@@ -64,7 +64,7 @@ def start_tag_end(source: Source, element: Element) -> int:
 
 
 def value_span(source: Source, element: Element, attribute: str) -> tuple[int, int]:
-    """Return where the value of an attribute is that the element has, with its quotes."""
+    """Return the span of an attribute's value in an element, with its quotes."""
     tag = _start_tag(source, element)
     pattern = re.compile(rb"\s" + re.escape(attribute.encode()) + rb"\s*=\s*(" + _VALUE + rb")")
     found = pattern.search(source.data, tag.start(), tag.end())
@@ -118,6 +118,6 @@ class _Reader:
 
 def _start_tag(source: Source, element: Element) -> re.Match[bytes]:
     tag = _START_TAG.match(source.data, element.start)
-    if tag is None:  # the parser has found one here
+    if tag is None:  # impossible: the parser has found a start tag here
         raise LookupError(f"no start tag of {element.tag}")
     return tag

@@ -1,7 +1,7 @@
 """The files that a model names: meshes, textures, parts of the model.
 
-MuJoCo opens what the attributes of a model name, wherever it is. A name counts from the folder of the world,
-or from one that the model names. `project` has the folder that none of them may leave.
+MuJoCo opens every file that an attribute of a model names. A name is relative to the folder of the world, or
+to a folder that the model names. `project` has the folder that none of them may leave.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ def named_folders(root: Element) -> Iterator[tuple[Element, str]]:
 
 
 def parts(root: Element) -> tuple[tuple[Element, str], ...]:
-    """Return the names of the files of which MuJoCo reads more elements, with their elements."""
+    """Return the names of the files from which MuJoCo reads more elements, with their elements."""
     return tuple(row for row in named_files(root) if row[0].tag in _PARTS)
 
 
 def assets(root: Element) -> Iterator[tuple[Element, str]]:
-    """Yield the names of the files that hold no elements, such as meshes, with their elements."""
+    """Yield the names of the files without elements, such as meshes, with their elements."""
     return (row for row in named_files(root) if row[0].tag not in _PARTS)
 
 
 def absolutes(source: Source, root: Element) -> Iterator[WorldError]:
-    """Yield an error for each name in a file that does not count from the folder of the world."""
+    """Yield an error for each name in a file that is not relative to the folder of the world."""
     for element, path in (*named_folders(root), *named_files(root)):
         if not is_relative(path):
             fact = f"{path!r} does not count from the folder of the world"

@@ -1,7 +1,7 @@
-"""Generate the MJCF world of one simulator: its source world with a ROS name of its own.
+"""Generate the MJCF world of one simulator: its source world with a generated ROS name.
 
-Only the text `controllerArgs` changes, or is inserted behind `<mujoco>`: `--name=` is set, `--synchronize`
-added, and `--clock` kept in one simulator at most. All other bytes stay, as in a `.wbt` world.
+Only the text `controllerArgs` changes, or is inserted after `<mujoco>`: `--name=` is set, `--synchronize` is
+added, and at most one simulator keeps `--clock`. All other bytes are unchanged, as in a `.wbt` world.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
     """Return the world with `suffix` appended to its ROS name, and without `--clock`.
 
     Raises:
-        WorldError: as for `check`; or there is no ROS name, or it would become too long.
+        WorldError: as for `check`; or the robot has no ROS name, or its new name is too long.
     """
     found = checked(source, name, relative_addresses=relative_addresses)
     present = _robot(found).ros_name
@@ -56,10 +56,10 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
 
 
 def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
-    """Return the robot of a world; there is one, which is a supervisor.
+    """Return the robot of a world; there is exactly one, and it is a supervisor.
 
     Raises:
-        WorldError: the bytes are no MJCF world.
+        WorldError: the bytes are not an MJCF world.
     """
     return (_robot(describe(source, name)),)
 
@@ -88,13 +88,13 @@ def _named(found: Description, new: str, *, clock: bool) -> bytes:
         text = data[start:end] if tuple(arguments) == found.arguments else value
     result = data[:start] + text + data[end:]
     if describe(result, found.source.name).arguments != tuple(arguments):
-        fact = f"the generated world has not the arguments {' '.join(arguments)}"
-        raise found.source.error(start, fact, "report this world, the generator is wrong")
+        fact = f"the generated world lacks the arguments {' '.join(arguments)}"
+        raise found.source.error(start, fact, "report this world; the generator has a bug")
     return result
 
 
 def _arguments(present: Iterable[str], new: str, *, clock: bool) -> list[str]:
-    """Return the arguments with one `--name=`, one `--synchronize`, and one `--clock` if it may stay."""
+    """Return the arguments with one `--name=` and one `--synchronize`; `clock` allows one `--clock`."""
     arguments: list[str] = []
     once = {NAME + new, SYNCHRONIZE, CLOCK}
     written = set() if clock else {CLOCK}

@@ -1,8 +1,8 @@
-"""The files of a model on a disk, and its project: the folder that holds them all.
+"""The files of a model on disk, and its project: the folder that holds them all.
 
 Models of a package share meshes, so a model may name files some folders above its own. The project is the
-nearest folder that holds all that the model names, unless the user names one. It is never the whole file
-system, and no link leads out of it: a model of a stranger must not read files of the pod.
+nearest folder that holds all files that the model names, unless the user names a folder. It is never the
+whole file system, and no link may lead out of it: an untrusted model must not read files of the pod.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TOGETHER: Final = (
 
 
 class _Named(NamedTuple):
-    """A file that is there, with the place that names it; `path` counts from the folder of the world."""
+    """An existing file, with the place that names it; `path` is relative to the folder of the world."""
 
     source: Source
     element: Element
@@ -41,13 +41,13 @@ class _Named(NamedTuple):
 class Project:
     """The files of a model, and of the files that it includes.
 
-    MuJoCo looks for an included file beside the world, then in the folders that the world names, then beside
-    the file that includes it.
+    MuJoCo looks for an included file next to the world, then in the folders that the world names, then next
+    to the file that includes it.
 
     Args:
         world: path of the world.
         description: its main file.
-        root: the folder that the user names; None: the nearest one that holds all files.
+        root: the folder that the user names; None for the nearest one that holds all files.
 
     Attributes:
         roots: the elements of the included files that were read.
@@ -61,7 +61,7 @@ class Project:
         self._named: list[_Named] = []
 
     def open(self) -> None:
-        """Read all included files, and look where all files are.
+        """Read all included files, and check the places of all files.
 
         Raises:
             WorldError: an included file is wrong, or a file is outside of the project.
@@ -71,7 +71,7 @@ class Project:
             raise error
 
     def _read(self) -> Iterator[WorldError]:
-        """Read all included files; yield what is wrong with them."""
+        """Read all included files; yield their errors."""
         description = self._description
         waiting = [("", description.source, description.root)]
         seen: set[str] = set()
@@ -96,11 +96,11 @@ class Project:
 
     @property
     def levels(self) -> int:
-        """By how many folders the files lead above that of the world."""
+        """The number of folders by which the files lead above the folder of the world."""
         return max((climb(named.path) for named in self._named), default=0)
 
     def _strays(self) -> Iterator[WorldError]:
-        """Yield an error for each file that is outside of the project."""
+        """Yield an error for each file outside the project."""
         nearest = None if self.levels >= self._top else (self._folder, *self._folder.parents)[self.levels]
         root = self._root or nearest
         for named in self._named:
@@ -112,11 +112,11 @@ class Project:
 
     @property
     def _top(self) -> int:
-        """The levels at which the project would be the whole file system."""
+        """The number of levels at which the project would be the whole file system."""
         return max(1, len(self._folder.parents))
 
     def _is_outside(self, named: _Named, root: Path | None) -> bool:
-        """Return whether a file is outside of `root`; None: still unknown, so only a path to the top is."""
+        """Return whether a file is outside `root`; if it is None, only a path to the top is outside."""
         if root is None:
             return climb(named.path) >= self._top
         return not self._real(named).is_relative_to(root.resolve())
@@ -125,9 +125,9 @@ class Project:
         return (self._folder / named.path).resolve()
 
     def _note_assets(self, source: Source, root: Element, beside: str) -> None:
-        """Note what is there of the meshes, textures and the like that a file in the folder `beside` names.
+        """Record the existing meshes, textures and other assets that a file in the folder `beside` names.
 
-        Of an attached model they are beside that model.
+        The assets of an attached model are next to that model.
         """
         named = [*self._folders(self._description.root), *self._folders(root)[1:]]
         folders = named + [posixpath.join(beside, folder) for folder in named if beside]
@@ -139,7 +139,7 @@ class Project:
         return ["", *(path for _, path in named_folders(root) if is_relative(path))]
 
     def _there(self, path: str, folders: list[str]) -> Iterator[str]:
-        """Yield the paths at which a file is, from the world's folder."""
+        """Yield the paths of existing files, relative to the world's folder."""
         if is_relative(path):
             for at in folders:
                 found = posixpath.normpath(posixpath.join(at, path))

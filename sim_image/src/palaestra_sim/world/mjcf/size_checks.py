@@ -1,6 +1,6 @@
-"""Elements that grow when MuJoCo reads them: copies, grids of points, and pictures.
+"""Checks for elements that grow when MuJoCo reads them: copies, grids of points, and images.
 
-MuJoCo allocates what they ask for, so a line of text can take all memory or minutes.
+MuJoCo allocates any size that they request, so one line of text can take all memory or minutes.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def growing(source: Source, root: Element) -> Iterator[WorldError]:
 
 
 def _size(element: Element) -> float:
-    """Return the product of the numbers that an element multiplies; 1 where MuJoCo refuses them."""
+    """Return the product of an element's size numbers; 1 without such numbers."""
     texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
     numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
     return math.prod(numbers)
