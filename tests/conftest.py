@@ -1,4 +1,4 @@
-"""How tests run: their order, threads, time in unit tests, what is skipped, and the format of the log."""
+"""The configuration of test runs: order, threads, time limits, skipped tests and log format."""
 
 import fcntl
 import gc
@@ -17,35 +17,39 @@ from xdist.scheduler import LoadFileScheduling
 from tests import skipped, surroundings
 from tests.control_plane.programs import REQUIRED, NoPrograms
 
-# Networks of this size learn faster on one thread than on several, which wait for each other; read by torch.
+# Networks of this size learn faster on one thread than on several that wait for each other; torch reads it.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# A property is not about time, and machines are noisy: --durations shows slow tests.
+# A property has no time limit, because machines are noisy; --durations shows slow tests.
 settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-# The same examples each time, as a random one must not fail an unrelated change; so a few are enough.
+# The examples are always the same, because a random one must not fail an unrelated change; a few are enough.
 settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True, max_examples=40)
 settings.load_profile("repeat")
-# Files that one worker runs one after another, by the beginnings of their paths.
+# Files that one worker runs one after another, by path prefix.
 TOGETHER = (
     ("tests/integration/chart/",),  # one control plane, with Prometheus' and Kueue's kinds
-    (  # with and without Kueue's kinds, on the control plane that all share
+    (  # with and without Kueue's kinds, on the shared control plane
         "tests/integration/operator/test_operator_queues.py",
         "tests/integration/operator/test_operator_refusals.py",
     ),
 )
-COMPILED = Path(__file__).parent / "__pycache__" / "compiled"  # marks that each test module was compiled
+COMPILED = Path(__file__).parent / "__pycache__" / "compiled"  # shows that each test module was compiled
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make tests independent of where they were started; a process that waits for workers stays as it is."""
+    """Make tests independent of the place where they were started.
+
+    A process that only waits for workers needs no change.
+    """
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
         surroundings.settle()
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_collection() -> Generator[None]:
-    """Let one worker compile tests and libraries on a new clone, and the others read what it wrote.
+    """Let one worker compile tests and libraries on a new clone, and the others read the result.
 
-    Else each of them compiles all, for a minute. What is imported stays, so no garbage is collected either.
+    Otherwise each of them compiles everything for a minute. Imported objects stay, so garbage collection is
+    off meanwhile.
     """
     with _compiled_by_one():
         gc.disable()
@@ -70,7 +74,7 @@ def _compiled_by_one() -> Iterator[None]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what was skipped, and how to run it, in a line or two instead of hundreds."""
+    """Print the skipped tests and the command to run them in a line or two instead of hundreds."""
     reports = terminalreporter.getreports("skipped")
     reasons = [report.longrepr[2].removeprefix("Skipped: ") for report in reports]
     if reasons:
@@ -81,7 +85,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling:
-    """Give each worker whole files, and one of them all files of a group."""
+    """Give each worker whole files, and all files of a group to one worker."""
     return _ByFile(config, log)
 
 
@@ -92,30 +96,30 @@ class _ByFile(LoadFileScheduling):
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes longest, so that no worker is left alone with it at the end."""
+    """Begin with the longest tests, so that no worker is left alone with one at the end."""
     items.sort(key=_minutes, reverse=True)
 
 
 def pytest_collection_finish() -> None:
-    """Let garbage collections pass over what is imported and collected by now: it stays, and it is much."""
+    """Exclude the imported and collected objects from garbage collection, because they are many and stay."""
     gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup() -> Generator[None]:
-    """Skip what needs programs of a cluster where they are not built: a fixture need not think of it."""
+    """Skip a test if its fixtures need programs of a cluster that are not built."""
     return (yield from _skipped_without_programs())
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Generator[None]:
-    """Skip it too where a test asks for them itself."""
+    """Skip it also if the test itself needs them."""
     return (yield from _skipped_without_programs())
 
 
 @pytest.fixture(autouse=True)
 def logs_as_before() -> Iterator[None]:
-    """Let no test read another's format of the log: programs that run in a test's process set it."""
+    """Reset the log format after each test, because programs in the process of a test change it."""
     before = structlog.get_config()
     yield
     structlog.configure(**before)

@@ -1,9 +1,9 @@
-"""Measure where the time of the tests goes, by program, folder, file and fixture.
+"""Measure the time of the tests by program, folder, file and fixture.
 
 `python -m tests.costs COMMAND…` runs a command and prints the processor seconds of each program that ran
 meanwhile. If the command is pytest with `-p tests.costs`, it also prints the seconds of each folder, file,
 fixture and test. Processes are sampled, so one that lives for less than the period is missing from the table;
-the last row is the difference to the kernel's own count.
+the last row is the difference from the kernel's own count.
 """
 
 import json
@@ -22,7 +22,7 @@ from typing import Any
 
 import pytest
 
-FOLDER = "PALAESTRA_COSTS"  # each pytest process writes a file here
+FOLDER = "PALAESTRA_COSTS"  # each pytest process writes a file there
 PERIOD_S = 0.25
 ROWS = 60
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -30,7 +30,7 @@ OPTION = re.compile(r"^-")
 Record = dict[str, Any]
 
 
-# What the plugin measures in each pytest process.
+# The measurements of the plugin in each pytest process.
 
 
 class Spent:
@@ -41,7 +41,7 @@ class Spent:
 
     @contextmanager
     def on(self, name: str) -> Iterator[None]:
-        """Add what the block spends to a name."""
+        """Add the time of the block to a name."""
         before = _clocks()
         yield
         row = self.rows[name]
@@ -54,14 +54,14 @@ folders, files, fixtures, tests = Spent(), Spent(), Spent(), Spent()
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None]:
-    """Measure collecting."""
+    """Measure the collection of tests."""
     with folders.on("(collection)"):
         return (yield)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None]:
-    """Measure a test with its set-up and its clean-up."""
+    """Measure a test with its setup and cleanup."""
     file = Path(item.location[0])
     with folders.on(file.parent.as_posix()), files.on(file.as_posix()), tests.on(item.nodeid):
         return (yield)
@@ -69,7 +69,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any]) -> Generator[None]:
-    """Measure the set-up of a fixture, without the fixtures that it requests."""
+    """Measure the setup of a fixture, without the fixtures that it requests."""
     with fixtures.on(f"{fixturedef.baseid}::{fixturedef.argname}"):
         return (yield)
 
@@ -91,7 +91,7 @@ def _clocks() -> tuple[float, float, float]:
     )
 
 
-# What the program measures around the command.
+# The measurements of the program around the command.
 
 
 class Sampler:
@@ -127,7 +127,7 @@ class Sampler:
 
 
 def _processes() -> Iterator[tuple[tuple[int, int], str, int]]:
-    """Yield pid and start, program and used ticks of every process that has a command line."""
+    """Yield pid and start time, program and used ticks of every process with a command line."""
     for entry in os.scandir("/proc"):
         if not entry.name.isdecimal():
             continue
@@ -141,7 +141,7 @@ def _processes() -> Iterator[tuple[tuple[int, int], str, int]]:
 
 
 def _program(command: list[str]) -> str:
-    """Return the name of a program: of the script or module that an interpreter runs."""
+    """Return the name of a program: for an interpreter, that of its script or module."""
     name, *arguments = command
     base = Path(name).name
     if not base.startswith("python"):

@@ -1,4 +1,4 @@
-"""Calls to the system that fail, as on machines that a test cannot have."""
+"""System calls that fail as on machines that a test cannot have."""
 
 import os
 from collections.abc import Callable

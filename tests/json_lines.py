@@ -1,4 +1,4 @@
-"""Files of JSON lines that somebody else writes meanwhile."""
+"""Files of JSON lines that another program is writing."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,6 @@ from typing import Any
 
 
 def whole_lines(path: Path, about: str = "") -> list[dict[str, Any]]:
-    """Return the content of the lines that have a text in them, without one that is being written."""
+    """Return the content of the lines that contain a text, without one that is still being written."""
     lines = path.read_bytes().splitlines(keepends=True)
     return [json.loads(line) for line in lines if line.endswith(b"\n") and about.encode() in line]

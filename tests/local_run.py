@@ -1,7 +1,7 @@
-"""`palaestra run` as a person types it, with what tests and measurements ask of it.
+"""`palaestra run` as a user types it, and functions to observe it for tests and measurements.
 
-Everything is real: ROS master, sidecars, stubs and trainer, each a process of this machine. Tests
-use only what a person could use: the run directory, `/status`, and the table of processes.
+Everything is real: ROS master, sidecars, stubs and trainer are processes of this machine. Tests use only what
+a user could use: the run directory, `/status`, and the table of processes.
 """
 
 import json
@@ -25,15 +25,15 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 240.0  # of runs that take seconds on an idle machine; below pytest's deadline
-REAPER = "reaper.py"  # its command line has that of the simulator in it
-GONE_S = 10.0  # for the kernel to end what was killed
-LOOK_EVERY_S = 0.05  # what is looked at, the run and all processes of the machine, costs processor time
+REAPER = "reaper.py"  # its command line contains that of the simulator
+GONE_S = 10.0  # for the kernel to end killed processes
+LOOK_EVERY_S = 0.05  # a poll reads the run and all processes of the machine, which costs processor time
 FAULT = re.compile(r"simulator fault .*kind=(\w+)")
 STATUS_ADDRESS = re.compile(r"^statusAddress: (\S+)$", re.MULTILINE)
 
 
 class LocalRun:
-    """One `palaestra run` of a job, and its directory; as a context it is ended with the block.
+    """One `palaestra run` of a job, and its directory; as a context it ends with the block.
 
     Attributes:
         directory: the run directory of the job's only replica.
@@ -50,17 +50,17 @@ class LocalRun:
         self._output = folder / "output.txt"
 
     def __enter__(self):
-        """Start it."""
+        """Start the run."""
         return self.start()
 
     def __exit__(self, *_):
-        """End it if it has not ended by itself."""
+        """End the run if it has not ended by itself."""
         self.stop()
 
     def start(self, *options):
-        """Start it, again if it has ended; its output is kept until the next start.
+        """Start the run, or start it again after its end; its output is kept until the next start.
 
-        It ends with the thread that starts it, however that ends.
+        It ends with the thread that starts it, however that thread ends.
         """
         command = ["setpriv", "--pdeathsig=TERM", PALAESTRA, "run", self.file, "--dir", self.runs, *options]
         with self._output.open("w") as output:
@@ -68,24 +68,24 @@ class LocalRun:
         return self
 
     def end(self, within_s=PATIENCE_S):
-        """Wait for its end; return exit code and output."""
+        """Wait for the end of the run, and return exit code and output."""
         return self.process.wait(within_s), self.output()
 
     def stop(self):
-        """Interrupt it as Ctrl-C does, and wait; nothing happens to one that has ended."""
+        """Interrupt the run as Ctrl-C does, and wait; a run that has ended stays as it is."""
         if self.process and self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
             self.process.wait(PATIENCE_S)
 
     def output(self):
-        """Return what it has printed."""
+        """Return the run's output so far."""
         return self._output.read_text()
 
     def until(self, claim, within_s=PATIENCE_S, look_every_s=LOOK_EVERY_S):
         """Return the first true value of `claim`.
 
         Raises:
-            AssertionError: there was none in time, or before the runner's end.
+            AssertionError: `claim` had no true value in time, or before the runner's end.
         """
         give_up = time.monotonic() + within_s
         while not (value := claim()):
@@ -97,7 +97,7 @@ class LocalRun:
         return value
 
     def status(self):
-        """Return what the trainer's /status says, None while nobody answers."""
+        """Return the trainer's /status, or None if it does not respond."""
         try:
             found = STATUS_ADDRESS.search((self.directory / "training.yaml").read_text())
             with urllib.request.urlopen(f"http://{found[1]}/status", timeout=5) as answer:
@@ -106,7 +106,7 @@ class LocalRun:
             return None
 
     def ask(self):
-        """Return what /status says, asking until it is answered."""
+        """Return the trainer's /status, as soon as it responds."""
         return self.until(self.status)
 
     def wait_for_step(self, step, within_s=PATIENCE_S):
@@ -123,16 +123,16 @@ class LocalRun:
         return yaml.safe_load((self.directory / "training.yaml").read_text())
 
     def summary(self):
-        """Return how the run ended."""
+        """Return the run's summary."""
         return json.loads((self.directory / "summary.json").read_text())
 
     def lines(self, name):
-        """Return the JSON lines of a file of the run directory, none while it is not there."""
+        """Return the JSON lines of a file in the run directory; none if the file does not exist."""
         path = self.directory / name
         return whole_lines(path) if path.exists() else []
 
     def attempts(self):
-        """Return why each attempt began, e.g. `resumed at step 400`."""
+        """Return the reason of each attempt, e.g. `resumed at step 400`."""
         return [line["reason"] for line in self.lines("attempts.jsonl")]
 
     def checkpoints(self):
@@ -148,20 +148,20 @@ class LocalRun:
         return path.read_text(errors="replace") if path.exists() else ""
 
     def faults(self):
-        """Return how many faults of each kind are in the trainer's log."""
+        """Return the number of faults of each kind in the trainer's log."""
         return dict(Counter(FAULT.findall(self.log())))
 
     def counters(self):
-        """Return what is counted over all attempts, by the newest checkpoint; empty without one."""
+        """Return the counters over all attempts, from the newest checkpoint; empty without one."""
         found = [json.loads((it / "manifest.json").read_text()) for it in self.checkpoints()[-1:]]
         return found[0]["counters"] if found else {}
 
     def processes(self):
-        """Return pid and words of the command line of everything below the runner."""
+        """Return process id and command line, as words, of every process below the runner."""
         return list(below(self.process.pid))
 
     def pids(self, program, simulator=""):
-        """Return the processes of a program, of those that serve one simulator if it is named."""
+        """Return the processes of a program, or only those of a given simulator."""
         return [
             pid
             for pid, words in self.processes()
@@ -171,27 +171,27 @@ class LocalRun:
         ]
 
     def pid_of(self, program, simulator=""):
-        """Return the one process of a program, that serves one simulator if it is named.
+        """Return the only process of a program, or the only one of a given simulator.
 
-        A simulator that is recycled just now is waited for.
+        A simulator that is being recycled is waited for.
         """
         (pid,) = self.until(lambda: self.pids(program, simulator))
         return pid
 
     def trainer(self):
-        """Return the trainer's process, waiting until there is one."""
+        """Return the trainer's process as soon as it exists."""
         return self.until(lambda: self.pids("palaestra-train"))[0]
 
 
 @contextmanager
 def running(job):
-    """Yield a run of a job, started in a folder of its own, which is taken away with it."""
+    """Yield a run of a job, started in a temporary folder."""
     with tempfile.TemporaryDirectory() as folder, LocalRun(Path(folder), job) as run:
         yield run
 
 
 def below(ancestor):
-    """Yield pid and words of the command line of every process below `ancestor`."""
+    """Yield process id and command line, as words, of every process below `ancestor`."""
     table = {}
     for directory in Path("/proc").glob("[0-9]*"):
         try:
@@ -207,7 +207,7 @@ def below(ancestor):
 
 
 def is_running(pid):
-    """Return whether a process is there and no zombie."""
+    """Return whether a process exists and is not a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (OSError, IndexError):
@@ -223,7 +223,7 @@ def left_of(pids):
 
 
 def send(pid, number):
-    """Send a signal to a process, which may have ended by now; return whether it was there."""
+    """Send a signal to a process, which may have ended, and return whether it existed."""
     try:
         os.kill(pid, number)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""docs/reference/metrics.md as a reader has it, and /metrics as Prometheus has it."""
+"""The metrics in docs/reference/metrics.md as a reader sees them, and /metrics as Prometheus sees it."""
 
 import re
 import subprocess
@@ -21,7 +21,7 @@ def served(text):
 
 
 def complaints(text):
-    """Return what `promtool check metrics` has to say of the text of /metrics; "": nothing."""
+    """Return the complaints of `promtool check metrics` about the text of /metrics, or ""."""
     promtool = programs(("promtool",)) / "promtool"
     done = subprocess.run(
         [promtool, "check", "metrics"], input=text, capture_output=True, text=True, timeout=60, check=False

@@ -1,4 +1,4 @@
-"""The fenced blocks of a page of the documentation, which tests carry out as they stand."""
+"""The fenced blocks of a page of the documentation, which tests run as written."""
 
 import re
 
@@ -6,18 +6,18 @@ FENCED = re.compile(r"^```([^\n]+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def fenced(page: str) -> list[tuple[str, str]]:
-    """Return every block of a page, as what stands behind its fence, e.g. `sh`, and its lines."""
+    """Return every block of a page, as the text after its fence, e.g. `sh`, and its lines."""
     return FENCED.findall(page)
 
 
 def chapters(page: str) -> list[tuple[str, str]]:
-    """Return heading and text of every chapter of a page, down to the next heading of its level."""
+    """Return heading and text of every chapter of a page, up to the next heading of the same level."""
     _, *found = re.split(r"^## ", page, flags=re.MULTILINE)
     return [(heading, text) for heading, _, text in (each.partition("\n") for each in found)]
 
 
 def blocks(page: str, kind: str) -> list[str]:
-    """Return the blocks behind whose fence `kind` stands and nothing else."""
+    """Return the blocks whose fence has exactly the text `kind`."""
     return [text for found, text in fenced(page) if found == kind]
 
 

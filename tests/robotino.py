@@ -1,4 +1,4 @@
-"""The Robotino 3 in closed form, as its sample controller has it.
+"""The kinematics of the Robotino 3 in closed form, as in its sample controller.
 
 Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. Wheel 0 is at the rear, 1 front
 right, and 2 front left.

@@ -1,4 +1,4 @@
-"""ROS messages with everything that a definition may hold, and values of any message, for hypothesis."""
+"""ROS messages with every kind of field, and values of any message, for hypothesis."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""What a run of the tests has skipped, in few lines: how many, and the command that runs them."""
+"""The skipped tests of a run in few lines: how many they are, and the command that makes them run."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -10,7 +10,7 @@ BUILDING = "builds them once, in 15 to 30 minutes"
 
 
 def lines(reasons: Iterable[str]) -> Iterator[str]:
-    """Yield a line for all tests that lack programs of a cluster, and one for each other reason."""
+    """Yield one line for all tests without their cluster programs, and one for each other reason."""
     counts = Counter(reasons)
     programs = {
         reason: words.split() for reason in counts for words in [reason.partition(f"{BUILD} ")[2]] if words

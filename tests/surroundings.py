@@ -1,6 +1,6 @@
-"""What tests give the programs that they start, wherever the tests themselves were started.
+"""The same surroundings for all programs that tests start, however the tests themselves were started.
 
-A shell starts a command in the background of a script with SIGINT ignored, nohup ignores SIGHUP, and a person
+A shell starts a command in the background of a script with SIGINT ignored, nohup ignores SIGHUP, and a user
 may have any locale, time zone, umask and limit of open files. Programs inherit all of these.
 """
 
@@ -12,7 +12,7 @@ LOCALE = "C.UTF-8"
 TIME_ZONE = "UTC"
 UMASK = 0o022
 OPEN_FILES = 1024
-# What changes the output of a program, or where it keeps things.
+# These variables change the output of a program, or where it keeps its files.
 UNSET = (
     "COLUMNS", "FORCE_COLOR", "LANGUAGE", "LINES", "MAKEFLAGS", "MAKELEVEL", "MFLAGS", "NO_COLOR",
     "PYTHONDONTWRITEBYTECODE", "ROS_HOSTNAME", "ROS_IP", "ROS_MASTER_URI", "ROS_NAMESPACE", "ROS_LOG_DIR",
@@ -20,7 +20,7 @@ UNSET = (
 
 
 def settle() -> None:
-    """Give this process and all that it starts the same signals, locale, time zone, umask and open files."""
+    """Set the same signals, locale, time zone, umask and limit of open files for all programs."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     for name in UNSET:

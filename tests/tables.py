@@ -1,4 +1,4 @@
-"""One test for all rows of a table, where each of hundreds of tests would have its own set-up."""
+"""One test for all rows of a table, where hundreds of tests would each need their own set-up."""
 
 import functools
 import inspect
@@ -9,7 +9,8 @@ from typing import Any
 def for_each(names: str, rows: Callable[[], Iterable[Any]] | Iterable[Any]) -> Callable[..., Any]:
     """Call a test for each row, as `pytest.mark.parametrize` does, but as one test with one set-up.
 
-    All rows are tried; the error has those that fail. Rows share their fixtures, so none may change them.
+    All rows are tested, and the error contains those that fail. Rows share their fixtures, so no row may
+    change them.
 
     Args:
         names: of the row's parameters, separated by commas.

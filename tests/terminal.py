@@ -1,4 +1,4 @@
-"""A person's terminal: shell commands of a page of the documentation, typed as they stand."""
+"""A user's terminal: shell commands from a page of the documentation, typed as written."""
 
 import os
 import signal
@@ -11,9 +11,9 @@ class Terminal:
     """A shell in `folder`, with the rest of the environment as here.
 
     Args:
-        folder: where commands are typed; its HOME too.
+        folder: where commands are typed; also its HOME.
         path: a folder whose programs come first.
-        before: commands that each shell begins with.
+        before: commands at the beginning of each shell.
         environment: more variables.
     """
 
@@ -25,7 +25,7 @@ class Terminal:
             self._environment["PATH"] = f"{path}:{os.environ['PATH']}"
 
     def try_(self, text: str, within_s: float) -> tuple[int, str]:
-        """Type commands, up to the first that fails; return the exit code and all that they print.
+        """Type commands up to the first one that fails, and return the exit code and all output.
 
         Raises:
             subprocess.TimeoutExpired: they took longer than `within_s`, and were killed.
@@ -41,13 +41,13 @@ class Terminal:
         ) as shell:
             try:
                 printed, _ = shell.communicate(timeout=within_s)
-            finally:  # a program that takes too long would go on without its shell
+            finally:  # otherwise a program that takes too long would continue without its shell
                 with suppress(ProcessLookupError):
                     os.killpg(shell.pid, signal.SIGKILL)
         return shell.returncode, printed
 
     def type_in(self, text: str, within_s: float) -> str:
-        """Type commands, which must succeed; return all that they print."""
+        """Type commands, which must succeed, and return all output."""
         code, printed = self.try_(text, within_s)
         assert code == 0, f"{text}\n{printed}"
         return printed

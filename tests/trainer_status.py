@@ -1,4 +1,4 @@
-"""A trainer's /status at an address of the loopback, for operators under test that ask pods."""
+"""A trainer's /status at a loopback address, for operators under test that request the status of pods."""
 
 import http.server
 import json
@@ -14,18 +14,21 @@ HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: application/json\r\n"
 
 
 class StatusServer:
-    """Serves from now on, on a trainer's port, until it is closed.
+    """A server on a trainer's port, which runs until it is closed.
 
     Attributes:
         host: its address.
     """
 
     def __init__(self, answer: Callable[[BinaryIO], object]) -> None:
-        """Give each question to `answer`, which writes head and body, in a thread of its own."""
+        """Start the server.
+
+        For each request it calls `answer` in a separate thread, which writes head and body.
+        """
 
         class Handler(http.server.BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                with suppress(OSError):  # an operator hangs up when it has enough
+                with suppress(OSError):  # an operator disconnects when it has enough
                     answer(self.wfile)
 
             def log_message(self, *_: object) -> None:
@@ -37,7 +40,7 @@ class StatusServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Serve no longer."""
+        """Stop the server."""
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
@@ -45,7 +48,7 @@ class StatusServer:
 
 @contextmanager
 def serving(status: Callable[[], TrainerStatus]) -> Iterator[str]:
-    """Answer each question with what `status` returns; yields the address."""
+    """Serve the result of `status` for each request, and yield the address."""
     server = StatusServer(lambda out: out.write(b"".join(answer(status()))))
     try:
         yield server.host
@@ -54,7 +57,7 @@ def serving(status: Callable[[], TrainerStatus]) -> Iterator[str]:
 
 
 def answer(status: TrainerStatus) -> tuple[bytes, bytes]:
-    """Return head and body of a trainer's answer."""
+    """Return head and body of a trainer's response."""
     body = json.dumps(status.to_json()).encode()
     return HEAD + b"Content-Length: %d\r\n\r\n" % len(body), body
 
@@ -63,6 +66,6 @@ def _at_a_free_address(
     handler: type[http.server.BaseHTTPRequestHandler],
 ) -> http.server.ThreadingHTTPServer:
     for last in range(1, 255):
-        with suppress(OSError):  # somebody else tests here, too
+        with suppress(OSError):  # somebody else's tests may use the address
             return http.server.ThreadingHTTPServer((f"127.90.90.{last}", STATUS_PORT), handler)
     raise AssertionError(f"port {STATUS_PORT} is taken at every address")

@@ -1,11 +1,11 @@
-"""Waiting for what tells nobody that it has come."""
+"""Waiting for a condition by polling."""
 
 import time
 from collections.abc import Callable
 from typing import Any
 
 DEADLINE_S = 30.0
-PACE_S = 0.05  # an API server that is polled must have time for its work
+PACE_S = 0.05  # leave a polled API server time for its work
 
 
 class TooLate(AssertionError):
@@ -13,10 +13,10 @@ class TooLate(AssertionError):
 
 
 def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S, pace_s: float = PACE_S) -> Any:
-    """Return the first true thing that `seen` returns, asked every `pace_s`.
+    """Return the first true value of `seen`, which is called every `pace_s`.
 
     Raises:
-        TooLate: there was none within `deadline_s`.
+        TooLate: `seen` returned no true value within `deadline_s`.
     """
     ends = time.monotonic() + deadline_s
     while not (found := seen()):

@@ -1,8 +1,8 @@
-"""`make bench`: measure what the project promises, and print it as JSON.
+"""`make bench`: measure the promised figures and print them as JSON.
 
-Every figure is a ratio within one run, or stands beside what it is compared with: machines are noisy.
-Names as arguments choose parts, e.g. `python -m tests.bench stepping parallel`; `--scale 0.1` does a tenth of
-what a part does, to see that the part itself works.
+Machines are noisy, so every figure is a ratio within one run, or is printed with the figure that it is
+compared with. Names as arguments select parts, e.g. `python -m tests.bench stepping parallel`. `--scale 0.1`
+does a tenth of each part, to test the part itself.
 """
 
 import argparse
@@ -44,7 +44,7 @@ PARTS = {
 
 
 def main():
-    """Print one JSON object a line: part, seconds it took, what it found."""
+    """Print one JSON object per line: the part, its duration in seconds, and its figures."""
     parser = argparse.ArgumentParser(prog="tests.bench", description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
     parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")

@@ -1,4 +1,4 @@
-"""Policies of one simulator in the other, and policies that see: what MuJoCo changes for learning."""
+"""Policies of one simulator in the other, and policies with cameras: the effect of MuJoCo on learning."""
 
 import shutil
 import tempfile
@@ -13,9 +13,9 @@ CYLINDER_STEPS = 300_000
 
 
 def measure_transfer(scale=1.0):
-    """Return the success of move-to-target's policies at home and in the other simulator, same episodes.
+    """Return the success of move-to-target's policies in both simulators, on the same episodes.
 
-    Below full scale, of the policy of MuJoCo alone.
+    Below full scale, only the policy of MuJoCo is measured.
     """
     homes = list(HOMES.items())[: scaled(len(HOMES), scale)]
     with tempfile.TemporaryDirectory() as folder:
@@ -28,7 +28,7 @@ def measure_transfer(scale=1.0):
 
 
 def measure_seeing(scale=1.0):
-    """Return the success of policies that see: on an empty floor, and among cylinders by 1 and 3 frames."""
+    """Return the success of camera policies on an empty floor, and among cylinders with 1 and 3 frames."""
     variants = {
         "empty": {},
         "cylinders_1_frame": {"cylinders": True, "frames": 1},
@@ -49,7 +49,7 @@ def moved(run, home, place):
 
 
 def _see(scale, **options):
-    """Return the success of see-target's policy; with options, after more steps than without."""
+    """Return the success of see-target's policy; with options, it trains for more steps."""
     job = example("see-target")
     trainer = job["spec"]["trainer"]
     trainer["environment"]["options"].update(options)

@@ -1,4 +1,4 @@
-"""A stub of the shipped arena with its facades, for the measurements."""
+"""A stub of the built-in arena with its facades, for the measurements."""
 
 from contextlib import contextmanager
 

@@ -1,4 +1,4 @@
-"""Many jobs at once: as bare Jobs, as the four objects of a plan, and as TrainingJobs."""
+"""Many jobs at once, as bare Jobs, as the four objects of a plan, and as TrainingJobs."""
 
 import json
 import time
@@ -36,7 +36,7 @@ def create_training_jobs(api, namespace, count):
 
 
 def create_all_objects(api, namespace, count):
-    """Create what the operator creates for as many jobs: four objects each, several jobs at a time."""
+    """Create what the operator creates for that many jobs: four objects each, several jobs at a time."""
     template = planned(namespace)
 
     def create(name):
@@ -47,14 +47,17 @@ def create_all_objects(api, namespace, count):
 
 
 def create_bare_jobs(api, namespace, count):
-    """Create nothing but the Jobs; pods that mount what is not there are made all the same."""
-    template = planned(namespace)[-1:]  # a Job comes last, after what its pods mount
+    """Create only the Jobs; their pods are made although the objects that they mount are missing."""
+    template = planned(namespace)[-1:]  # the Job is last, after the objects that its pods mount
     jobs = [obj for name in names(count) for obj in renamed(template, name)]
     in_parallel(lambda job: api.create(JOBS, job), jobs)
 
 
 def planned(namespace):
-    """Return the objects of one TrainingJob as text, without owner and labels: no operator looks at them."""
+    """Return the objects of one TrainingJob as text.
+
+    They have no owner and labels, so operators ignore them.
+    """
     uid = "00000000-0000-0000-0000-000000000000"
     job = identified(validate(training_job(TEMPLATE, namespace)), uid)
     images = Images(trainer="trainer:bench", stub="stub:bench", mujoco="mujoco:bench", webots="webots:bench")
@@ -81,25 +84,25 @@ def in_parallel(do, items):
 
 
 def wait_for_account(api, namespace):
-    """Return when a new namespace lets pods in: once its account is there."""
+    """Return when a new namespace has its service account, without which it accepts no pods."""
     wait_for_count(api, ACCOUNTS, namespace, 1)
 
 
 def wait_for_count(api, resource, namespace, count):
-    """Return when so many objects of a kind are there.
+    """Return when a kind has so many objects.
 
     Raises:
-        TooLate: they are not within twenty minutes.
+        TooLate: this takes more than twenty minutes.
     """
     eventually(lambda: len(api.list(resource.only_metadata(), namespace)) >= count, DEADLINE_S, LOOK_EVERY_S)
 
 
 def wait_for_silence(plane):
-    """Return when the operator has asked for nothing during ten seconds, but by watches and the Lease."""
+    """Return after ten seconds in which the operator sent only watches and requests for the Lease."""
 
     def silent():
         before = sum(each.counts for each in asked(plane))
-        time.sleep(SILENCE_S)  # silence is what is waited for
+        time.sleep(SILENCE_S)  # the test waits for a period without requests
         return sum(each.counts for each in asked(plane)) == before
 
     eventually(silent, DEADLINE_S)

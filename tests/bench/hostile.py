@@ -1,7 +1,7 @@
-"""Jobs whose worlds cost much to check, and how long another tenant's job waits beside them.
+"""Jobs whose worlds are costly to check, and the waiting time of another tenant's job meanwhile.
 
-The operator is a separate process with the rights of an installation; the control plane is real and has no
-nodes. The memory is that of the operator and of the processes in which it checks worlds, together.
+The operator is a separate process with the permissions of an installation; the control plane is real and has
+no nodes. The memory is that of the operator together with the processes in which it checks worlds.
 """
 
 import math
@@ -22,18 +22,18 @@ from tests.integration.operator.installed import operator, wait_for
 ROOT = Path(__file__).parents[2]
 HOSTILE, OTHERS = 32, 5
 TENANTS = ("hostile-1", "hostile-2")  # as many as there are checks at a time
-MOST_BYTES = 899_900  # of the worlds of a job; more are refused
-MOST_BYTES_OF_ONE = 200_000  # of an inline world
-LARGE_BYTES = 150_000  # of a world that has to be checked apart, too
+MOST_BYTES = 899_900  # of a job's worlds together; more are refused
+MOST_BYTES_OF_ONE = 200_000  # of one inline world
+LARGE_BYTES = 150_000  # of a world that is also checked in a separate process
 PERIOD_S = 0.1
 DEADLINE_S = 600
 HEADER = b"#VRML_SIM R2023b utf8\n"
 ROBOT = b'Robot{controller "ros"}'
-NODE = b"A{a 0}"  # of all nodes, those that cost most memory for each byte
+NODE = b"A{a 0}"  # the node that costs most memory per byte
 
 
 def measure(scale=1.0):
-    """Return how long another tenant's jobs take to be planned, alone and beside hostile ones, and memory."""
+    """Return the time to plan another tenant's jobs, alone and together with hostile ones, and the memory."""
     count, others = scaled(HOSTILE, scale), scaled(OTHERS, scale)
     with tempfile.TemporaryDirectory(prefix="palaestra-hostile-") as name, running(Path(name)) as plane:
         api = _installed(plane)
@@ -65,13 +65,13 @@ def measure(scale=1.0):
 
 
 def costly(size, number=0):
-    """Return a world of a size that costs as much as any; `number` makes it another one."""
+    """Return a world of a size with the highest possible cost; `number` makes it unique."""
     first = HEADER + b"# %d\n" % number + ROBOT
     return first + NODE * ((size - len(first)) // len(NODE))
 
 
 def with_world(size, number=0):
-    """Return the fields of a job with such worlds, of a size together; no two worlds are equal."""
+    """Return the fields of a job with such worlds, of a total size; no two worlds are equal."""
     groups = math.ceil(size / MOST_BYTES_OF_ONE)
     worlds = [costly(size // groups, 100 * number + place).decode() for place in range(groups)]
     return {
@@ -84,7 +84,7 @@ def with_world(size, number=0):
 
 
 class _Watching:
-    """Samples the memory and the probe of an operator while a block runs."""
+    """Samples the operator's memory and its probe during a block."""
 
     def __init__(self, running_operator):
         self._operator = running_operator
@@ -110,7 +110,7 @@ class _Watching:
 
 
 def _rss_mib(pid):
-    """Return the resident memory of a process and of its children."""
+    """Return the resident memory of a process and its children."""
     children = [each for path in Path(f"/proc/{pid}/task").glob("*/children") for each in _read(path).split()]
     lines = [line for each in (pid, *children) for line in _read(Path(f"/proc/{each}/status")).splitlines()]
     return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024
@@ -149,7 +149,7 @@ def _installed(plane):
 
 
 def _create_hostile(api, number):
-    """Create a job with worlds of the largest size: every other one has a single world, in a ConfigMap."""
+    """Create a job with worlds of the largest size; every second job has a single world, in a ConfigMap."""
     name, namespace = f"job-{number}", TENANTS[number // 2 % len(TENANTS)]
     if number % 2:
         return _create(api, namespace, name, with_world(MOST_BYTES, number))
@@ -171,7 +171,7 @@ def _create(api, namespace, name, spec):
 
 
 def _planned(api):
-    """Return how many hostile jobs have their batch/v1 Job."""
+    """Return the number of hostile jobs that have their batch/v1 Job."""
     return sum(len(_names(api, namespace)) for namespace in TENANTS)
 
 

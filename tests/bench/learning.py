@@ -1,4 +1,4 @@
-"""What the examples learn, by training seed, measured on episodes that nothing was chosen on."""
+"""The success of the examples' policies by training seed, on episodes by which no policy was chosen."""
 
 import json
 import subprocess
@@ -27,7 +27,7 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure(scale=1.0):
-    """Return what move-to-target and navigate learn, by seed, and two policies that learn nothing."""
+    """Return the success of both tasks by seed, and that of two policies without training."""
     trained = by_seed("move-to-target", SEEDS, scale)
     navigating = by_seed("navigate", NAVIGATE_SEEDS, scale)
     return {
@@ -40,13 +40,16 @@ def measure(scale=1.0):
 
 
 def measure_sparse(scale=1.0):
-    """Return what sparse-reward learns with each training seed."""
+    """Return the success of sparse-reward for each training seed."""
     trained = by_seed("sparse-reward", SPARSE_SEEDS, scale)
     return {"success": trained, "seeds_at_50": sum(rate >= 0.5 for rate in trained.values())}
 
 
 def by_seed(name, seeds, scale):
-    """Return the success rate of an example's policy by training seed; of the first ones below full scale."""
+    """Return the success rate of an example's policy by training seed.
+
+    Below full scale, of the first seeds.
+    """
     return {str(seed): train_and_measure(name, seed, scale) for seed in seeds[: scaled(len(seeds), scale)]}
 
 
@@ -59,7 +62,7 @@ def train_and_measure(name, seed, scale=1.0):
 
 
 def shortened(job, scale):
-    """Return a job with a share of its steps; below full scale it evaluates at its end only."""
+    """Return a job with a share of its steps; below full scale it evaluates only at its end."""
     if scale < 1:
         trainer = job["spec"]["trainer"]
         trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
@@ -89,7 +92,7 @@ def success_rate(run, episodes=EPISODES):
 
 
 def measure_baselines(scale=1.0):
-    """Return the success rates of chance and of driving straight at the target, on such episodes."""
+    """Return the success rates of random driving and of driving straight to the target, on such episodes."""
     with running() as (robot, scene, _):
         env = make(robot, scene, movements=MOVEMENTS)
         seeds = list(episode_seeds(SEEDS[0], STREAM, scaled(EPISODES, scale)))

@@ -1,4 +1,4 @@
-"""A newcomer's first minutes: from a clone to the trained policy, with nothing cached."""
+"""A new user's first minutes: from a clone to the trained policy, with nothing cached."""
 
 import os
 import subprocess
@@ -11,9 +11,10 @@ CACHES = {"PALAESTRA_CACHE", "PIP_CACHE_DIR", "UV_CACHE_DIR", "VIRTUAL_ENV", "XD
 
 
 def measure(scale=1.0):
-    """Return the seconds that installing takes, and the whole until `make run` has ended.
+    """Return the seconds of the installation, and of everything up to the end of `make run`.
 
-    At scale 0, it only shows that the clone's verbs can be typed: to install takes minutes.
+    At scale 0, the test only shows that the clone's commands can be run, because an installation takes
+    minutes.
     """
     install, train = ("setup", "run") if scale else ("help", "help")
     with tempfile.TemporaryDirectory() as folder:
@@ -29,7 +30,7 @@ def measure(scale=1.0):
 
 
 def make(verb, clone, home):
-    """Have a verb of the clone's Makefile carried out, as if this machine had nothing of it yet."""
+    """Run a make target of the clone as on a machine without caches."""
     kept = {name: value for name, value in os.environ.items() if name not in CACHES}
     subprocess.run(
         ["make", verb], cwd=clone, env={**kept, "HOME": home}, check=True, stdout=subprocess.DEVNULL

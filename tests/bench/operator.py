@@ -1,7 +1,7 @@
-"""What the operator costs: time and processor for a crowd of jobs, requests for one job, memory, silence.
+"""The costs of the operator: time and processor for many jobs, requests for one job, memory, idle requests.
 
-The control plane has no nodes, so nothing but the API server, the Job controller and the operator runs.
-A client that creates the same objects is measured beside the operator, on the same control plane.
+The control plane has no nodes, so only the API server, the Job controller and the operator run. A client that
+creates the same objects is measured on the same control plane.
 """
 
 import os
@@ -19,13 +19,13 @@ from tests.integration.operator.installed import asked, operator
 
 ROOT = Path(__file__).parents[2]
 JOBS = 1000
-FAST = 500  # requests a second of each controller; Kubernetes' own default is 20
+FAST = 500  # requests per second of each controller; the default of Kubernetes is 20
 QUIET_S = 30
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
 def measure(scale=1.0):
-    """Return the figures of a crowd at both speeds of the Job controller, of one job, and of memory."""
+    """Return the figures of many jobs at both speeds of the Job controller, of one job, and of memory."""
     return {
         "jobs": scaled(JOBS, scale),
         "default_rate": measure_crowd(None, scale),
@@ -36,13 +36,16 @@ def measure(scale=1.0):
 
 
 def measure_crowd(requests_per_s, scale):
-    """Return the figures of a crowd on a control plane of its own."""
+    """Return the figures of many jobs on a separate control plane."""
     with cluster(requests_per_s) as (plane, api, folder):
         return figures_of_a_crowd(plane, api, folder, scaled(JOBS, scale), QUIET_S)
 
 
 def figures_of_a_crowd(plane, api, folder, count, quiet_s):
-    """Return seconds until so many pods exist: of bare Jobs, of a client, of the operator; and its cost."""
+    """Return the seconds until that many pods exist.
+
+    They are measured for bare Jobs, for a client and for the operator, with its cost.
+    """
     bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs, count)
     client_s = seconds_to_pods(api, "client", crowd.create_all_objects, count)
     with operator(plane, folder / "operator.log") as running_operator:
@@ -65,7 +68,7 @@ def figures_of_a_crowd(plane, api, folder, count, quiet_s):
 
 
 def measure_one_job():
-    """Return what one job that trains ten seconds asks of the API server, from creation to its end."""
+    """Return the requests to the API server for one job that trains for ten seconds, from creation to end."""
     with cluster(None) as (plane, api, folder), operator(plane, folder / "operator.log"):
         crowd.wait_for_silence(plane)
         return single.requests_of_one_job(plane, api)
@@ -73,7 +76,7 @@ def measure_one_job():
 
 @contextmanager
 def cluster(requests_per_s):
-    """Run a control plane with Palaestra installed; yields it, an administrator's client and a folder."""
+    """Run a control plane with Palaestra installed; yield it, an administrator's client and a folder."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "plane").mkdir()
@@ -98,16 +101,16 @@ def seconds_to_pods(api, namespace, create, count):
 
 
 def cpu_seconds(installed):
-    """Return the processor time that an operator has spent so far."""
+    """Return the processor time that an operator has used so far."""
     fields = Path(f"/proc/{installed.process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS_A_SECOND
 
 
 def requests(plane):
-    """Return how many requests operators have sent, but for watches and the Lease."""
+    """Return the number of requests that operators have sent, except watches and those for the Lease."""
     return sum(each.counts for each in asked(plane))
 
 
 def mib(count):
-    """Return bytes in MiB."""
+    """Return bytes as MiB."""
     return round(count / 1024**2, 1)

@@ -1,7 +1,7 @@
-"""The operator's memory: at rest, beside large jobs, beside many.
+"""The operator's memory: idle, with large jobs, and with many.
 
-The operator is a separate process, as in a pod, with the rights of an installation and the environment of its
-image. The control plane is real and has no nodes: pods stay pending, and nothing else happens.
+The operator is a separate process, as in a pod, with the permissions of an installation and the environment
+of its image. The control plane is real and has no nodes: pods stay Pending, and nothing else happens.
 """
 
 import re
@@ -23,14 +23,14 @@ from tests.integration.operator.installed import asked, operator, wait_for
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "crowd"
 LARGE, PLANNED, FINISHED = 400, 1_000, 10_000
-GROUPS, CHARACTERS = 5, 180_000  # of inline worlds: 900,000, as many as an API server takes
+GROUPS, CHARACTERS = 5, 180_000  # of inline worlds: 900,000, the most that an API server accepts
 SETTLED_S, SETTLES_S = 5, 1200
 MIB = 1 << 20
 THEN = "2026-01-01T00:00:00Z"
 
 
 def measure(scale=1.0):
-    """Return resident memory in MiB: now where it says `rss`, the most of the process' life where `peak`."""
+    """Return resident memory in MiB: `rss` is the current value, and `peak` the largest so far."""
     refused, planned_jobs, ended = (scaled(count, scale) for count in (LARGE, PLANNED, FINISHED))
     with crowd("large") as (plane, api):
         idle = started(plane)
@@ -64,17 +64,17 @@ def crowd(name):
 
 
 def started(plane):
-    """Start an operator beside what there is, and return its memory once it has come to rest."""
+    """Start an operator with the existing objects, and return its memory when it is idle."""
     began = time.monotonic()
     with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
         settle(plane, running_operator)
         found = memory(running_operator.process.pid) | {"seconds": round(time.monotonic() - began)}
-        running_operator.end()  # gives the Lease back, so that the next one leads at once
+        running_operator.end()  # releases the Lease, so that the next one leads at once
     return found
 
 
 def beside_planned(plane, api, count):
-    """Return the memory of an operator that saw jobs come and planned them, and of one that came later."""
+    """Return the memory of an operator that planned jobs as they came, and of one that started later."""
     with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
         create(api, (small_job(number) for number in range(count)))
         wait_for(lambda: jobs(api) == count, SETTLES_S, lambda: jobs(api))
@@ -85,12 +85,12 @@ def beside_planned(plane, api, count):
 
 
 def jobs(api):
-    """Return how many batch/v1 Jobs there are."""
+    """Return the number of batch/v1 Jobs."""
     return len(api.list(JOBS.only_metadata(), NAMESPACE))
 
 
 def settle(plane, running_operator):
-    """Return once an operator leads, and asked for nothing but watches and the Lease for some seconds."""
+    """Return when an operator leads and has sent only watches and Lease requests for some seconds."""
 
     def leads():
         with urllib.request.urlopen(
@@ -108,7 +108,7 @@ def settle(plane, running_operator):
 
 
 def memory(pid):
-    """Return the resident memory of a process in MiB, now and at most."""
+    """Return the current and the largest resident memory of a process, in MiB."""
     text = Path(f"/proc/{pid}/status").read_text()
     found = {name: int(kib) / 1024 for name, kib in re.findall(r"(VmRSS|VmHWM):\s+(\d+) kB", text)}
     return {"rss_mib": round(found["VmRSS"], 1), "peak_mib": round(found["VmHWM"], 1)}
@@ -138,7 +138,10 @@ def small_job(number):
 
 
 def large_job(number):
-    """Return a TrainingJob whose worlds are as large as an API server takes, and none of them a world."""
+    """Return a TrainingJob with inline worlds of the largest size that an API server accepts.
+
+    None is valid.
+    """
     groups = [
         {
             "name": f"g{place}",
@@ -158,7 +161,8 @@ def finished_status():
         for kind in ("Accepted", "Succeeded")
     ]
     images = {
-        name: f"registry.example.com/robots/palaestra-{name}:0.1.0" for name in ("trainer", "stub", "webots")
+        name: f"registry.example.com/robots/palaestra-{name}:0.1.0"
+        for name in ("trainer", "stub", "mujoco", "webots")
     }
     log = [f"2026-01-01T00:00:{line:02d}Z line {line} of what the trainer wrote last" for line in range(10)]
     replica = {

@@ -1,4 +1,4 @@
-"""The operator's time for a plan: a large job, whose worlds are checked once and shipped once a group."""
+"""The operator's time for a plan of a large job, whose worlds are checked once and stored once per group."""
 
 import json
 import time
@@ -9,7 +9,7 @@ from palaestra_sim.world import builtin, check
 from tests.bench.sizes import scaled
 
 REPLICAS = 30
-SIMULATORS = 17  # of a replica: 16 that collect, one that evaluates
+SIMULATORS = 17  # of a replica: 16 collect, and one evaluates
 WORLD_BYTES = 45_000
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 POST = """DEF POST_{0} Solid {{
@@ -34,7 +34,7 @@ POST = """DEF POST_{0} Solid {{
 
 
 def measure(scale=1.0):
-    """Return processor seconds: to plan all replicas, to plan one, and to check the world once."""
+    """Return the processor seconds to plan all replicas, to plan one, and to check the world once."""
     text = world()
     replicas = scaled(REPLICAS, scale)
     job = identified(validate(request(text, replicas)), UID)
@@ -46,13 +46,13 @@ def measure(scale=1.0):
         "world_kb": round(len(text) / 1000),
         "config_map_kb": round(len(json.dumps(planned.replicas[0].config_map)) / 1000),
         "seconds_for_all": cpu_s(lambda: plan(job, layout)),
-        "seconds_for_one": cpu_s(lambda: plan(job, layout, mounted={0: ()})),
+        "seconds_for_one": cpu_s(lambda: plan(job, layout, replicas=[0])),
         "seconds_for_the_check": cpu_s(lambda: check(text.encode())),
     }
 
 
 def world():
-    """Return the arena with as many posts as make it large."""
+    """Return the arena with so many posts that it is large."""
     text = builtin("arena").decode()
     posts = (WORLD_BYTES - len(text)) // len(POST.format(10)) + 1
     return text + "".join(POST.format(number) for number in range(posts))
@@ -74,7 +74,7 @@ def request(text, replicas):
 
 
 def cpu_s(work, rounds=3):
-    """Return the processor seconds of some work, the least of several rounds."""
+    """Return the processor seconds of some work, the minimum of several rounds."""
     return round(min(one_round_s(work) for _ in range(rounds)), 3)
 
 

@@ -1,4 +1,4 @@
-"""Simulators step at the same time: four that sleep 3 ms a step against one, round by round."""
+"""Simulators step at the same time: four that sleep 3 ms a step are compared with one, round by round."""
 
 import itertools
 import statistics
@@ -18,13 +18,13 @@ from tests.bench.stepping import rate
 ROUNDS = 15
 STEPS = 200
 SLEEP_MS = 3
-# Every wheel turns the other way at every step, so that none of its commands can be spared.
+# Every wheel changes direction at every step, so that every command has to be sent.
 MOVEMENTS = ("TURN_LEFT", "TURN_RIGHT")
 ARENA = Path(__file__).parents[2] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
 
 def measure(scale=1.0):
-    """Return environment steps per second of one and of four, and how many times the one the four are."""
+    """Return the environment steps per second of one and of four simulators, and the ratio."""
     with ExitStack() as stack:
         members = [started(stack, f"parallel_{number}") for number in range(4)]
         one, four = vector(stack, members[:1]), vector(stack, members)
@@ -44,7 +44,7 @@ def measure(scale=1.0):
 
 
 class Member:
-    """A running simulator that is never restarted here."""
+    """A running simulator that is never restarted in this measurement."""
 
     def __init__(self, name, robot, scene):
         self.name = name
@@ -52,30 +52,30 @@ class Member:
         self.resets = 0
 
     def start(self):
-        """It runs already."""
+        """Do nothing, because it already runs."""
 
     def due(self, episodes=1):
-        """It is not played in for long."""
+        """Return None, because it is only used for a short time."""
 
     def abandon(self):
-        """It is never started here."""
+        """Do nothing, because it is never restarted."""
 
     def stop(self):
-        """Others stop it."""
+        """Do nothing, because its owner stops it."""
 
     def restart(self):
-        """Refuse: a fault would spoil the measurement."""
+        """Raise an error: a fault would spoil the measurement."""
         raise RuntimeError(f"{self.name} broke")
 
     def pause(self):
-        """It is always busy."""
+        """Do nothing, because it is always busy."""
 
     def unpause(self):
-        """It runs already."""
+        """Do nothing, because it already runs."""
 
 
 def started(stack, name):
-    """Return a member whose simulator runs, under a name of its own, until `stack` is closed."""
+    """Return a member with a running simulator of its own name, until `stack` is closed."""
     world = Path(stack.enter_context(tempfile.TemporaryDirectory())) / f"{name}.wbt"
     world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", f"--name={name}".encode()))
     robot, scene, _ = stack.enter_context(running(f"--step-sleep-ms={SLEEP_MS}", world=world, name=name))
@@ -90,7 +90,7 @@ def vector(stack, members):
 
 
 def steps_per_second(env, steps):
-    """Return environment steps per second of all members together, without a learner, in a new episode."""
+    """Return the environment steps per second of all members together, without a learner."""
     env.reset()
     actions = itertools.cycle(np.full(env.num_envs, number) for number in range(len(MOVEMENTS)))
     return env.num_envs * rate(lambda: env.step(next(actions)), steps)

@@ -1,7 +1,8 @@
-"""`make run` beside plain Stable-Baselines3 on the same task: what simulators, ROS and restarts cost.
+"""The cost of simulators, ROS and restarts: `make run` compared with plain Stable-Baselines3.
 
-Plain means one process without a simulator: `fake_arena` computes the task, SB3 evaluates the policy.
-Steps, hyperparameters, evaluations and the confirmation's episodes are those of the example.
+Plain training runs the same task in one process without a simulator: `fake_arena` computes the task, and SB3
+evaluates the policy. Steps, hyperparameters, evaluations and the episodes of the confirmation are those of
+the example.
 """
 
 import json
@@ -26,12 +27,12 @@ from tests.local_run import PALAESTRA
 from tests.soak.jobs import example
 
 JOB = "move-to-target"
-CONFIRMING = 100  # episodes: evaluation.confirmEpisodes, which the example leaves out
+CONFIRMING = 100  # evaluation.confirmEpisodes, which the example does not set
 LEAST_STEPS = 300
 
 
 def measure(scale=1.0):
-    """Return the seconds of both, one after the other, and how many times plain training the run takes."""
+    """Return the seconds of both, one after the other, and their ratio."""
     plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", str(scale)])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "job.yaml"
@@ -56,7 +57,7 @@ def job(scale):
 
 
 def seconds_of(command):
-    """Return how long a command takes."""
+    """Return the duration of a command in seconds."""
     began = time.monotonic()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return time.monotonic() - began
@@ -64,7 +65,7 @@ def seconds_of(command):
 
 def train(spec):
     """Train and evaluate as the job's `spec` says, in this process."""
-    torch.set_num_threads(1)  # as the trainer does
+    torch.set_num_threads(1)  # the trainer does this too
     trainer = spec["trainer"]
     evaluation, hyperparameters = trainer["evaluation"], trainer["algorithm"]["hyperparameters"]
     one, other = (Monitor(make(*fake_arena(), **trainer["environment"]["options"])) for _ in range(2))
@@ -72,7 +73,7 @@ def train(spec):
     evaluating = EvalCallback(
         other, eval_freq=evaluation["everySteps"], n_eval_episodes=evaluation["episodes"], verbose=0
     )
-    model.set_logger(Logger(None, []))  # else Stable-Baselines3 leaves a folder behind for each run
+    model.set_logger(Logger(None, []))  # otherwise Stable-Baselines3 leaves a folder behind for each run
     model.learn(trainer["steps"], callback=evaluating)
     evaluate_policy(model, other, n_eval_episodes=evaluation["confirmEpisodes"])
 

@@ -1,4 +1,4 @@
-"""Whole local runs: how soon training goes on after a kill and a sidecar ends, and what processes take."""
+"""Complete local runs: the time to continue after a kill or to end a sidecar, and the memory."""
 
 import os
 import re
@@ -31,14 +31,14 @@ def measure_memory(scale=1.0):
 
 
 def measured(figures, scale):
-    """Return the figures of a run of move-to-target that has taken some steps."""
+    """Return the figures of a run of move-to-target after some steps."""
     with running(example("move-to-target")) as run:
         run.wait_for_step(scaled(WARM_STEPS, scale), PATIENCE_S)
         return figures(run)
 
 
 def recovery(run):
-    """Return the seconds from a SIGKILL of the collecting stub to the next environment step."""
+    """Return the seconds from SIGKILL of the collecting stub to the next environment step."""
     before = run.ask()["step"]
     stub = run.pid_of("palaestra-stub", "collect-0.wbt")
     killed = time.monotonic()
@@ -48,7 +48,7 @@ def recovery(run):
 
 
 def shutdown(run):
-    """Return the seconds from a SIGTERM of the collecting sidecar to its end and that of its stub."""
+    """Return the seconds from SIGTERM of the collecting sidecar to its end and to that of its stub."""
     sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
     asked = time.monotonic()
     os.kill(sidecar, signal.SIGTERM)
@@ -57,7 +57,7 @@ def shutdown(run):
 
 
 def memory(run):
-    """Return the resident megabytes of the processes of a run, by kind, the largest of each."""
+    """Return the resident megabytes of a run's processes, the largest of each kind."""
     return {f"{program}_mb": max(map(resident_mb, run.pids(program))) for program in PROGRAMS}
 
 

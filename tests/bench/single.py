@@ -1,4 +1,4 @@
-"""One TrainingJob from its creation to its end, and what the operator asks of the API server meanwhile."""
+"""One TrainingJob from creation to end, and the operator's requests to the API server meanwhile."""
 
 import time
 
@@ -30,7 +30,7 @@ def requests_of_one_job(plane, api):
 
 
 def counted(requests):
-    """Return how many of these are reads, writes and events; watches and the Lease are none."""
+    """Return the number of reads, writes and events; watches and requests for the Lease do not count."""
     counts = [each for each in requests if each.counts]
     events = [each for each in counts if each.resource == "events" and each.verb not in READS]
     reads = [each for each in counts if each.verb in READS]
@@ -38,7 +38,7 @@ def counted(requests):
 
 
 def training():
-    """Serve the status of a trainer that makes a hundred steps a second; yields its address."""
+    """Serve the status of a trainer with a hundred steps per second, and yield its address."""
     began = time.monotonic()
 
     def status():

@@ -1,6 +1,6 @@
-"""How much a measurement does at a scale: all of it at 1, the least that runs its code at 0."""
+"""The size of a measurement at a scale: all of it at 1, and the least that runs its code at 0."""
 
 
 def scaled(whole: int, scale: float, least: int = 1) -> int:
-    """Return a share of a count, and `least` where that is less."""
+    """Return a share of a count, but at least `least`."""
     return max(round(whole * scale), least)

@@ -1,6 +1,6 @@
-"""Environment steps over ROS, ours against rospy's, in turns.
+"""Environment steps over ROS, Palaestra's clients and rospy's in turns.
 
-One step is three wheel commands, one time_step, nine distances, the bumper and the position.
+One step has three wheel commands, one time_step, nine distances, the bumper and the position.
 """
 
 import itertools
@@ -26,7 +26,7 @@ TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
 
 
 def measure(scale=1.0):
-    """Return steps per second of both, and their ratio round by round."""
+    """Return the steps per second of both, and their ratio round by round."""
     with running() as (robot, _, _):
         pairs = [(rate_of_ours(robot, scale), rate_of_rospy(scale)) for _ in range(scaled(ROUNDS, scale))]
     return {
@@ -37,7 +37,7 @@ def measure(scale=1.0):
 
 
 def rate_of_ours(robot, scale):
-    """Return steps per second with our sockets, alone on the simulator."""
+    """Return the steps per second of Palaestra's clients, alone on the simulator."""
     robot.connect()
     ways = itertools.cycle((1.0, -1.0))
     found = rate(lambda: step(robot, next(ways)), scaled(OURS, scale))
@@ -46,7 +46,7 @@ def rate_of_ours(robot, scale):
 
 
 def rate_of_rospy(scale):
-    """Return steps per second with rospy, alone on the simulator."""
+    """Return the steps per second of rospy, alone on the simulator."""
     stepper = RospyStepper("robotino")
     found = rate(stepper.step, scaled(ROSPYS, scale))
     stepper.close()
@@ -54,7 +54,7 @@ def rate_of_rospy(scale):
 
 
 def rate(step_once, count):
-    """Return how often a second `step_once` can be called."""
+    """Return the number of calls of `step_once` per second."""
     started = time.perf_counter()
     for _ in range(count):
         step_once()
@@ -62,14 +62,14 @@ def rate(step_once, count):
 
 
 def step(robot, way):
-    """Take one step of ours, with every wheel turned the other `way`, or its command would be spared."""
+    """Take one step of Palaestra's client; `way` turns every wheel, because an equal command is not sent."""
     robot.drive(way * 0.3, way * 0.1, way * 0.5)
     robot.advance()
     robot.pose()
 
 
 class RospyStepper:
-    """The same step as a rospy program does it: a proxy a service, a subscriber a topic."""
+    """The same step as a rospy program takes it, with a proxy per service and a subscriber per topic."""
 
     def __init__(self, name):
         self._calls = [
@@ -97,14 +97,17 @@ class RospyStepper:
                 raise TimeoutError("a sensor stays silent")
 
     def close(self):
-        """Unsubscribe, and wait until the simulator knows it: the next stepper has the same name."""
+        """Unsubscribe, and wait until the simulator has noticed.
+
+        The next stepper has the same name.
+        """
         for subscriber in self._subscribers:
             subscriber.unregister()
         eventually(lambda: not self._connected())
         self._publisher("close")()
 
     def _connected(self):
-        """Return the topics that the simulator sends to us; rospy counts a connection before it is made."""
+        """Return the topics that the simulator sends to this node; rospy counts a connection too early."""
         links = self._publisher.getBusInfo(rospy.get_name())[2]
         return {topic for _, subscriber, _, _, topic, _ in links if subscriber == rospy.get_name()}
 

@@ -1,6 +1,6 @@
-"""checkov, in an environment of its own: it pins libraries that the project has newer.
+"""checkov in an environment of its own, because it pins older libraries than the project's.
 
-The first call installs what checkov.lock names (`make lock` writes it) into the project's cache. A scan
+The first call installs the packages of checkov.lock (`make lock` writes it) into the project's cache. A scan
 opens no connection.
 """
 
@@ -24,7 +24,7 @@ KEPT = 2  # environments; another checkout may have another lock
 
 
 class Finding(NamedTuple):
-    """What checkov has against an object, by its check's name, such as CKV_K8S_11."""
+    """checkov's finding about an object, by the name of its check, such as CKV_K8S_11."""
 
     check: str
     kind: str
@@ -32,10 +32,10 @@ class Finding(NamedTuple):
 
 
 def findings(manifests: Mapping[str, str]) -> dict[str, set[Finding]]:
-    """Return all that checkov finds wrong in objects as YAML, under the names given.
+    """Return checkov's findings in objects as YAML, by the given names.
 
     Raises:
-        CalledProcessError: it did not run, or could not be installed.
+        CalledProcessError: checkov failed or could not be installed.
     """
     with TemporaryDirectory() as folder:
         for name, text in manifests.items():
@@ -62,7 +62,7 @@ def _environment() -> Path:
             part = Path(folder, "environment")
             _uv("venv", f"--python={sys.executable}", part)
             _uv("pip", "install", "--require-hashes", f"--python={part}", f"--requirements={LOCK}")
-            with suppress(OSError):  # it is there meanwhile
+            with suppress(OSError):  # another process has created it
                 part.rename(made)
     cache.use(made)
     cache.prune(made.parent.glob("checkov-*"), KEPT)

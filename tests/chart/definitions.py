@@ -1,4 +1,4 @@
-"""CustomResourceDefinitions of what the chart has to do with, out of those projects' Go modules."""
+"""CustomResourceDefinitions that the chart uses, from those projects' Go modules."""
 
 import json
 import os
@@ -19,7 +19,7 @@ def definitions(module: str, folder: str) -> Path:
     Nothing is downloaded unless the tests are required to run.
 
     Raises:
-        NoPrograms: Go, or the module, is not there.
+        NoPrograms: Go or the module is missing.
     """
     proxy = {} if os.environ.get(REQUIRED) == "1" else {"GOPROXY": "off"}
     try:
@@ -40,10 +40,10 @@ def definitions(module: str, folder: str) -> Path:
 
 
 def kinds_of_prometheus() -> list[str]:
-    """Return kubectl's options for the definitions of the kinds that the chart uses of Prometheus' Operator.
+    """Return kubectl's options for the definitions of the Prometheus Operator's kinds that the chart uses.
 
     Raises:
-        NoPrograms: Go, or the module, is not there.
+        NoPrograms: Go or the module is missing.
     """
     folder, kinds = definitions(*PROMETHEUS), ("podmonitors", "servicemonitors", "prometheusrules")
     return [f"--filename={folder}/monitoring.coreos.com_{each}.yaml" for each in kinds]

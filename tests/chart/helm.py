@@ -18,15 +18,15 @@ Object = dict[str, Any]
 
 
 class HelmRefused(Exception):
-    """What Helm says instead of doing what it was asked for."""
+    """Helm's error message."""
 
 
 def helm(*arguments: str, sent: str = "", **environment: str) -> str:
-    """Run Helm with `sent` as its standard input, and return what it prints; 60 s at most.
+    """Run Helm with `sent` as its standard input, and return its output; the limit is 60 s.
 
     Raises:
         NoPrograms: Helm is not built.
-        HelmRefused: it ended with another code than 0.
+        HelmRefused: the exit code is not 0.
     """
     program = programs(("helm",)) / "helm"
     done = subprocess.run(

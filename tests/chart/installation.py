@@ -1,4 +1,4 @@
-"""manifests/install.yaml: the chart with its default values, for those who have no Helm."""
+"""manifests/install.yaml: the chart with its default values, for users without Helm."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ def text() -> str:
     Raises:
         NoPrograms: Helm is not built.
     """
-    without = {"crds": {"keep": False}, "test": {"enabled": False}}  # a policy and a command of Helm's
+    without = {"crds": {"keep": False}, "test": {"enabled": False}}  # both need Helm
     return HEAD + rendered(without)
 
 

@@ -56,7 +56,7 @@ MODES: dict[str, Values] = {
 
 
 def merged(*parts: Values) -> Values:
-    """Return all values together; a later part wins."""
+    """Return all values merged; a later part wins."""
     whole: Values = {}
     for part in parts:
         for key, value in part.items():

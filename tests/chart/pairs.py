@@ -1,4 +1,4 @@
-"""Values chosen together so that each pair of choices occurs: no template may rely on a default."""
+"""Sets of values in which each pair of choices occurs, because no template may rely on a default."""
 
 from collections.abc import Iterable
 from itertools import combinations
@@ -12,7 +12,7 @@ RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
 SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}
 LABELS = {"example.com/team": "robots"}
 
-# Another value than the default, for each value that there is.
+# Another value than the default for each value.
 OTHERS: dict[str, Any] = {
     "images.registry": "registry.example.com:5000/robots",
     "images.pullPolicy": "Never",
@@ -75,7 +75,7 @@ OTHERS: dict[str, Any] = {
     "jupyter.existingClaim": "notes",
     "jupyter.resources": RESOURCES,
 }
-# What the schema demands beside a value.
+# Other values that the schema requires together with a value.
 BESIDE: dict[str, dict[str, Any]] = {
     "operator.leaderElection": {"operator.replicas": 1},
     "tensorboard.enabled": {"tensorboard.existingClaim": "runs"},
@@ -84,10 +84,10 @@ BESIDE: dict[str, dict[str, Any]] = {
 
 
 def rows() -> list[tuple[str, ...]]:
-    """Return a few choices of paths. Of any two paths, each is somewhere alone, both are, and neither.
+    """Return a few sets of paths. For any two paths, some sets have each alone, both, and neither.
 
-    Nothing is chosen in the first of n + 1 rows, and each path in its own n/2 of the others, rounded up: two
-    such halves overlap, and neither holds the other (Katona 1973).
+    The first of n + 1 rows is empty, and each path is in n/2 of the others, rounded up: two such halves
+    overlap, and neither contains the other (Katona 1973).
     """
     n = next(odd for odd in range(1, 99, 2) if comb(odd, odd // 2 + 1) >= len(OTHERS))
     halves = list(zip(OTHERS, combinations(range(1, n + 1), n // 2 + 1), strict=False))
@@ -95,7 +95,7 @@ def rows() -> list[tuple[str, ...]]:
 
 
 def together(row: Iterable[str]) -> Values:
-    """Return other values than the defaults for some paths, and what those need beside them."""
+    """Return other values than the defaults for some paths, and the values that these require."""
     chosen = {path: OTHERS[path] for path in row}
     for path in tuple(chosen):
         chosen |= BESIDE.get(path, {})

@@ -1,6 +1,6 @@
-"""The chart's README: an introduction, and a table made of values.yaml, where each value has a sentence.
+"""The chart's README: an introduction, and a table generated from values.yaml.
 
-A comment belongs to the key on the line below it.
+In values.yaml each value has a comment, which belongs to the key on the line below it.
 """
 
 import json
@@ -17,7 +17,7 @@ MARK = "<!-- generated from values.yaml by `make golden` -->\n"
 
 
 class Value(NamedTuple):
-    """One value: its path with dots, its default, and what it is for ("": nobody says)."""
+    """A value: its dotted path, its default, and its description ("" if it has no comment)."""
 
     path: str
     default: Any
@@ -31,7 +31,7 @@ def values(source: str) -> Iterator[Value]:
 
 
 def text() -> str:
-    """Return the README as it should be: the introduction as it stands, and the table anew."""
+    """Return the README as it should be: the unchanged introduction and a newly generated table."""
     introduction, _, _ = PATH.read_text().partition(MARK)
     rows = [
         f"| `{value.path}` | `{json.dumps(value.default)}` | {value.sentence} |"

@@ -1,4 +1,4 @@
-"""Rights: what roles grant to a service account, and what it used by an API server's audit log. Pure."""
+"""Permissions: the grants of roles to a service account, and its uses in an API server's audit log. Pure."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,7 +30,7 @@ class Use(NamedTuple):
 
 
 def granted(objects: Iterable[Object], namespace: str, account: str) -> set[Right]:
-    """Return all that the bindings among some objects allow to a service account."""
+    """Return everything that the bindings among some objects grant to a service account."""
     found = list(objects)
     roles = {_key(each["kind"], each, each["metadata"]["name"]): each for each in found if "rules" in each}
     subject = {"kind": "ServiceAccount", "name": account, "namespace": namespace}
@@ -43,7 +43,7 @@ def granted(objects: Iterable[Object], namespace: str, account: str) -> set[Righ
 
 
 def held(role: Object) -> set[Right]:
-    """Return all that a role allows."""
+    """Return everything that a role grants."""
     return {
         Right(group, resource, verb)
         for rule in role["rules"]
@@ -54,9 +54,9 @@ def held(role: Object) -> set[Right]:
 
 
 def uses(log: str, since: str = "") -> Iterator[Use]:
-    """Yield what service accounts asked for since a moment, as ISO 8601 in UTC; discovery is left out."""
+    """Yield the requests of service accounts since a time, in ISO 8601 and UTC; discovery is left out."""
     for line in log.splitlines():
-        with suppress(json.JSONDecodeError):  # the last line may not be whole yet
+        with suppress(json.JSONDecodeError):  # the last line may be incomplete
             entry = json.loads(line)
             if entry["requestReceivedTimestamp"] >= since and "objectRef" in entry:
                 yield from _uses(entry)
@@ -71,12 +71,12 @@ def _uses(entry: Object) -> Iterator[Use]:
     resource = "/".join(filter(None, (target["resource"], target.get("subresource"))))
     verbs = [entry["verb"]]
     if entry["verb"] == "patch" and entry.get("responseStatus", {}).get("code") == CREATED:
-        verbs.append("create")  # to apply what is not there yet, a server asks for both
+        verbs.append("create")  # to apply a new object, a server checks both
     for verb in verbs:
         right = Right(target.get("apiGroup", ""), resource, verb)
         yield Use(namespace, account, right, allowed, notes.get("authorization.k8s.io/reason", ""))
 
 
 def _key(kind: str, beside: Object, name: str) -> tuple[str, str | None, str]:
-    """Return the key of a role, of which a Role lies beside its binding."""
+    """Return the key of a role; a Role is in the namespace of its binding."""
     return kind, beside["metadata"].get("namespace") if kind == "Role" else None, name

@@ -1,8 +1,7 @@
-"""Write container images as OCI archives, from plain files, without an engine.
+"""Write container images as OCI archives from plain files, without a container engine.
 
-An image here is one layer of programs and what they need. Same files, same
-bytes: no clock and no owner enters, so an archive can be kept under the key of
-its content.
+An image has one layer with programs and their dependencies. The same files give the same bytes: no time and
+no owner is included, so an archive can be cached under a key of its content.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ SEARCH_PATH = "PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Image:
-    """What goes into an image: full name with tag, program, files and links by place, user and group."""
+    """The content of an image: full name with tag, program, files and links by path, user and group."""
 
     name: str
     entrypoint: str

@@ -1,8 +1,8 @@
-"""Write the images that a node must bring along: the control plane, kube-proxy, CoreDNS, volumes.
+"""Write the images that come with a node: the control plane, kube-proxy, CoreDNS, volumes.
 
-python3 -m tests.cluster.images PROGRAMS TREE OUT: from the folder of built
-programs and the node's Debian tree, one OCI archive each into OUT. Standard
-library only, since it runs before anything is installed.
+python3 -m tests.cluster.images PROGRAMS TREE OUT writes one OCI archive each into OUT, from the folder of
+built programs and the node's Debian tree. It uses only the standard library, because it runs before anything
+is installed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.cluster.archive import Image, write_archive
 
 PAUSE = "registry.k8s.io/pause:3.10.2"
 HELPER = "palaestra.dev/busybox:1.37.0"
-# iptables chooses its command by the name it is called by
+# iptables chooses its command by the name under which it is called
 IPTABLES = (
     "iptables",
     "iptables-save",
@@ -30,10 +30,10 @@ HELPER_COMMANDS = ("sh", "mkdir", "rm", "du")
 
 
 def version_of(module: str, package: str) -> str:
-    """Return the version of `package` that programs/`module`/go.mod asks for, such as "v1.36.4".
+    """Return the version of `package` in programs/`module`/go.mod, such as "v1.36.4".
 
     Raises:
-        LookupError: The file doesn't ask for the package.
+        LookupError: the file does not require the package.
     """
     text = (Path(__file__).parent / "programs" / module / "go.mod").read_text(encoding="utf-8")
     found = re.search(rf"^(?:require|\s)\s*{re.escape(package)} (v\S+)", text, re.MULTILINE)
@@ -44,7 +44,7 @@ def version_of(module: str, package: str) -> str:
 
 
 def single_programs(programs: Path) -> list[Image]:
-    """Return the images that hold one static program of `programs` and nothing else."""
+    """Return the images that contain one static program of `programs` and nothing else."""
     kubernetes = version_of("kubernetes", "k8s.io/kubernetes")
     etcd = version_of("etcd", "go.etcd.io/etcd/server/v3").removeprefix("v")
     coredns = version_of("coredns", "github.com/coredns/coredns")
@@ -59,12 +59,13 @@ def single_programs(programs: Path) -> list[Image]:
 
 
 def kube_proxy(programs: Path, tree: Path) -> Image:
-    """Return kube-proxy's image, with the iptables and nft that it calls and their libraries from `tree`."""
+    """Return kube-proxy's image, with the programs iptables and nft and their libraries from `tree`."""
     extensions = sorted((tree / "usr/lib/x86_64-linux-gnu/xtables").glob("*.so"))
     called = [tree / "usr/sbin/xtables-nft-multi", tree / "usr/sbin/nft"]
     programs_and_extensions = [*called, *(path for path in extensions if not path.is_symlink())]
     files = {_place(path, tree): path for path in programs_and_extensions}
-    # also the extensions' own libraries (libm): without them Services with two endpoints fail now and then
+    # The extensions' own libraries (libm) are included: without them, Services with two endpoints sometimes
+    # fail.
     for library in set(chain.from_iterable(_libraries(path, tree) for path in programs_and_extensions)):
         files[PurePosixPath(library.lstrip("/"))] = _resolved(library, tree)
     links = {_place(path, tree): str(path.readlink()) for path in extensions if path.is_symlink()}
@@ -75,7 +76,7 @@ def kube_proxy(programs: Path, tree: Path) -> Image:
 
 
 def helper(tree: Path) -> Image:
-    """Return the image of the pods that make and remove the folders of volumes: one busybox."""
+    """Return the image of the pods that create and remove the folders of volumes: one busybox."""
     links = {PurePosixPath("bin", command): "busybox" for command in HELPER_COMMANDS}
     files = {PurePosixPath("bin/busybox"): tree / "usr/bin/busybox"}
     return Image(name=HELPER, entrypoint="/bin/sh", files=files, links=links)
@@ -97,7 +98,7 @@ def _libraries(path: Path, tree: Path) -> set[str]:
 
 
 def _resolved(library: str, tree: Path) -> Path:
-    """Return the file in `tree` behind a library's absolute path; links in it are the tree's own."""
+    """Return the file in `tree` for a library's absolute path; links are resolved inside the tree."""
     command = ["chroot", str(tree), "realpath", library]
     inside = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
     return tree / inside.lstrip("/")

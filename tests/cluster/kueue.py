@@ -1,7 +1,7 @@
-"""Write the image of Kueue's manager as its project ships it, and let its chart name that image.
+"""Write the image of Kueue's manager as its project ships it, and put its name into the chart.
 
-python3 -m tests.cluster.kueue PROGRAM VALUES OUT: from the built program to an OCI archive, and the chart's
-values.yaml anew. Standard library only.
+python3 -m tests.cluster.kueue PROGRAM VALUES OUT writes an OCI archive from the built program, and the
+chart's values.yaml again. It uses only the standard library.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def version() -> str:
 
 
 def manager(program: Path) -> Image:
-    """Return the image; Kueue's chart calls `/manager` in it and refuses to run it as root."""
+    """Return the image; Kueue's chart runs `/manager` in it and refuses to run it as root."""
     return Image(
         name=f"{REPOSITORY}:{version()}",
         entrypoint="/manager",
@@ -32,13 +32,13 @@ def manager(program: Path) -> Image:
 
 
 def released(values: str) -> str:
-    """Return the chart's values.yaml with the image of `manager`, as in the chart of the release.
+    """Return the chart's values.yaml with the image of `manager`, as in the released chart.
 
-    The module's own names a staging image with the policy Always, so a node would not use the image that was
-    loaded onto it. The manager's image is the first one below `controllerManager`.
+    The module's chart names a staging image with the policy Always, so a node would not use the image that
+    was loaded onto it. The manager's image is the first one below `controllerManager`.
 
     Raises:
-        LookupError: There is no such image.
+        LookupError: the file has no such image.
     """
     for key, value in (("repository", REPOSITORY), ("tag", version()), ("pullPolicy", "IfNotPresent")):
         first = re.compile(rf"^(controllerManager:\n.*?^ {{6}}{key}: )[^\n]*", re.MULTILINE | re.DOTALL)

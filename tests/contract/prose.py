@@ -1,7 +1,7 @@
-"""Sentences that a hurried reader must read twice, found by rule in docs, sources and configuration.
+"""Sentences that a hurried reader must read twice, found by rules in docs, sources and configuration.
 
-Pure: text in, findings out. The rules are a list, `RULES`; code, quotes, tables, headings and questions are
-exempt. `python -m tests.contract.prose PATH...` prints what it finds.
+Pure: text in, findings out. `RULES` is the list of rules; code, quotes, tables, headings and questions are
+exempt. `python -m tests.contract.prose PATH...` prints the findings.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 MOST_WORDS = 35
 WORD = re.compile(r"[A-Za-z0-9][\w'./-]*")
-# A full stop ends a sentence where a capital, a quote or a digit follows, so that "e.g. this" stays one.
+# A full stop ends a sentence if a capital, a quote or a digit follows, so that "e.g. this" stays one.
 END = re.compile(r"(?<=[.!?])[)\"'”*]*\s+(?=[A-Z\"'“`(*\d])")
 
 
@@ -71,7 +71,7 @@ RULES: dict[str, Callable[[str], bool]] = {
 
 
 def findings(path: Path) -> list[Finding]:
-    """Return what the rules find in a file, in the order of its lines."""
+    """Return the findings of the rules in a file, in the order of its lines."""
     return [
         Finding(path=path, line=sentence.line, rule=rule, text=sentence.text)
         for sentence in sentences(path)
@@ -82,7 +82,7 @@ def findings(path: Path) -> list[Finding]:
 
 
 def sentences(path: Path) -> Iterator[Sentence]:
-    """Yield the sentences of running text in a file, by what its name says that it holds."""
+    """Yield the sentences of running text in a file, by the type in its name."""
     text = path.read_text()
     paragraphs = READERS.get(path.suffix, of_comments)(text)
     for line, paragraph in paragraphs:
@@ -94,7 +94,7 @@ Paragraph = tuple[int, str]
 
 
 def of_markdown(text: str) -> Iterator[Paragraph]:
-    """Yield paragraphs and list items without code, tables, headings, quotes and the addresses of links."""
+    """Yield paragraphs and list items without code, tables, headings, quotes and link addresses."""
     text = re.sub(r"^(```|~~~).*?^\1[^\n]*$", blank, text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"<!--.*?-->", blank, text, flags=re.DOTALL)
     exempt = re.compile(r"\s*([#|>├└│]|!\[|<|---)")
@@ -103,7 +103,7 @@ def of_markdown(text: str) -> Iterator[Paragraph]:
 
 
 def of_lines(lines: Iterable[Paragraph]) -> Iterator[Paragraph]:
-    """Yield paragraphs: they end at an empty line, and at one that begins an item or a field."""
+    """Yield paragraphs; an empty line ends one, and so does a line that begins an item or a field."""
     begins = re.compile(r"\s*([-*]|\d+\.)\s+|\s*[\w.`*\[\]/]+( \([^)]*\))?: +(?=\S)")
     start, held = 0, ""
     for number, line in [*lines, (0, "")]:
@@ -137,13 +137,13 @@ def is_message(text: str) -> bool:
 
 
 def of_docstring(line: int, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a docstring, at their lines; headings of sections and blocks are none."""
+    """Yield the paragraphs of a docstring with their lines, except section headings and blocks."""
     prose = re.sub(r"^\s*\w+:$", "", without_blocks(text), flags=re.MULTILINE)
     yield from ((line + number - 1, paragraph) for number, paragraph in of_markdown(prose))
 
 
 def without_blocks(docstring: str) -> str:
-    """Return a docstring whose blocks of code or tables, indented after an empty line, are empty lines."""
+    """Return a docstring in which blocks of code or tables, indented after an empty line, are blank."""
     lines = docstring.split("\n")
     margin = min((indent(line) for line in lines[1:] if line.strip()), default=0)
     kept, inside = lines[:1], False
@@ -155,12 +155,12 @@ def without_blocks(docstring: str) -> str:
 
 
 def indent(line: str) -> int:
-    """Return how many blanks a line begins with."""
+    """Return the number of blanks at the beginning of a line."""
     return len(line) - len(line.lstrip())
 
 
 def of_comments(text: str) -> Iterator[Paragraph]:
-    """Yield comments; full lines of one comment belong together, a comment behind code is one by itself."""
+    """Yield comments; consecutive full lines are one comment, and a comment after code is another."""
     found = [(number, without_code(comment)) for number, comment in comments(text)]
     sources = text.split("\n")
     full = {number: comment for number, comment in found if sources[number - 1].lstrip().startswith("#")}
@@ -169,7 +169,7 @@ def of_comments(text: str) -> Iterator[Paragraph]:
 
 
 def comments(text: str) -> Iterator[Paragraph]:
-    """Yield the comments of Python, or of any text in which `#` begins one at the start of a line."""
+    """Yield the comments of Python, or of any text in which a line with `#` at its beginning is one."""
     try:
         tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
     except (tokenize.TokenError, SyntaxError):
@@ -192,7 +192,7 @@ def piece(node: ast.expr) -> str:
 
 
 def without_code(text: str) -> str:
-    """Return text with code as one word, quotes left out, and links as their text."""
+    """Return text with code as one word, without quotes, and with links as their text."""
     text = re.sub(r"`[^`]*`", "X", text)  # a capital, since it may begin a sentence
     text = re.sub(r"[\"“][^\"”]*[\"”]", "x", text)
     return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
@@ -204,7 +204,7 @@ def blank(match: re.Match[str]) -> str:
 
 
 def main() -> None:
-    """Print the findings in the files given, and in the folders given those of text."""
+    """Print the findings in the given files, and in the text files of the given folders."""
     found = 0
     for path in files(Path(it) for it in sys.argv[1:]):
         for finding in findings(path):
@@ -214,7 +214,7 @@ def main() -> None:
 
 
 def files(paths: Iterable[Path]) -> Iterator[Path]:
-    """Yield files, and those of folders whose names say that they hold text."""
+    """Yield files, and the files of folders that have a suffix of text."""
     for path in paths:
         if path.is_dir():
             yield from sorted(

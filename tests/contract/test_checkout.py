@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_a_checkout_with_autocrlf_has_no_crlf(tmp_path):
-    """Git for Windows sets `core.autocrlf`; bash, checksums and recorded files need LF."""
+    """Git for Windows sets `core.autocrlf`, but bash, checksums and recorded files need LF."""
     clone = tmp_path / "clone"
     made = ["git", "-c", "core.autocrlf=true", "clone", "--quiet", "--shared", ROOT, clone]
     subprocess.run(made, check=True, timeout=60)

@@ -36,7 +36,7 @@ def homes():
 
 
 def test_a_class_name_has_one_meaning():
-    """Two classes of one name make every search, import and traceback ambiguous."""
+    """Two classes with one name make every search, import and traceback ambiguous."""
     twice = {name: modules for name, modules in homes().items() if len(modules) > 1}
 
     assert {name: modules for name, modules in twice.items() if name not in ALLOWED_TWICE} == {}

@@ -1,4 +1,4 @@
-"""What the pages show can be typed."""
+"""The examples on the pages work when they are typed."""
 
 import re
 from pathlib import Path
@@ -19,7 +19,7 @@ PAGES = sorted(
 
 
 def blocks(language, pages=PAGES):
-    """Return every block of a language, with the page it stands on."""
+    """Return every block of a language, with its page."""
     return [
         pytest.param(text, id=f"{page.relative_to(ROOT).with_suffix('')}-{number}")
         for page in pages
@@ -30,20 +30,20 @@ def blocks(language, pages=PAGES):
 
 @pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page != ROOT / "README.md"]))
 def test_python_runs(text):
-    """The README's own block is a file in examples/, with a test of its own."""
+    """The README has no block of Python; that of a notebook is in examples/, with its own test."""
     exec(compile(text, "<page>", "exec"), {})
 
 
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_whole_jobs_are_right(text):
-    """Parts of a job are checked where they are explained; whole ones load."""
+    """Parts of a job are checked where they are explained; complete ones must load."""
     if "kind: TrainingJob" in text:
         palaestra.api.load(text, "page")
 
 
 @pytest.mark.parametrize("text", blocks("console"))
 def test_every_verb_that_is_typed_exists(text):
-    """`make help` and the pages tell the same."""
+    """`make help` and the pages must agree."""
     makefile = (ROOT / "Makefile").read_text()
 
     verbs = re.findall(r"^make (\w+)", text, re.MULTILINE)

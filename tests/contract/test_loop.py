@@ -1,4 +1,4 @@
-"""The operator's loop stays what its page says: short, and a place where nothing is built."""
+"""The operator's loop is as short as its page claims, and builds no object."""
 
 import ast
 import inspect
@@ -18,7 +18,7 @@ def test_the_loop_is_read_in_one_screen():
 
 
 def test_the_operator_makes_no_object():
-    """It carries out what was decided; a function of the plan in it would be a second place for that."""
+    """It applies decisions; if it called a function of the plan, objects would be made in two places."""
     taken = {
         (node.module, each.name)
         for source in SOURCES
@@ -32,7 +32,7 @@ def test_the_operator_makes_no_object():
 
 
 def test_a_look_observes_once():
-    """Reading every object of a job again for each question about it made a look three times as dear."""
+    """When every question about a job read all its objects again, a reconcile cost three times as much."""
     calls = [
         (source.name, ast.unparse(node.func))
         for source in SOURCES

@@ -1,4 +1,4 @@
-"""Drawings and lists equal the code: error trees, modules, folders."""
+"""Drawings and lists match the code: error trees, modules, folders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PACKAGES = {
 IGNORE = re.compile(r"# (noqa|type: ignore|pyright: ignore|pragma)")
 REASON = re.compile(r"# (noqa: [A-Z0-9, ]+ - |type: ignore\[[a-z-]+\](  # noqa: [A-Z0-9]+ - |  # ))\w")
 PATH = re.compile(
-    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a word of its own, by its suffix
+    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a separate word with a file suffix
     r"|(?<![\w/.~-])((?:operator|trainer|sim_image|tests|docs|manifests|charts|tools)/[\w./-]*[\w/])"
 )
 NEW = {"sim_image/src/palaestra_sim/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
@@ -43,7 +43,7 @@ BRANCH = re.compile(r"^(?P<indent>[│ ]*)[├└]── (?P<name>\w+)")
 
 @pytest.mark.parametrize("package", sorted(set(PACKAGES) - {"palaestra_protocol"}))
 def test_the_drawn_error_tree_is_that_of_the_classes(package):
-    """A caller chooses what to catch by the drawing."""
+    """A caller uses the drawing to choose which error to catch."""
     folder = PACKAGES[package]
     drawing = ast.get_docstring(ast.parse((folder / "errors.py").read_text()))
 
@@ -54,7 +54,7 @@ def test_the_drawn_error_tree_is_that_of_the_classes(package):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_is_in_the_table_of_modules(package):
-    """A stranger looks there for where a change belongs."""
+    """A new contributor finds the module for a change there."""
     listed = set(re.findall(rf"^\| `{package}\.([a-z_.]+)` \|", page("docs/architecture.md"), re.MULTILINE))
     rooms = {it.parent.name for it in PACKAGES[package].glob("*/__init__.py")}
 
@@ -64,7 +64,7 @@ def test_every_package_is_in_the_table_of_modules(package):
 
 @pytest.mark.parametrize("file", [pytest.param(file, id=".".join(file.parts[-3:-1])) for file in LISTING])
 def test_a_package_that_lists_its_modules_lists_all(file):
-    """A stranger opens the module that the list names, and would never open one that it leaves out."""
+    """A new contributor opens the module that the list names, and never finds one that it leaves out."""
     items = re.findall(r"^- (.*)$", docstring(file), re.MULTILINE)
     listed = {name for item in items for name in re.findall(r"`([a-z_]+)`(?=[,:]| and )", item)}
     modules = {path.stem for path in file.parent.glob("*.py")} - {"__init__"}
@@ -74,7 +74,7 @@ def test_a_package_that_lists_its_modules_lists_all(file):
 
 
 def test_the_table_of_folders_names_every_folder_with_something_to_read():
-    """`tests/` and `tools/` are for those who change the project."""
+    """`tests/` and `tools/` are for people who change the project."""
     listed = re.findall(r"^\| `([a-z_]+)/[^`]*`", page("README.md"), re.MULTILINE)
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     folders = {name.partition("/")[0] for name in tracked.split() if "/" in name and not name.startswith(".")}
@@ -83,7 +83,7 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
 
 
 def test_every_path_that_contributing_names_is_there():
-    """Its walkthroughs send a stranger there; of a file that they create, the folder is there."""
+    """New contributors follow its walkthroughs; for a file that they create, the folder must exist."""
     named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
 
     assert named >= NEW
@@ -92,7 +92,7 @@ def test_every_path_that_contributing_names_is_there():
 
 
 def test_the_lines_around_a_change_in_contributing_are_those_of_its_file():
-    """They show where a new line belongs."""
+    """These lines show where a new line belongs."""
     around = [
         (path, line[1:])
         for path, change in CHANGE.findall(page("CONTRIBUTING.md"))
@@ -105,7 +105,7 @@ def test_the_lines_around_a_change_in_contributing_are_those_of_its_file():
 
 
 def test_rules_are_ignored_rarely_and_for_a_reason():
-    """An ignore hides the next fault of its kind too, so each costs a reason, and there are few."""
+    """An ignore also hides the next mistake of its kind, so each needs a reason, and there must be few."""
     sources = [path for folder in PACKAGES.values() for path in folder.rglob("*.py")]
     ignores = [line for path in sources for line in path.read_text().splitlines() if IGNORE.search(line)]
 
@@ -114,7 +114,7 @@ def test_rules_are_ignored_rarely_and_for_a_reason():
 
 
 def tree(drawing):
-    """Return the root of a drawing, and parent by child."""
+    """Return the root of a drawing, and each child's parent."""
     lines = drawing.splitlines()
     first = next(number for number, line in enumerate(lines) if BRANCH.match(line.lstrip() or " "))
     root = lines[first - 1].split()[0]
@@ -129,14 +129,14 @@ def tree(drawing):
 
 
 def bases_of_classes(folder):
-    """Return the names of the bases of each class in a folder's modules."""
+    """Return the names of the base classes of each class in a folder's modules."""
     modules = [ast.parse(path.read_text()) for path in folder.rglob("*.py")]
     classes = [node for module in modules for node in ast.walk(module) if isinstance(node, ast.ClassDef)]
     return {node.name: [ast.unparse(base).rpartition(".")[2] for base in node.bases] for node in classes}
 
 
 def descendants(root, bases):
-    """Return the parent of every class that comes from `root`."""
+    """Return the parent of every class that derives from `root`."""
     found, parents = {}, {root}
     while parents:
         found |= (new := {name: base for name, given in bases.items() for base in given if base in parents})

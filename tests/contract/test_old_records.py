@@ -1,7 +1,7 @@
-"""What the programs of a5276f3 wrote is read by those of now, and the other way round.
+"""The programs of today read what 0.1.0 wrote.
 
-The records lie in tests/fixtures/a5276f3. That release refuses unknown fields, so what is written for a
-job that uses nothing newer has exactly its fields.
+The records are in tests/fixtures/0.1.0. A field that a later release adds is absent unless it is set. So what
+is written for a job that uses nothing newer has the fields of 0.1.0, and no others.
 """
 
 import json
@@ -23,7 +23,7 @@ from palaestra_trainer import checkpoint
 from palaestra_trainer import configuration as trainer
 from palaestra_trainer.run_directory import RunDirectory
 
-OLD = Path(__file__).parents[1] / "fixtures" / "a5276f3"
+OLD = Path(__file__).parents[1] / "fixtures" / "0.1.0"
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 JOBS = sorted(OLD.glob("job-*.json"))
 TRAININGS = sorted(OLD.glob("training/*.yaml"))
@@ -75,12 +75,13 @@ def test_a_job_in_a_cluster_is_shown_as_before(path):
 
 @pytest.mark.parametrize("path", JOBS, ids=name_of)
 def test_a_status_that_uses_nothing_new_has_no_new_field(path):
-    """An operator or command line of a5276f3 would refuse the whole status for it."""
+    """A cluster whose definition is that of 0.1.0 drops a field that it does not know."""
     recorded = json.loads(path.read_text())
 
     written = as_data(accept(recorded))
 
-    assert fields(written["status"]) <= fields(recorded["status"])
+    known = set().union(*(fields(json.loads(each.read_text())["status"]) for each in JOBS))
+    assert fields(written["status"]) <= known  # each leaves its own empty lists out
     assert fields(written["spec"]) == fields(recorded["spec"])
 
 
@@ -97,8 +98,8 @@ def test_a_training_yaml_is_read_as_it_was(path):
 
 @pytest.mark.parametrize("path", TRAININGS, ids=name_of)
 def test_a_training_yaml_of_a_job_that_uses_nothing_new_has_no_new_field(path):
-    """A job's own trainer image of a5276f3 would end with 2."""
-    example, layout = path.stem.split(".")
+    """A job's own trainer image of 0.1.0 logs a field that it does not know."""
+    example, layout = path.stem.rsplit(".", 1)
     job = identified(load((OLD / "jobs" / f"{example}.yaml").read_text()), UID)
     images = Images.of_release("0.0.0")
     layouts = {
@@ -127,7 +128,7 @@ def test_a_last_word_is_read_and_has_the_same_fields():
 
     read = Termination.from_message(recorded)
 
-    assert read.reason == "Interrupted: SIGTERM received"
+    assert read.reason.startswith("Interrupted: ")
     assert fields(read.to_json()) == fields(json.loads(recorded))
 
 
@@ -173,7 +174,8 @@ def test_a_checkpoint_of_two_collectors_is_whole_and_of_the_same_run():
 
     found = checkpoint.newest(directory.checkpoints)
 
-    assert (found.manifest.step, found.lost) == (200, frozenset())
+    word = Termination.from_message((directory.path / "termination.json").read_text())
+    assert (found.manifest.step, found.lost) == (word.last_checkpoint.step, frozenset())
     checkpoint.refuse_another_run(found, trainer.load(directory.configuration))
 
 

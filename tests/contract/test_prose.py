@@ -1,4 +1,4 @@
-"""Every sentence that people read keeps the rules of `tests.contract.prose`."""
+"""Every sentence for readers follows the rules of `tests.contract.prose`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_no_sentence_needs_a_second_reading(place):
 
 @pytest.mark.parametrize("reason", ROWS)
 def test_no_reason_needs_a_second_reading(reason, tmp_path):
-    """Its row is a table cell in docs/reference/reasons.md, which the rules for pages exempt."""
+    """Each reason is a table cell in docs/reference/reasons.md, which the rules for pages exempt."""
     page = tmp_path / "row.md"
     row = ROWS[reason]
     page.write_text(f"{row.meaning}\n\n{row.remedy}\n")
@@ -55,7 +55,7 @@ def test_no_reason_needs_a_second_reading(reason, tmp_path):
     ],
 )
 def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
-    """A rule that finds nothing anywhere would pass for ever."""
+    """A rule that never finds anything would pass for ever."""
     path = tmp_path / name
     path.write_text(text.format(planted))
 
@@ -63,7 +63,7 @@ def test_a_planted_sentence_is_found(planted, name, text, tmp_path):
 
 
 def test_tables_and_code_in_a_docstring_are_no_sentences(tmp_path):
-    """An indented block after an empty line is what Markdown calls code; a list of arguments is prose."""
+    """Markdown treats an indented block after an empty line as code; a list of arguments is prose."""
     path = tmp_path / "blocks.py"
     path.write_text(
         '"""Return a table.\n\n    What is    a cell\n\n    Who leads  another\n\n'

@@ -1,4 +1,4 @@
-"""What the README and the first pages show is what there is."""
+"""The examples of the README and of the first pages match the project."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ def block(language):
 
 
 def test_the_first_command_stands_within_25_lines():
-    """A stranger decides in one screen."""
+    """A new reader decides in one screen."""
     lines = README.splitlines()
 
     assert any(line.startswith("make run") for line in lines[:25])
@@ -29,7 +29,7 @@ def test_the_first_command_stands_within_25_lines():
 
 
 def test_the_job_shown_is_the_minimal_example():
-    """It is also run by the tests of the examples."""
+    """The tests of the examples run it too."""
     text = (ROOT / "manifests/examples/minimal.yaml").read_text().rstrip()
 
     assert block("yaml") == text
@@ -37,7 +37,7 @@ def test_the_job_shown_is_the_minimal_example():
 
 
 def test_the_script_for_a_notebook_is_the_facade_example():
-    """It is also run by a test of its own."""
+    """It has its own test."""
     [script] = blocks(NOTEBOOK, "python with-a-simulator")
 
     assert (ROOT / "examples/facade.py").read_text().endswith(script)
@@ -78,7 +78,7 @@ def test_the_citation_names_the_paper_as_the_readme_does():
 
 
 def test_what_is_typed_for_a_cluster_fits_together():
-    """Cluster, operator, job, end: each line needs what those before it have made."""
+    """The order is cluster, operator, job and end: each line needs the results of those before it."""
     (shown,) = (block for block in blocks(CLUSTER, "console") if block.startswith("make cluster "))
     cluster, operator, job, end = (line.partition("#")[0].split() for line in shown.splitlines())
 
@@ -92,7 +92,7 @@ def test_what_is_typed_for_a_cluster_fits_together():
 
 
 def test_every_verb_of_the_makefile_is_documented():
-    """`make help` prints what stands behind `##`."""
+    """`make help` prints the text after `##`."""
     makefile = (ROOT / "Makefile").read_text()
     verbs = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split()
 

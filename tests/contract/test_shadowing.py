@@ -1,4 +1,4 @@
-"""Programs beside which a user's files have the names of Python's modules and of our dependencies."""
+"""Programs start next to a user's files that have the names of modules of Python and of dependencies."""
 
 import os
 import subprocess
@@ -24,11 +24,11 @@ NEEDED = (
     "mujoco",
     "PIL",
 )
-# Python itself does not start with these, before any program of ours: it reads text, and it is compiled.
+# Python itself does not start with these, before any program of Palaestra: it decodes text and compiles.
 UNAVOIDABLE = {"encodings", "__future__"}
 
 
-# The library imports these to find out which system this is.
+# The library imports these to detect the operating system.
 OF_WINDOWS = {"msvcrt", "nt", "winreg", "_winapi"}
 
 
@@ -43,7 +43,7 @@ def folder(tmp_path_factory):
 
 
 def ran(program, folder, *arguments):
-    """Run a program with a folder on PYTHONPATH; return its exit code and its output."""
+    """Run a program with a folder on PYTHONPATH, and return its exit code and output."""
     done = subprocess.run(
         [Path(sys.executable).with_name(program), *arguments],
         env={**os.environ, "PYTHONPATH": str(folder)},
@@ -60,7 +60,7 @@ def ran(program, folder, *arguments):
     sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
 )
 def test_each_program_starts_or_names_the_files(program, folder):
-    """A program that runs code of users cannot start; the others import such a folder last."""
+    """A program that runs users' code cannot start; the others import such a folder last."""
     code, out, err = ran(program, folder, "--help")
 
     if program in WITH_CODE_OF_USERS:
@@ -74,7 +74,7 @@ def test_each_program_starts_or_names_the_files(program, folder):
 @pytest.mark.parametrize("name", ["re", "fnmatch", "msvcrt", "queue"])
 @pytest.mark.parametrize("program", ["palaestra", "palaestra-train"])
 def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_path):
-    """The start of Python imports some, without an error, and keeps them in modules that it has imported."""
+    """Python imports some of them at its start without an error, and keeps them in imported modules."""
     (tmp_path / f"{name}.py").write_text("x = 1\n")
     arguments = ("plan", JOB) if program == "palaestra" else ("--help",)
 
@@ -88,7 +88,7 @@ def test_a_module_that_is_harmless_by_itself_is_found_too(program, name, tmp_pat
 
 
 def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
-    """The simulators would start, and the trainer would not."""
+    """Otherwise the simulators would start and the trainer would not."""
     code, _, err = ran("palaestra", folder, "run", JOB, "--dir", tmp_path / "runs")
 
     assert code == 2
@@ -98,7 +98,7 @@ def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
 
 
 def test_a_script_or_notebook_beside_such_a_file_gets_its_name(tmp_path):
-    """As the error of its first import, before NumPy and PyTorch fail with something else."""
+    """The first import raises this error, before NumPy and PyTorch fail with an unrelated one."""
     (tmp_path / "queue.py").write_text("waypoints = []\n")
 
     done = subprocess.run(

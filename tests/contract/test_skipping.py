@@ -1,4 +1,4 @@
-"""`make test` on a machine where no program of a cluster was ever built, as every newcomer's is."""
+"""`make test` on a machine on which no program of a cluster was built, such as a new user's."""
 
 import os
 import re
@@ -13,9 +13,9 @@ DEADLINE_S = 200
 
 
 TESTS = (
-    "tests/integration/monitoring/test_alerts_fire.py",  # a test asks for them itself
-    "tests/integration/monitoring/test_dashboards_answer.py",  # a fixture asks for them
-    "tests/unit/chart/test_chart_values.py",  # what it calls does
+    "tests/integration/monitoring/test_alerts_fire.py",  # the test itself needs them
+    "tests/integration/monitoring/test_dashboards_answer.py",  # a fixture needs them
+    "tests/unit/chart/test_chart_values.py",  # a function that it calls needs them
 )
 
 

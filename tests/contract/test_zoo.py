@@ -1,4 +1,4 @@
-"""Jobs from files of RL-Baselines3-Zoo: what the command writes, the trainer accepts."""
+"""The trainer accepts the jobs that the command writes from files of RL-Baselines3-Zoo."""
 
 import pytest
 import yaml
@@ -37,7 +37,7 @@ def test_classes_have_the_short_names_that_the_trainer_knows():
     "algorithm", ["dqn", "sac", "td3", "ddpg", "qrdqn", "tqc", "crossq", "ppo", "a2c", "trpo"]
 )
 def test_the_trainer_accepts_the_hyperparameters_of_a_converted_entry(algorithm):
-    """A schedule and classes of PyTorch stand in every file of Zoo."""
+    """Every file of Zoo has a schedule and classes of PyTorch."""
     written = load(convert(FILE, f"{algorithm}.yml", env="a-v0").text).spec.trainer.algorithm
 
     assert check(Algorithm(name=written.name, hyperparameters=written.hyperparameters, policy=written.policy))
@@ -53,7 +53,7 @@ def test_no_word_that_lives_elsewhere_becomes_a_hyperparameter():
 
 
 def test_the_written_job_can_be_planned(tmp_path, capsys):
-    """The next command that a person types is `palaestra plan` or `palaestra run`."""
+    """A person's next command is `palaestra plan` or `palaestra run`."""
     (tmp_path / "ppo.yml").write_text(FILE)
     out = tmp_path / "job.yaml"
 

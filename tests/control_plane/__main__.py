@@ -1,6 +1,7 @@
 """Run a control plane without nodes until Ctrl-C: `python -m tests.control_plane`.
 
-Prints the kubeconfig of its administrator when it is ready. Builds the programs if need be.
+It prints the path of its administrator's kubeconfig when it is ready, and builds its programs if they are
+missing.
 """
 
 import os
@@ -16,10 +17,10 @@ ENDS = {signal.SIGINT, signal.SIGTERM}
 
 
 def main() -> int:
-    """Run it; ends with the terminal that it runs in."""
+    """Run it; it ends with its terminal."""
     os.environ[REQUIRED] = "1"
     with tempfile.TemporaryDirectory(prefix="control-plane-") as folder, running(Path(folder)) as plane:
-        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # not before: the programs would inherit it
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # not earlier, because the programs would inherit it
         sys.stdout.write(f"export KUBECONFIG={plane.kubeconfig}\n")
         sys.stdout.flush()
         signal.sigwait(ENDS)

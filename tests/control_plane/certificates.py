@@ -1,4 +1,4 @@
-"""Keys and certificates of one control plane, made by openssl, good for a day."""
+"""Keys and certificates of one control plane, made by openssl and valid for a day."""
 
 import subprocess
 from collections.abc import Iterable
@@ -25,14 +25,14 @@ class Authority:
 
     @classmethod
     def create(cls, folder: Path, *extensions: str) -> "Authority":
-        """Make the authority's own key and certificate in a folder that exists."""
+        """Make the authority's own key and certificate in an existing folder."""
         authority, subject = cls(folder), ("-subj", "/CN=control-plane")
         _openssl("req", "-x509", "-new", *CURVE, *DAY, *subject, *_added(extensions), *_files(authority.pair))
         return authority
 
     @property
     def pair(self) -> Pair:
-        """The authority's own."""
+        """The authority's own certificate and key."""
         return Pair(certificate=self.folder / "ca.crt", key=self.folder / "ca.key")
 
     def server(self, addresses: Iterable[str]) -> Pair:
@@ -40,7 +40,7 @@ class Authority:
         return self._issue(self.folder / "server", "/CN=kube-apiserver", _named(addresses))
 
     def bare_server(self, addresses: Iterable[str], days: int) -> Pair:
-        """Make the certificate of a server without key identifiers; -1 days: until yesterday."""
+        """Make the certificate of a server without key identifiers; with -1 days it has expired."""
         pair, request, extensions = (self.folder / name for name in ("bare", "request", "extensions"))
         found = _pair(pair)
         no_identifiers = "subjectKeyIdentifier=none\nauthorityKeyIdentifier=none\n"
@@ -53,7 +53,7 @@ class Authority:
         return found
 
     def client(self, user: str, group: str, folder: Path) -> Pair:
-        """Make the certificate of a user with its files in a folder; an empty group adds no group."""
+        """Make a user's certificate in a folder; an empty group adds no group."""
         subject = f"/O={group}/CN={user}" if group else f"/CN={user}"
         return self._issue(folder / user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
 

@@ -1,8 +1,8 @@
-"""A control plane without nodes: etcd, kube-apiserver and kube-controller-manager as processes of ours.
+"""A control plane without nodes: etcd, kube-apiserver and kube-controller-manager as processes.
 
-It stands in seconds and does what a cluster does up to the pods: it validates, stores, watches, collects
-garbage and turns Jobs into pods that nobody runs. Everything listens on the loopback only, and no program of
-it connects to anything else. The processes end with the one that started them, however that ends (pdeathsig).
+It starts in seconds and behaves like a cluster except for running pods: it validates, stores, watches,
+collects garbage and turns Jobs into pods. Everything listens only on the loopback, and no program of it
+connects to anything else. The processes end with their parent, however that ends (pdeathsig).
 """
 
 import json
@@ -27,16 +27,16 @@ from tests.json_lines import whole_lines
 from tests.waiting import eventually
 
 ADDRESS = LOOPBACK
-SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
-# Each of the others would watch a handful of kinds, and ask for more, for nobody.
+SERVICES = "198.19.0.0/24"  # a range for benchmarks, to which no route leads
+# Each of the other controllers would watch a few kinds and send more requests, for nothing.
 CONTROLLERS = (
     "job-controller",
     "garbage-collector-controller",
     "namespace-controller",
-    "serviceaccount-controller",  # a namespace without an account lets no pod in
+    "serviceaccount-controller",  # a namespace without an account accepts no pods
     "resourcequota-controller",
-    "clusterrole-aggregation-controller",  # gives `edit` and `view` what others add to them
-    "persistentvolumeclaim-protection-controller",  # lets claims go that the API server holds back
+    "clusterrole-aggregation-controller",  # adds other kinds to `edit` and `view`
+    "persistentvolumeclaim-protection-controller",  # releases claims that the API server protects
 )
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
@@ -46,7 +46,7 @@ AUDIT = {
     "kind": "Policy",
     "omitStages": ["RequestReceived"],
     "rules": [
-        # Of Secrets what was answered too: a request does not tell whether it asks for their content.
+        # For Secrets, responses are recorded too: a request does not show whether it reads their content.
         {
             "level": "RequestResponse",
             "userGroups": ["system:serviceaccounts"],
@@ -68,11 +68,11 @@ class ControlPlane:
     Attributes:
         folder: certificates, logs and data; the caller that made the folder removes it.
         port: of the API server, on 127.0.0.1.
-        authority: signs more clients.
-        kubeconfig: of an administrator.
+        authority: signs the certificates of clients.
+        kubeconfig: that of an administrator.
         binaries: the folder of the programs.
-        clients: the folder for certificates and kubeconfigs of users; each process that uses the plane has
-            one of its own.
+        clients: the folder for users' certificates and kubeconfigs; each process that uses the plane has its
+            own.
     """
 
     folder: Path
@@ -89,19 +89,19 @@ class ControlPlane:
 
     @property
     def audit_log(self) -> Path:
-        """A line of JSON for each request, with user, verb and object."""
+        """One line of JSON for each request, with user, verb and object."""
         return self.folder / "audit.log"
 
     def audit(self, about: str = "") -> list[dict[str, Any]]:
-        """Return the recorded requests in their order, without a last line that is being written.
+        """Return the recorded requests in order, without an incomplete last line.
 
         Args:
-            about: only entries that have this text in them, such as a namespace: all tests share the log.
+            about: only entries that contain this text, such as a namespace, because all tests share the log.
         """
         return whole_lines(self.audit_log, about)
 
     def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
-        """Run kubectl as the administrator, with `sent` as its standard input; 60 s at most."""
+        """Run kubectl as the administrator, with `sent` as its standard input; the limit is 60 s."""
         return subprocess.run(
             [str(self.binaries / "kubectl"), f"--cache-dir={self.folder / 'cache'}", *arguments],
             env={"KUBECONFIG": str(self.kubeconfig)},
@@ -113,13 +113,13 @@ class ControlPlane:
         )
 
     def await_kinds(self, *kinds: str) -> None:
-        """Return when CustomResourceDefinitions, named as for kubectl, are established and in discovery.
+        """Return when CustomResourceDefinitions, named as for kubectl, are established and discovered.
 
-        kubectl gives up at once on one that has no condition yet, and keeps for hours a discovery without
-        it, which `kubectl get CATEGORY` trusts; `kubectl api-resources` reads discovery anew.
+        kubectl fails at once for one that has no condition yet. It also caches for hours a discovery that
+        lacks it, and `kubectl get CATEGORY` trusts that; `kubectl api-resources` refreshes it.
 
         Raises:
-            TooLate: one of them is not within 30 s.
+            TooLate: one of them is not ready within 30 s.
         """
         wait = ("wait", "--for=condition=Established", "--timeout=10s", *kinds)
         eventually(lambda: self.kubectl(*wait).returncode == 0)
@@ -128,7 +128,7 @@ class ControlPlane:
         eventually(lambda: names <= set(self.kubectl("api-resources", "--output=name").stdout.split()))
 
     def kubeconfig_of(self, user: str, group: str = "") -> Path:
-        """Write a kubeconfig for a user with a certificate and return its path."""
+        """Write a kubeconfig for a user with a certificate, and return its path."""
         return _kubeconfig(self.clients / f"{user.replace(':', '-')}.kubeconfig", self, user, group)
 
 
@@ -139,14 +139,14 @@ def running(
     """Run a control plane with its files in `folder` until the block ends.
 
     Args:
-        folder: exists and is empty.
-        kinds: a file of definitions that are there before the controllers, one of which looks for new kinds
-            every 30 s only: it collects the garbage.
-        requests_per_s: that each controller may send; None: Kubernetes' own default.
+        folder: an existing empty folder.
+        kinds: a file of definitions that exist before the controllers start; the garbage collector looks for
+            new kinds only every 30 s.
+        requests_per_s: the limit of each controller; None is Kubernetes' own default.
 
     Raises:
         NoPrograms: the programs are not built.
-        DidNotStart: one of them did not come up in 60 s, or the definitions are refused.
+        DidNotStart: one of them was not ready in 60 s, or the definitions are refused.
         TooLate: the definitions are not served within 30 s.
     """
     authority = Authority.create(folder)
@@ -213,7 +213,7 @@ def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
         f"--service-cluster-ip-range={SERVICES}",
         "--endpoint-reconciler-type=none",
         "--authorization-mode=RBAC",
-        "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # as OpenShift has it
+        "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # as on OpenShift
         f"--audit-policy-file={policy}",
         f"--audit-log-path={plane.audit_log}",
     ]
@@ -239,7 +239,10 @@ def _controllers(plane: ControlPlane, requests_per_s: int | None) -> list[str]:
 
 @contextmanager
 def started(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[bytes]"]:
-    """Run a program until the block ends, with its log in `folder`; it does not outlive us."""
+    """Run a program until the block ends, with its log in `folder`.
+
+    It ends with this process at the latest.
+    """
     if not shutil.which("setpriv"):
         raise DidNotStart(
             "setpriv is missing, without which processes could be left behind; install util-linux"
@@ -273,7 +276,7 @@ def _wait_ready(plane: ControlPlane, api_server: "subprocess.Popen[bytes]") -> N
             answer = urllib.request.urlopen(f"{plane.server}/readyz", context=context, timeout=5)
             answer.close()
             return
-        threading.Event().wait(0.1)  # a port that nobody listens on yet gives nothing to wait for
+        threading.Event().wait(0.1)  # a port without a listener has no event
     log = (plane.folder / "kube-apiserver.log").read_text(errors="replace")[-3000:]
     raise DidNotStart(f"kube-apiserver: not ready in {START_DEADLINE_S} s; its log ends with\n{log}")
 

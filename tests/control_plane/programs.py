@@ -1,4 +1,4 @@
-"""Where etcd, kube-apiserver, kubectl, helm and others are; built by tests/cluster/programs.sh."""
+"""The folder of etcd, kube-apiserver, kubectl, helm and others, which tests/cluster/programs.sh builds."""
 
 import os
 import subprocess
@@ -9,19 +9,19 @@ SCRIPTS = Path(__file__).parents[1] / "cluster"
 PROGRAMS = ("etcd", "kube-apiserver", "kube-controller-manager", "kubectl")
 REQUIRED = "PALAESTRA_REQUIRE_CLUSTER"
 BUILD_DEADLINE_S = 1800
-MISSING = 3  # what programs.sh --built answers where one of them is missing
+MISSING = 3  # the exit code of programs.sh --built if one is missing
 
 
 class NoPrograms(Exception):
-    """The programs are not there; the message names the command that builds them."""
+    """The programs are missing; the message has the command that builds them."""
 
 
 @cache
 def programs(names: tuple[str, ...] = PROGRAMS) -> Path:
-    """Return the folder that holds the programs; build them where they are required and missing.
+    """Return the folder with the programs, and build them if they are required and missing.
 
     Raises:
-        NoPrograms: they are not built, and PALAESTRA_REQUIRE_CLUSTER is not 1; or building them failed.
+        NoPrograms: they are not built and PALAESTRA_REQUIRE_CLUSTER is not 1, or the build failed.
     """
     command = f"tests/cluster/programs.sh {' '.join(names)}"
     wanted = names if os.environ.get(REQUIRED) == "1" else ("--built", *names)

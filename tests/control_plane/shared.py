@@ -1,9 +1,9 @@
-"""One control plane for all pytest processes of a run: the first that needs it starts it.
+"""One control plane for all pytest processes of a run, which the first process that needs it starts.
 
-A process of its own runs it, `python -m tests.control_plane.shared FOLDER OWNER`, with Palaestra installed.
-It ends, and removes the folder, when `end` is called or when the process OWNER, which is pytest itself, has
-ended in any way. Tests keep apart by namespaces. A test that stops a control plane, fills it or changes its
-definition of TrainingJobs has one of its own (`plane.running`).
+A separate process runs it, `python -m tests.control_plane.shared FOLDER OWNER`, with Palaestra installed. It
+ends and removes the folder when `end` is called, or when the process OWNER, which is pytest itself, has ended
+in any way. Tests are separated by namespaces. A test that stops a control plane, fills it or changes its
+definition of TrainingJobs has its own (`plane.running`).
 """
 
 import fcntl
@@ -28,23 +28,24 @@ from tests.control_plane.programs import programs
 
 ROOT = Path(__file__).parents[2]
 KINDS = ROOT / "manifests" / "crd.yaml"
-# Of each controller: those of one process would share Kubernetes' own 20, and tests of four processes wait.
+# This is the limit of each controller. With Kubernetes' default, the controllers of a process share 20, and
+# the tests of four processes would wait.
 REQUESTS_PER_S = 200
 ENDS_S = 30.0
-VARIABLE = "PALAESTRA_TESTS_CONTROL_PLANE"  # process and folder of the run
-ADDRESS = "plane.json"  # is written once the control plane is ready
+VARIABLE = "PALAESTRA_TESTS_CONTROL_PLANE"  # the process and the folder of the run
+ADDRESS = "plane.json"  # written when the control plane is ready
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One run of pytest: its process, and the folder of its control plane, which need not exist."""
+    """One run of pytest: its process, and the folder of its control plane, which may not exist."""
 
     owner: int
     folder: Path
 
     @classmethod
     def of_this_process(cls) -> Self:
-        """Return the run that this process is a worker of, or that it begins; its workers inherit it."""
+        """Return the run of this worker process, or begin a run that its workers inherit."""
         owner, _, folder = os.environ.get(VARIABLE, "").partition(":")
         if owner == str(os.getppid()):
             return cls(os.getppid(), Path(folder))
@@ -57,7 +58,7 @@ def joined(run: Run, clients: Path) -> ControlPlane:
     """Return the control plane of a run, and start it if no process has.
 
     Args:
-        run: the same for all of its processes.
+        run: the same for all processes of the run.
         clients: an existing folder of this process, see `ControlPlane`.
 
     Raises:
@@ -83,7 +84,7 @@ def joined(run: Run, clients: Path) -> ControlPlane:
 
 
 def end(run: Run) -> None:
-    """End the control plane of a run that this process began, if it has one, and wait for its processes."""
+    """End the control plane of a run that this process began, and wait for its processes."""
     address = run.folder / ADDRESS
     if run.owner != os.getpid() or not address.exists():
         return
@@ -94,7 +95,10 @@ def end(run: Run) -> None:
 
 
 def _start(run: Run) -> None:
-    """Start the process that runs it, which is not waited for: it may outlive this one, but not the owner."""
+    """Start the process that runs it, without waiting for its end.
+
+    It may outlive this process, but not the owner.
+    """
     command = [sys.executable, "-m", "tests.control_plane.shared", str(run.folder), str(run.owner)]
     ready, written = os.pipe()
     with tempfile.TemporaryFile("w+") as log:
@@ -111,7 +115,7 @@ def _start(run: Run) -> None:
         )
         os.close(written)
         with os.fdopen(ready) as lines:
-            if not lines.readline():  # it has ended, with its folder; each of its waits has a deadline
+            if not lines.readline():  # it has ended and removed its folder; all its waits have deadlines
                 log.seek(0)
                 raise DidNotStart(log.read()[-3000:])
 
@@ -135,7 +139,7 @@ def main(folder: Path, owner: int) -> int:
 
 
 def _leave(*_: object) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once: the second would cut the clean-up short
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second signal would cut the cleanup short
     raise SystemExit(0)
 
 

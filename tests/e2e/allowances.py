@@ -1,15 +1,15 @@
-"""What the tests' installation allows jobs; by default, as in manifests/install.yaml, it allows nothing."""
+"""The permissions for jobs in the tests' installation; by default, manifests/install.yaml allows nothing."""
 
 from tests.e2e.cluster import Cluster
 from tests.e2e.namespace import OPERATOR, SYSTEM
 
 MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
-OF_THE_PAGE = "urgent"  # of docs/howto/queues.md
+OF_THE_PAGE = "urgent"  # used in docs/howto/queues.md
 OPTIONS = tuple(f"--allow-priority-class={name}" for name in (MISSING, LIMITED, URGENT, OF_THE_PAGE))
 
 
 def allow(cluster: Cluster) -> None:
-    """Let jobs have the priority classes of the tests, and wait until the operator has started with them."""
+    """Allow jobs the priority classes of the tests, and wait until the operator has restarted with them."""
     deployment = cluster.get("deployments", SYSTEM, OPERATOR)
     assert deployment is not None, "Palaestra is not installed"
     [container] = deployment["spec"]["template"]["spec"]["containers"]

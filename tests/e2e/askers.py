@@ -1,4 +1,4 @@
-"""Pods that ask other pods something over the network, from wherever a test puts them."""
+"""Pods that send requests to other pods, from wherever a test puts them."""
 
 from importlib.metadata import version
 
@@ -24,7 +24,7 @@ ThreadingHTTPServer(("", 9090), SimpleHTTPRequestHandler).serve_forever()
 
 
 def plain_pod(name: str, labels: dict[str, str] | None = None, **container: object) -> Object:
-    """Return a pod of one small container, which sleeps, in the terms of *restricted*."""
+    """Return a pod of one small container that sleeps and meets *restricted*."""
     return {
         "apiVersion": "v1",
         "kind": "Pod",
@@ -48,7 +48,7 @@ def plain_pod(name: str, labels: dict[str, str] | None = None, **container: obje
 
 
 class Asker:
-    """A pod that runs in a namespace until that is deleted; `labels` are its own."""
+    """A pod that runs until its namespace is deleted; `labels` are its own."""
 
     def __init__(self, namespace: Namespace, name: str, labels: dict[str, str] | None = None) -> None:
         self.namespace, self.name, self.labels = namespace, name, labels or {}
@@ -56,12 +56,12 @@ class Asker:
         namespace.wait(lambda: trains(namespace.get("pods", name) or {"status": {}}))
 
     def get(self, pod: Object, port: int, path: str) -> str:
-        """Return what another pod answers over HTTP."""
+        """Return another pod's response over HTTP."""
         address = f"http://{pod['status']['podIP']}:{port}{path}"
         return self.namespace.execute(self.name, "python3", "-c", ASK, address, container="main")
 
     def reaches(self, pod: Object, port: int) -> bool:
-        """Return whether a connection to a port of another pod is answered."""
+        """Return whether a connection to another pod's port succeeds."""
         assert runs(pod)
         where = (pod["status"]["podIP"], str(port), str(CONNECT_S))
         try:

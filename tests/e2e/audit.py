@@ -1,6 +1,6 @@
-"""What the API server of the cluster has written down of the service accounts' requests.
+"""The API server's record of the service accounts' requests.
 
-tests/cluster/audit-policy.yaml says what is written; the kubelet shows its node's logs to administrators.
+tests/cluster/audit-policy.yaml determines the record; the kubelet shows its node's logs to administrators.
 """
 
 import os
@@ -16,9 +16,9 @@ BEGUN = datetime.now(UTC).isoformat()  # modules are imported before the first t
 
 
 def recorded(cluster: Cluster) -> list[Use]:
-    """Return all that service accounts have asked for since the tests began.
+    """Return all requests of service accounts since the tests began.
 
-    A cluster that somebody else has made need not write it down; then the test is skipped.
+    A cluster that somebody else made may have no record; the test is then skipped.
     """
     nodes = [node["metadata"]["name"] for node in cluster.select("nodes", None)]
     logs = [cluster.kubectl("get", "--raw", LOG.format(node=node)) for node in nodes]

@@ -1,8 +1,8 @@
-"""What goes on beside the tests, in threads of its own: it waits, and they need not wait for it.
+"""Tests that mostly wait run in their own threads, at the same time as others.
 
-A test that is marked `beside` is called before its turn, when the first test of its place in the order has
-its own (tests/e2e/conftest.py), in a namespace of its own. Its turn waits for the end, and what came of it is
-what came of the test. It may ask for `namespace`, `job` and `tmp_path`, and for what it is parametrized with.
+A test with the mark `beside` starts early, when the first test of its group in the order begins
+(tests/e2e/conftest.py), in its own namespace. Its turn waits for its end, and has its result. It may request
+`namespace`, `job` and `tmp_path`, and its own parameters.
 """
 
 import threading
@@ -21,7 +21,7 @@ from tests.e2e.namespace import Namespace, unique
 T = TypeVar("T")
 
 BESIDE = "beside"  # the mark
-AT_ONCE = 12  # small pods that begin beside two trainings, on two processors
+AT_ONCE = 12  # small pods that start next to two trainings, on two processors
 END_S = 1200.0
 
 
@@ -33,18 +33,21 @@ class Beside(Generic[T]):
         threading.Thread(target=self._tell, args=(act,), daemon=True).start()
 
     def result(self) -> T:
-        """Return what it returns, once it does; raise what it raises."""
+        """Wait for the result of `act` and return it, or raise its error."""
         return self._result.result(END_S)
 
     def _tell(self, act: Callable[[], T]) -> None:
         try:
             self._result.set_result(act())
-        except BaseException as error:  # noqa: BLE001 - whoever asks for the result gets it
+        except BaseException as error:  # noqa: BLE001 - the caller of `result` gets it
             self._result.set_exception(error)
 
 
 class Stories:
-    """The tests that are marked `beside`, each with a namespace, deleted here if its turn never comes."""
+    """The tests with the mark `beside`, each with a namespace.
+
+    A namespace is deleted here if its test never starts.
+    """
 
     def __init__(self, cluster: Cluster, folders: pytest.TempPathFactory) -> None:
         self._cluster = cluster
@@ -54,7 +57,7 @@ class Stories:
         self._room = threading.BoundedSemaphore(AT_ONCE)
 
     def __enter__(self) -> Self:
-        """Begin nothing yet."""
+        """Start nothing yet."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -63,7 +66,7 @@ class Stories:
             namespace.delete()
 
     def begin(self, items: Iterable[pytest.Item]) -> None:
-        """Call those of these tests that are marked and have not begun."""
+        """Start those of these tests that have the mark and have not begun."""
         for item in items:
             if item.get_closest_marker(BESIDE) and item.nodeid not in self._begun:
                 assert isinstance(item, pytest.Function)
@@ -72,11 +75,11 @@ class Stories:
                 self._begun[item.nodeid] = Beside(partial(self._call, item, namespace))
 
     def take(self, item: pytest.Item) -> Namespace | None:
-        """Return the namespace of a test that has begun, for its taker to delete; None: it has not."""
+        """Return the namespace of a test that has begun, which the caller must delete, or None."""
         return self._namespaces.pop(item.nodeid, None)
 
     def end(self, item: pytest.Item) -> bool:
-        """Wait for the end of a test and raise what it has raised; return False if it has not begun."""
+        """Wait for the end of a test and raise its error; return False if it has not begun."""
         story = self._begun.get(item.nodeid)
         if story:
             story.result()

@@ -1,7 +1,7 @@
-"""A Kubernetes cluster as people reach it: the API server's own JSON, and kubectl.
+"""A Kubernetes cluster as a user reaches it, by the API server's own JSON and kubectl.
 
-Nothing of Palaestra's own client is used, so that a mistake in it cannot hide itself. One
-`kubectl proxy` serves all requests: it knows every way to log in that a kubeconfig can name.
+Palaestra's own client is not used, so that a mistake in it cannot hide itself. One `kubectl proxy` serves all
+requests, because it knows every way to log in that a kubeconfig can have.
 """
 
 import json
@@ -25,14 +25,14 @@ GROUPS = {
     "rolebindings": "apis/rbac.authorization.k8s.io/v1",
     "trainingjobs": "apis/palaestra.dev/v1alpha1",
     "workloads": "apis/kueue.x-k8s.io/v1beta2",
-}  # every other kind that is used here belongs to the core
+}  # every other kind here is in the core group
 REQUEST_S = 30
 COMMAND_S = 60
 ROLLOUT_S = 120
 
 
 class Refused(Exception):
-    """The API server's no: `code` of HTTP, `reason` in one word, `message` in a sentence."""
+    """The API server's refusal: `code` of HTTP, `reason` in one word, `message` in a sentence."""
 
     def __init__(self, code: int, status: Object) -> None:
         self.code = code
@@ -42,7 +42,7 @@ class Refused(Exception):
 
 
 class Cluster:
-    """A cluster that `kubectl` reaches as it is called here, with `options`, while this is entered."""
+    """A cluster that `kubectl` reaches with `options`, while this context is entered."""
 
     def __init__(self, kubectl: str, *options: str) -> None:
         self._kubectl = (kubectl, *options)
@@ -50,8 +50,8 @@ class Cluster:
         self._address = ""
 
     def __enter__(self) -> Self:
-        """Begin to serve the API on a port of loopback."""
-        # Ended by us alone: Ctrl-C must leave it to what is still to be cleaned up.
+        """Begin to serve the API on a port of the loopback."""
+        # Only this object ends it: Ctrl-C must leave it to the cleanup.
         self._proxy = subprocess.Popen(
             ["setpriv", "--pdeathsig=TERM", *self._kubectl, "proxy", "--port=0"],
             stdout=subprocess.PIPE,
@@ -73,11 +73,11 @@ class Cluster:
         self._proxy.stdout.close()
 
     def acting_as(self, user: str, group: str) -> Self:
-        """Return the cluster as it answers to somebody else, to be entered."""
+        """Return the cluster as another user sees it, to be entered."""
         return type(self)(self._kubectl[0], f"--as={user}", f"--as-group={group}")
 
     def get(self, kind: str, namespace: str | None, name: str) -> Object | None:
-        """Return an object, None when there is none."""
+        """Return an object, or None."""
         try:
             return self.request("GET", path(kind, namespace, name))
         except Refused as refusal:
@@ -91,7 +91,7 @@ class Cluster:
         return items
 
     def create(self, kind: str, content: Object) -> Object:
-        """Create an object, in the namespace that its metadata names; return it as it was accepted."""
+        """Create an object in the namespace of its metadata, and return it as stored."""
         return self.request("POST", path(kind, content["metadata"].get("namespace")), content)
 
     def patch(self, kind: str, namespace: str | None, name: str, content: Object) -> Object:
@@ -99,7 +99,10 @@ class Cluster:
         return self.request("PATCH", path(kind, namespace, name), content)
 
     def delete(self, kind: str, namespace: str | None, name: str, *, grace_s: int | None = None) -> None:
-        """Delete an object and, in the background, what it owns; that it is gone already is no error."""
+        """Delete an object and, in the background, those that it owns.
+
+        An object that is already gone is not an error.
+        """
         options: Object = {"propagationPolicy": "Background"}
         if grace_s is not None:
             options["gracePeriodSeconds"] = grace_s
@@ -110,16 +113,16 @@ class Cluster:
                 raise
 
     def evict(self, namespace: str, pod: str) -> None:
-        """Ask for a pod as `kubectl drain` does."""
+        """Evict a pod as `kubectl drain` does."""
         metadata = {"name": pod, "namespace": namespace}
         content = {"apiVersion": "policy/v1", "kind": "Eviction", "metadata": metadata}
         self.request("POST", f"{path('pods', namespace, pod)}/eviction", content)
 
     def request(self, method: str, where: str, content: Object | None = None) -> Object:
-        """Return the API server's answer.
+        """Return the API server's response.
 
         Raises:
-            Refused: it said no.
+            Refused: it refused the request.
         """
         kind = "application/merge-patch+json" if method == "PATCH" else "application/json"
         body = None if content is None else json.dumps(content).encode()
@@ -135,24 +138,24 @@ class Cluster:
                 raise Refused(error.code, _status(error.read())) from None
 
     def kubectl(self, *arguments: str, within_s: float = COMMAND_S) -> str:
-        """Run kubectl; return its output, whatever comes of it."""
+        """Run kubectl and return its output, whatever its exit code is."""
         ended = subprocess.run(
             [*self._kubectl, *arguments], capture_output=True, text=True, timeout=within_s, check=False
         )
         return ended.stdout + ended.stderr
 
     def rolled_out(self, namespace: str, deployment: str) -> None:
-        """Wait until a Deployment is as it is to be; what happens where it never is shows later."""
+        """Wait until a Deployment is rolled out; a failure shows later."""
         wait = f"--timeout={ROLLOUT_S}s"
         self.kubectl(
             "rollout", "status", f"deploy/{deployment}", "-n", namespace, wait, within_s=ROLLOUT_S + 10
         )
 
     def execute(self, namespace: str, pod: str, container: str, *command: str) -> str:
-        """Run a command in a container; return its standard output.
+        """Run a command in a container, and return its standard output.
 
         Raises:
-            CommandFailed: it ended with another code than 0, or could not be run.
+            CommandFailed: its exit code is not 0, or it could not be run.
         """
         ended = subprocess.run(
             [*self._kubectl, "exec", "-n", namespace, pod, "-c", container, "--", *command],
@@ -164,7 +167,7 @@ class Cluster:
 
 
 class CommandFailed(Exception):
-    """A command in a container ended with `code`; `output` is what it wrote to standard error."""
+    """A command in a container ended with `code`; `output` is its standard error."""
 
     def __init__(self, code: int, output: str) -> None:
         self.code, self.output = code, output
@@ -172,7 +175,7 @@ class CommandFailed(Exception):
 
 
 def path(kind: str, namespace: str | None, name: str = "") -> str:
-    """Return where the API server keeps a kind, or an object of it."""
+    """Return the path of a kind, or of an object of it, at the API server."""
     parts = [GROUPS.get(kind, "api/v1"), *(["namespaces", namespace] if namespace else []), kind]
     return "/".join([*parts, name] if name else parts)
 

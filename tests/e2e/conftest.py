@@ -1,8 +1,9 @@
-"""What the end-to-end tests share: the cluster, a namespace for each test, small jobs, one long run.
+"""Fixtures of the end-to-end tests: the cluster, a namespace for each test, small jobs, one long run.
 
-`make e2e` brings a cluster up, installs Palaestra in it and runs these tests; without one they are
-skipped. They come place by place: those that look at the middle of the long run, then most, then those of
-LATE. The long run goes on beside them until its end is looked at; what mostly waits, beside its own place.
+`make e2e` starts a cluster, installs Palaestra in it and runs these tests; without one they are skipped. They
+run in groups: those that look at the middle of the long run, then most tests, then those of LATE. The long
+run continues meanwhile until a test looks at its end. Tests that mostly wait run at the same time as their
+own group.
 """
 
 import os
@@ -23,7 +24,7 @@ from tests.e2e.namespace import Namespace, unique
 CHOSEN = "PALAESTRA_E2E"  # set to confirm that the cluster of $KUBECONFIG is for tests
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
 BEGIN_FIRST = ("long_run", "evictions", "always_interrupted")
-LATE = {  # marks, in the order of their places
+LATE = {  # marks, in the order of their groups
     "after_the_kills": "looks at what an operator must see at once",
     "comes_late": "looks at the end of what waits for minutes",
     "changes_the_cluster": "brings what acts on each Job and each pod that is made",
@@ -34,7 +35,7 @@ LATE = {  # marks, in the order of their places
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Name the marks by which tests are put in order."""
+    """Register the marks that determine the order of tests."""
     config.addinivalue_line("markers", f"{BESIDE}: mostly waits, so it goes on beside others; see beside.py")
     for mark, why in LATE.items():
         config.addinivalue_line("markers", f"{mark}: {why}")
@@ -42,7 +43,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put them in order; of a place those come last that go on beside the others."""
+    """Sort them; in a group, the tests that run at the same time as others come last."""
     items.sort(key=lambda item: (_place(item), item.get_closest_marker(BESIDE) is not None))
 
 
@@ -53,7 +54,7 @@ def _place(item: pytest.Item) -> int:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Wait for a test that has begun before its turn, instead of calling it."""
+    """Wait for a test that has started early, instead of calling it."""
     stories = pyfuncitem.funcargs["stories"]
     assert isinstance(stories, Stories)
     return stories.end(pyfuncitem) or None
@@ -61,7 +62,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
-    """Show the namespace of a test that failed, while it is still there."""
+    """Show the namespace of a failed test while it still exists."""
     report = yield
     if report.failed and report.when != "teardown":
         for each in getattr(item, "funcargs", {}).values():
@@ -84,21 +85,21 @@ def cluster() -> Iterator[Cluster]:
 
 @pytest.fixture(scope="session")
 def begun(request: pytest.FixtureRequest) -> dict[str, object]:
-    """Begin what takes long before all tests, if one of them looks at it; return it by its fixture's name."""
+    """Start the long fixtures before all tests, if a test uses them, and return them by name."""
     looked_at = {name for item in request.session.items for name in getattr(item, "fixturenames", ())}
     return {name: request.getfixturevalue(name) for name in BEGIN_FIRST if name in looked_at}
 
 
 @pytest.fixture(scope="session")
 def stories(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stories]:
-    """The tests that go on beside others."""
+    """The tests that run at the same time as others."""
     with Stories(cluster, tmp_path_factory) as told:
         yield told
 
 
 @pytest.fixture(autouse=True)
 def in_order(begun: dict[str, object], stories: Stories, request: pytest.FixtureRequest) -> None:
-    """Begin, with the first test of a place, those of the same place that go on beside it."""
+    """With the first test of a group, start those of the group that run at the same time."""
     place = _place(request.node)
     if place > 0 and isinstance(run := begun.get("long_run"), LongRun):
         run.wait_for_kills()
@@ -107,21 +108,21 @@ def in_order(begun: dict[str, object], stories: Stories, request: pytest.Fixture
 
 @pytest.fixture(scope="session")
 def long_run(cluster: Cluster) -> Iterator[LongRun]:
-    """move-to-target in full and a job of two replicas, while their operator is killed again and again."""
+    """The full training move-to-target and a job of two replicas, while their operator is killed."""
     with LongRun(Namespace(cluster, unique("move-to-target"))) as run:
         yield run
 
 
 @pytest.fixture(scope="session")
 def evictions(cluster: Cluster) -> Iterator[Evictions]:
-    """A training whose pod is evicted again and again."""
+    """A training whose pod is evicted repeatedly."""
     with Evictions(Namespace(cluster, unique("evictions"))) as run:
         yield run
 
 
 @pytest.fixture(scope="session")
 def always_interrupted(cluster: Cluster) -> Iterator[Namespace]:
-    """A namespace with the job `always`, whose trainer exits with 75 at the same step each time."""
+    """A namespace with the job `always`, whose trainer always exits with 75 at the same step."""
     made = Namespace(cluster, unique("always"))
     word = '{"step": 7, "reason": "Interrupted: always"}'
     made.apply(make_job("always", script=f"echo '{word}' >/dev/termination-log; exit 75", backoffLimit=0))
@@ -131,7 +132,7 @@ def always_interrupted(cluster: Cluster) -> Iterator[Namespace]:
 
 @pytest.fixture(scope="module")
 def shared(cluster: Cluster, request: pytest.FixtureRequest) -> Iterator[Namespace]:
-    """A namespace for all tests of a module, whose jobs wait side by side."""
+    """A namespace for all tests of a module, whose jobs wait at the same time."""
     made = Namespace(cluster, unique(request.path.stem.removeprefix("test_")))
     yield made
     made.delete()
@@ -139,7 +140,7 @@ def shared(cluster: Cluster, request: pytest.FixtureRequest) -> Iterator[Namespa
 
 @pytest.fixture
 def namespace(cluster: Cluster, stories: Stories, request: pytest.FixtureRequest) -> Iterator[Namespace]:
-    """A namespace of the test's own, which enforces *restricted*."""
+    """A namespace of the test, which enforces *restricted*."""
     made = stories.take(request.node) or Namespace(cluster, unique(request.node.name))
     yield made
     made.delete()
@@ -147,7 +148,7 @@ def namespace(cluster: Cluster, stories: Stories, request: pytest.FixtureRequest
 
 @pytest.fixture(scope="session")
 def make_namespace(cluster: Cluster) -> Iterator[Callable[[str], Namespace]]:
-    """Makes further namespaces, which stay until all tests have ended."""
+    """Return a function that makes further namespaces, which stay until all tests have ended."""
     made = []
 
     def make(name: str) -> Namespace:
@@ -161,7 +162,7 @@ def make_namespace(cluster: Cluster) -> Iterator[Callable[[str], Namespace]]:
 
 @pytest.fixture(scope="session")
 def monitor(cluster: Cluster) -> Iterator[Asker]:
-    """A pod where metrics are gathered from; a namespace that was there before stays."""
+    """A pod in the namespace that collects metrics; an existing namespace stays."""
     there = cluster.get("namespaces", None, MONITORING) is not None
     place = Namespace(cluster, MONITORING, there=there)
     name = unique("monitor")
@@ -173,5 +174,5 @@ def monitor(cluster: Cluster) -> Iterator[Asker]:
 
 @pytest.fixture
 def job() -> Callable[..., Object]:
-    """Makes small TrainingJobs; the test says what matters."""
+    """Return the builder of small TrainingJobs; a test sets the fields that matter."""
     return make_job

@@ -1,6 +1,6 @@
-"""What somebody tries who may write TrainingJobs and make no pods; each attempt with what it would gain.
+"""Attempts of a user who may write TrainingJobs but create no pods, each with its possible gain.
 
-Data only: tests/e2e/test_escalations.py says what becomes of them.
+This module has only data: tests/e2e/test_escalations.py tests the outcomes.
 """
 
 import copy
@@ -20,7 +20,10 @@ HOST = [{"name": "node", "hostPath": {"path": "/"}}]
 
 
 class Request(NamedTuple):
-    """A request past the TrainingJob; `where` is below the API's root, `{namespace}` the author's own."""
+    """A request for other objects.
+
+    `where` is relative to the API's root, `{namespace}` is the author's own.
+    """
 
     name: str
     gain: str
@@ -39,7 +42,7 @@ class Field(NamedTuple):
     told: str = ""
 
 
-# Refused by the roles that the author has.
+# The author's roles refuse these.
 REQUESTS = (
     Request(
         "a pod",
@@ -110,7 +113,7 @@ REQUESTS = (
     ),
 )
 
-# Refused by the definition of a TrainingJob.
+# The definition of a TrainingJob refuses these.
 REFUSED = (
     Field(
         "the cluster's own priority",
@@ -226,7 +229,7 @@ REFUSED = (
     ),
 )
 
-# Unknown to a TrainingJob: refused where the client asks for it, dropped otherwise.
+# A TrainingJob has no such field: a strict client gets an error, otherwise the field is dropped.
 UNKNOWN = (
     Field("a folder of the node", "Reads and writes the node.", "spec.trainer.volumes", HOST),
     Field(
@@ -256,7 +259,8 @@ UNKNOWN = (
 _APART = "spec.scheduling.affinity"
 _REQUIRED = "requiredDuringSchedulingIgnoredDuringExecution"
 
-# Accepted as a request, and not carried out: nobody has opened what they name, or allowed what they ask.
+# These are accepted as requests but held: nobody has opened the named objects or allowed the requested
+# fields.
 HELD = (
     Field(
         "a cluster of its own",
@@ -337,7 +341,7 @@ HELD = (
 _LABELS = "spec.scheduling.podLabels"
 _ANNOTATIONS = "spec.scheduling.podAnnotations"
 
-# Accepted as a request, and held: this installation allows neither labels nor annotations of pods.
+# These are accepted as requests but held: this installation allows no labels and annotations of pods.
 METADATA = tuple(
     Field(name, gain, path, {key: value}, "PodMetadataNotAllowed")
     for name, gain, path, key, value in (
@@ -444,7 +448,7 @@ METADATA = tuple(
 
 
 def authors(name: str, *fields: tuple[str, Any]) -> Object:
-    """Return a TrainingJob with fields of it set by path; suspended, as nothing of it has to run."""
+    """Return a TrainingJob with fields set by path; it is suspended, because nothing has to run."""
     job = make_job(name, script="exit 0", suspend=True)
     for path, value in fields:
         *above, last = path.split(".")

@@ -1,7 +1,7 @@
-"""A training whose pod is evicted again and again, beside the other tests.
+"""A training whose pod is evicted repeatedly, at the same time as other tests.
 
-For more than a minute of it nothing happens: Kubernetes waits 10 s before the second pod of a Job, and
-twice as long before each further one.
+For more than a minute it only waits: Kubernetes waits 10 s before the second pod of a Job, and twice as long
+before each further one.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ NEXT_POD_S = 600.0
 
 @dataclass(frozen=True)
 class Evicted:
-    """What came of it: the step `seen` before each eviction, the run's `attempts`, its `last` pod."""
+    """The result: the step `seen` before each eviction, the run's `attempts`, and its `last` pod."""
 
     seen: list[int]
     attempts: list[Object]
@@ -30,23 +30,23 @@ class Evicted:
 
 
 class Evictions:
-    """The evicted job, and the `namespace` it is in."""
+    """The evicted job and its `namespace`."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
 
     def __enter__(self) -> Self:
-        """Begin the training, and evicting its pods."""
+        """Start the training and the evictions."""
         self.namespace.apply(make_slow_job(NAME, steps=STEPS, every_steps=EVERY_STEPS, backoffLimit=0))
         self._evicted = Beside(self._evict_again_and_again)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take the job away; an eviction that waits for a pod finds none."""
+        """Delete the job; an eviction that waits for a pod then finds none."""
         self.namespace.delete()
 
     def result(self) -> Evicted:
-        """Return what came of the evictions, once the last of them is over."""
+        """Return the result after the last eviction."""
         return self._evicted.result()
 
     def _evict_again_and_again(self) -> Evicted:
@@ -55,7 +55,7 @@ class Evictions:
         return Evicted(seen, self.namespace.in_run(last, "attempts.jsonl"), last)
 
     def _evict(self, step: int) -> int:
-        """Evict the pod past a step, as a drain of its node does; return the step it was seen at."""
+        """Evict the pod past a step, as a drain of its node does, and return the observed step."""
         space = self.namespace
         pod, seen = space.wait_for_step(NAME, step, NEXT_POD_S)
         space.cluster.evict(space.name, pod)

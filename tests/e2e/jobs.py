@@ -1,4 +1,4 @@
-"""Small TrainingJobs. Those that train need as much as any; those that only wait fit beside others."""
+"""Small TrainingJobs: those that train need normal resources, and those that only wait fit next to others."""
 
 import copy
 from typing import Any
@@ -8,7 +8,7 @@ from tests.e2e.namespace import example
 
 WAIT = "trap exit TERM; sleep 3600 & wait"
 LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
-# Steps that take time and no processor.
+# Steps that take time but no processor.
 SLOW = {
     "name": "collect",
     "role": "Collect",
@@ -19,7 +19,7 @@ SMALL = {"requests": {"cpu": "60m", "memory": "400Mi"}}
 
 
 def make_claim(name: str, **metadata: Any) -> Object:
-    """Return a claim that is no job's own."""
+    """Return a claim that belongs to no job."""
     spec = {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "64Mi"}}}
     return {"metadata": {"name": name, **metadata}, "spec": spec}
 
@@ -27,8 +27,8 @@ def make_claim(name: str, **metadata: Any) -> Object:
 def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
     """Return manifests/examples/tiny.yaml with another `name` and these fields of its spec.
 
-    `script` is bash in the place of the training, with one simulator only. `simulator` are fields of
-    the first group of simulators; a `trainer` given is merged into the example's.
+    `script` is bash that replaces the training, with one simulator only. `simulator` has fields of the first
+    group of simulators; a given `trainer` is merged into the example's.
     """
     job = example("tiny")
     job["metadata"]["name"] = name
@@ -48,9 +48,9 @@ def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None =
 
 
 def make_slow_job(name: str, *, steps: int, every_steps: int, **spec: Any) -> Object:
-    """Return a training of at most 25 steps a second, so that it still goes on when all has been looked at.
+    """Return a training of at most 25 steps per second, so that it still runs after all checks.
 
-    However busy the machine is; and there is room for it beside others.
+    This holds however busy the machine is, and the job leaves room for others.
     """
     trainer = {
         "steps": steps,

@@ -36,7 +36,7 @@ helm() {
 
 
 class Kueue:
-    """Kueue, its queue and the namespace of the page; `folder` is where the commands are typed."""
+    """Kueue, and the queue and namespace of the page; commands are typed in `folder`."""
 
     def __init__(self, cluster: Cluster, folder: Path) -> None:
         self._cluster = cluster
@@ -44,14 +44,14 @@ class Kueue:
         self._chart = ""
 
     def taken(self) -> str:
-        """Return what is in the way: a Kueue or a namespace that somebody else has made; "": nothing."""
+        """Return the existing Kueue or namespace that conflicts, or ""."""
         if self._kinds():
             return "this cluster has a Kueue of its own"
         there = self._cluster.get("namespaces", None, NAMESPACE) is not None
         return f"this cluster has a namespace {NAMESPACE} of its own" if there else ""
 
     def install(self) -> Namespace:
-        """Type the page down to its last section; return the namespace that has the queue."""
+        """Run the page up to its last section, and return the namespace with the queue."""
         (self._folder / "manifests").symlink_to(ROOT / "manifests")
         made = _said("kueue.sh")
         _said("load.sh", f"{made}/image.tar")
@@ -62,7 +62,7 @@ class Kueue:
         return Namespace(self._cluster, NAMESPACE, there=True)
 
     def remove(self) -> None:
-        """Type the last section, whatever there is to take away; nothing may be left."""
+        """Run the last section, whatever exists, and check that nothing is left."""
         said = [self._type("-uc", block) for block in blocks(UNDOING, "sh")]
         assert self.taken() == "", "".join(each.stdout + each.stderr for each in said)
 
@@ -78,21 +78,21 @@ class Kueue:
 
 
 def scheduling(priority: str | None = None) -> Object:
-    """Return the `scheduling` that the page gives a job, of a priority class or of none."""
+    """Return the `scheduling` that the page gives a job, with a priority class or without."""
     specs: list[Object] = [yaml.safe_load(block).get("spec", {}) for block in blocks(DOING, "yaml")]
     found: list[Object] = [spec["scheduling"] for spec in specs if "scheduling" in spec]
     return next(each for each in found if each.get("priorityClassName") == priority)
 
 
 def workload(space: Namespace, job: str) -> Object:
-    """Return what Kueue made of the first replica of a TrainingJob, empty before it has."""
+    """Return Kueue's Workload for the first replica of a TrainingJob, empty before it exists."""
     found = space.cluster.select("workloads", space.name)
     owners = {each["metadata"]["ownerReferences"][0]["name"]: each for each in found}
     return owners.get(f"{job}-0", {})
 
 
 def wait_for_words(space: Namespace, job: str, kind: str, told: str) -> str:
-    """Wait until a condition of a TrainingJob's Workload tells so, and return all that it says."""
+    """Wait until a condition of a TrainingJob's Workload contains a text, and return its message."""
 
     def said() -> str:
         found = words(workload(space, job), kind)
@@ -102,7 +102,7 @@ def wait_for_words(space: Namespace, job: str, kind: str, told: str) -> str:
 
 
 def wait_for_message(space: Namespace, job: str, told: str) -> str:
-    """Wait until the status of a TrainingJob's first replica has these words, and return its message."""
+    """Wait until the status of a TrainingJob's first replica contains a text, and return its message."""
     path = "jsonpath={.status.replicas[0].message}"
 
     def said() -> str:
@@ -113,13 +113,13 @@ def wait_for_message(space: Namespace, job: str, told: str) -> str:
 
 
 def words(found: Object, kind: str) -> str:
-    """Return what a condition of a Workload says, "" where it has none."""
+    """Return the message of a Workload's condition, or ""."""
     conditions = found.get("status", {}).get("conditions", [])
     return next((each["message"] for each in conditions if each["type"] == kind), "")
 
 
 def leave_room_for_one(space: Namespace, job: str) -> None:
-    """Lower the quota of the queue to what a TrainingJob takes, once that is admitted."""
+    """Lower the quota of the queue to the size of a TrainingJob, after that job is admitted."""
     admission = space.wait(lambda: workload(space, job).get("status", {}).get("admission"))
     (pods,) = admission["podSetAssignments"]
     queue = space.cluster.get("clusterqueues", None, QUEUE)
@@ -131,20 +131,20 @@ def leave_room_for_one(space: Namespace, job: str) -> None:
 
 
 def change_queue(space: Namespace, **spec: Any) -> None:
-    """Change fields of the ClusterQueue, and wait until Kueue goes by them."""
+    """Change fields of the ClusterQueue, and wait until Kueue uses them."""
     changed = space.cluster.patch("clusterqueues", None, QUEUE, {"spec": spec})
     generation = changed["metadata"]["generation"]
     space.wait(lambda: _looked_at(space.cluster.get("clusterqueues", None, QUEUE)) == generation)
 
 
 def _looked_at(queue: Object | None) -> int | None:
-    """Return the generation of a ClusterQueue that Kueue has taken in."""
+    """Return the generation of a ClusterQueue that Kueue has processed."""
     conditions = queue["status"].get("conditions", []) if queue else []
     return next((each["observedGeneration"] for each in conditions if each["type"] == "Active"), None)
 
 
 def _said(script: str, *arguments: str) -> str:
-    """Run a script of tests/cluster; return its last line."""
+    """Run a script of tests/cluster, and return its last line."""
     done = subprocess.run(
         [str(ROOT / "tests" / "cluster" / script), *arguments],
         capture_output=True, text=True, timeout=MADE_S, check=False,

@@ -1,4 +1,4 @@
-"""A training in full and one of two replicas, which go on beside other tests; their operator is killed."""
+"""A full training and one of two replicas run at the same time as other tests; their operator is killed."""
 
 import random
 import threading
@@ -10,23 +10,23 @@ from tests.e2e.jobs import SMALL, make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, example, named, trains
 
 NAME, STEPS = "move-to-target", 50_000
-# Its steps take time and no processor: it goes on until the last kill on the fastest machine.
+# Its steps take time but no processor, so that it runs until the last kill on the fastest machine.
 PAIR, PAIR_STEPS = "pair", 3_000
 TENTH_OF_A_SECOND = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=100"}]
 REPLICAS = 2
 KILLS = 10
 SEED = 20
-# Between two kills, in turn: so long that an operator leads again, 15 s after the last renewal of the one
-# before it, and so short that it has only just begun. In all less than the pair takes.
+# The gaps between two kills alternate. One is long enough for an operator to lead again, 15 s after the last
+# renewal; in the other it has only just started. Together they are shorter than the pair's training.
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
-EVALUATED_EVERY = 12_500  # more often than this, evaluations are a third of the training's time
-# So little that there is room beside it, and that others come before it where processors are short.
+EVALUATED_EVERY = 12_500  # with more evaluations, these take a third of the training's time
+# The requests are so small that other pods fit next to it and come first if processors are short.
 SIMULATOR = {"requests": {"cpu": "1m", "memory": "160Mi"}}
 TRAINER = {"requests": {"cpu": "1m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
 
-# The operator is process 1 of its container, which no signal from inside can kill, unless the pod
-# shares its process namespace.
+# The operator is process 1 of its container, which no signal from inside can kill unless the pod shares its
+# process namespace.
 SHARED = {"spec": {"template": {"spec": {"shareProcessNamespace": True}}}}
 KILL = """
 import os, pathlib, signal
@@ -38,7 +38,7 @@ for entry in pathlib.Path("/proc").glob("[0-9]*"):
 
 
 class LongRun:
-    """Both jobs: the `namespace` they are in, and when their operator was killed: `kills`."""
+    """Both jobs, their `namespace`, and `kills`, the times at which their operator was killed."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
@@ -47,7 +47,7 @@ class LongRun:
         self._killer = threading.Thread(target=self._kill_again_and_again, daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin the trainings, and the killing in the same moment."""
+        """Start the trainings and the kills at the same time."""
         make_killable(self.namespace)
         self.namespace.apply(_full())
         self.namespace.apply(_pair())
@@ -55,13 +55,13 @@ class LongRun:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End both."""
+        """End both jobs."""
         self._ended.set()
         self._killer.join(END_S)
         self.namespace.delete()
 
     def pods(self) -> list[Object]:
-        """Return the pods of the pair once both train."""
+        """Return the pods of the pair when both train."""
         space = self.namespace
 
         def training() -> list[Object]:
@@ -72,7 +72,7 @@ class LongRun:
         return space.wait(training, LONG_S)
 
     def wait_for_kills(self) -> None:
-        """Wait until nobody kills the operator any more."""
+        """Wait until the last kill of the operator."""
         self._killer.join(END_S)
 
     def end(self, name: str) -> Object:
@@ -115,7 +115,7 @@ def _pair() -> Object:
 
 
 def make_killable(namespace: Namespace) -> None:
-    """Let a test kill the operator as a node does that runs out of memory."""
+    """Prepare the operator so that a test can kill it as a node without memory does."""
     cluster = namespace.cluster
     cluster.patch("deployments", SYSTEM, OPERATOR, SHARED)
     cluster.rolled_out(SYSTEM, OPERATOR)
@@ -128,16 +128,16 @@ def operators(namespace: Namespace) -> list[Object]:
 
 
 def kill_operator(namespace: Namespace, pod: str = "") -> bool:
-    """Kill an operator with SIGKILL and put a new one in its place; return whether one was there.
+    """Kill an operator with SIGKILL and replace it by a new one; return whether one existed.
 
-    The pod goes too: a container that is killed often is made anew only minutes later.
+    The pod is deleted too: a container that is killed often is restarted only minutes later.
     """
     chosen = pod or next((named(each) for each in operators(namespace)), "")
     if not chosen:
         return False
     try:
         namespace.cluster.execute(SYSTEM, chosen, "operator", "python3", "-c", KILL)
-    except CommandFailed:  # it was gone already, or is not up yet
+    except CommandFailed:  # it has already ended, or is not up yet
         return False
     namespace.cluster.delete("pods", SYSTEM, chosen, grace_s=0)
     return True

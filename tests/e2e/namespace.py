@@ -1,4 +1,4 @@
-"""One namespace with the TrainingJobs of one test in it: what is asked there, and what is waited for."""
+"""A namespace with the TrainingJobs of one test: its objects, requests and waits."""
 
 import json
 import re
@@ -19,8 +19,9 @@ SYSTEM = "palaestra-system"
 EXAMPLES = Path(__file__).parents[2] / "manifests/examples"
 RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
 LOOK_EVERY_S = 0.5
-# For what takes 10 s and for a tiny training, on a busy machine whose operator is killed again and again.
-# A pod may wait until the pods of other tests leave room on the only node: five minutes on a slow machine.
+# These are for waits of 10 s and for a tiny training, on a busy machine whose operator is killed repeatedly.
+# A pod may wait until the pods of other tests leave room on the only node, which takes five minutes on a slow
+# machine.
 SHORT_S, LONG_S = 180.0, 900.0
 JOB = "palaestra.dev/job"
 NAME_BYTES = 40
@@ -38,11 +39,11 @@ print(json.dumps(sorted({node for _, nodes in published + services for node in n
 
 
 class NeverHeld(AssertionError):
-    """A claim that did not become true in time."""
+    """A condition did not become true in time."""
 
 
 class Namespace:
-    """A namespace that enforces the *restricted* Pod Security Standard, and all that is in it."""
+    """A namespace that enforces the *restricted* Pod Security Standard, with all its objects."""
 
     def __init__(self, cluster: Cluster, name: str, *, there: bool = False) -> None:
         self.cluster = cluster
@@ -51,20 +52,20 @@ class Namespace:
             cluster.create("namespaces", {"metadata": {"name": name, "labels": RESTRICTED}})
 
     def delete(self) -> None:
-        """Begin to delete it with everything in it."""
+        """Start to delete it with everything in it."""
         self.cluster.delete("namespaces", None, self.name)
 
     def apply(self, job: Object) -> Object:
-        """Create a TrainingJob; return it as it was accepted."""
+        """Create a TrainingJob, and return it as stored."""
         return self.create("trainingjobs", job)
 
     def create(self, kind: str, content: Object) -> Object:
-        """Create an object here."""
+        """Create an object in this namespace."""
         metadata = {**content["metadata"], "namespace": self.name}
         return self.cluster.create(kind, {**content, "metadata": metadata})
 
     def get(self, kind: str, name: str) -> Object | None:
-        """Return an object of here, None when there is none."""
+        """Return an object of this namespace, or None."""
         return self.cluster.get(kind, self.name, name)
 
     def select(self, kind: str, job: str = "") -> list[Object]:
@@ -82,12 +83,12 @@ class Namespace:
         return status
 
     def replica(self, name: str, index: int = 0) -> Object:
-        """Return what the status says of a replica, empty before it says anything."""
+        """Return the status of a replica, empty before it exists."""
         replicas = self.status(name).get("replicas", [])
         return next((each for each in replicas if each["index"] == index), {})
 
     def condition(self, name: str, kind: str) -> Object:
-        """Return a condition of a TrainingJob, empty before it has it."""
+        """Return a condition of a TrainingJob, empty before it exists."""
         conditions = self.status(name).get("conditions", [])
         return next((each for each in conditions if each["type"] == kind), {})
 
@@ -96,18 +97,18 @@ class Namespace:
         return self.condition(name, kind).get("status") == "True"
 
     def reasons(self, name: str) -> set[str]:
-        """Return every reason that its true conditions and its replicas give."""
+        """Return all reasons of its true conditions and of its replicas."""
         status = self.status(name)
         conditions = [each for each in status.get("conditions", []) if each["status"] == "True"]
         return {each["reason"] for each in [*conditions, *status.get("replicas", [])] if each.get("reason")}
 
     def pods(self, name: str, *, live: bool = True) -> list[Object]:
-        """Return the pods of a TrainingJob that run, oldest first; all of them when not `live`."""
+        """Return the running pods of a TrainingJob, oldest first; with `live` False, all pods."""
         found = sorted(self.select("pods", name), key=lambda pod: pod["metadata"]["creationTimestamp"])
         return [pod for pod in found if not live or runs(pod)]
 
     def pods_made(self, name: str) -> int:
-        """Return how many pods the job controller tells to have made for a TrainingJob's Jobs."""
+        """Return the number of pods that the Job controller reports to have made for a TrainingJob's Jobs."""
         made = [
             each
             for each in self.select("events")
@@ -118,7 +119,7 @@ class Namespace:
         return sum(each.get("count") or 1 for each in made)
 
     def events(self, name: str, reason: str) -> list[str]:
-        """Return the messages of the events about a TrainingJob that have a reason."""
+        """Return the messages of the events about a TrainingJob with a reason."""
         about = {"kind": "TrainingJob", "name": name}
         return [
             each["message"]
@@ -127,15 +128,15 @@ class Namespace:
         ]
 
     def execute(self, pod: str, *command: str, container: str = "trainer") -> str:
-        """Run a command in a container of a pod; return its standard output."""
+        """Run a command in a container of a pod, and return its standard output."""
         return self.cluster.execute(self.name, pod, container, *command)
 
     def fetch(self, pod: str, address: str, *, container: str = "trainer") -> str:
-        """Return what an address answers to a container of a pod."""
+        """Return the response of an address to a container of a pod."""
         return self.execute(pod, "python3", "-c", ASK, address, container=container)
 
     def trainer_status(self, pod: str) -> Object:
-        """Return what the trainer of a pod says of itself, empty while it does not answer."""
+        """Return the status of a pod's trainer, empty while it does not respond."""
         try:
             status: Object = json.loads(self.fetch(pod, "http://127.0.0.1:9090/status"))
         except CommandFailed:
@@ -143,7 +144,7 @@ class Namespace:
         return status
 
     def ros_nodes(self, pod: str) -> set[str]:
-        """Return the names that a pod's ROS master knows."""
+        """Return the node names at a pod's ROS master."""
         return set(json.loads(self.execute(pod, "python3", "-c", ROS_NODES)))
 
     def in_run(self, pod: str, name: str) -> list[Object]:
@@ -155,7 +156,7 @@ class Namespace:
         """Return the first true value of `claim`.
 
         Raises:
-            NeverHeld: there was none in time.
+            NeverHeld: it was not true in time.
         """
         try:
             return eventually(claim, within_s, LOOK_EVERY_S)
@@ -163,20 +164,20 @@ class Namespace:
             raise NeverHeld(f"not within {within_s:.0f} s: {_source(claim)}") from late
 
     def wait_for_reason(self, name: str, reason: str, within_s: float = SHORT_S) -> Object:
-        """Wait until the status gives a reason for the only replica; return what it says of it then."""
+        """Wait until the only replica has a reason, and return its status."""
         return self.wait(lambda: _if_so(self.replica(name), reason), within_s)
 
     def wait_for_end(self, name: str, within_s: float = LONG_S) -> str:
-        """Wait until a TrainingJob has ended; return its phase."""
+        """Wait until a TrainingJob has ended, and return its phase."""
         ends = {"Succeeded", "Failed"}
         return self.wait(lambda: {self.status(name).get("phase", "")} & ends, within_s).pop()
 
     def wait_for_pod(self, name: str, within_s: float = SHORT_S) -> str:
-        """Wait until the trainer of a TrainingJob's only pod runs; return the pod's name."""
+        """Wait until the trainer in a TrainingJob's only pod runs, and return the pod's name."""
         return self.wait(lambda: next((named(pod) for pod in self.pods(name) if trains(pod)), ""), within_s)
 
     def wait_for_step(self, name: str, step: int, within_s: float = LONG_S) -> tuple[str, int]:
-        """Wait until the trainer of the only pod has passed a step; return the pod's name and its step."""
+        """Wait until the only pod's trainer has passed a step, and return the pod's name and step."""
 
         def passed() -> tuple[str, int] | None:
             told = {named(pod): self.trainer_status(named(pod)) for pod in self.pods(name) if trains(pod)}
@@ -186,7 +187,7 @@ class Namespace:
         return self.wait(passed, within_s)
 
     def dump(self) -> str:
-        """Return what a person needs who asks why a claim never held."""
+        """Return the information for a person who looks for the cause of a failed wait."""
         parts = [
             yaml.safe_dump(_plain(self.select("trainingjobs"))),
             yaml.safe_dump(_plain(self.select("jobs"))),
@@ -201,7 +202,7 @@ class Namespace:
 
 
 def unique(text: str) -> str:
-    """Return a name for a namespace that nothing else has, made of the name of a test."""
+    """Return a unique name for a namespace, made from the name of a test."""
     plain = re.sub("[^a-z0-9]+", "-", text.removeprefix("test_").lower())[:NAME_BYTES].strip("-")
     return f"e2e-{plain}-{time.time_ns() // 1_000_000 % 0xFFFFFF:x}"
 
@@ -213,7 +214,7 @@ def named(content: Object) -> str:
 
 
 def runs(pod: Object) -> bool:
-    """Return whether a pod has not ended, and nobody has deleted it."""
+    """Return whether a pod has not ended and is not being deleted."""
     ended = pod["status"].get("phase") in {"Succeeded", "Failed"}
     return not ended and "deletionTimestamp" not in pod["metadata"]
 
@@ -224,7 +225,7 @@ def trains(pod: Object) -> bool:
 
 
 def statuses(content: Object) -> list[Object]:
-    """Return the statuses of all containers of a pod, in their order; other objects have none."""
+    """Return the statuses of all containers of a pod, in order; other objects have none."""
     status = content.get("status", {})
     return [*status.get("initContainerStatuses", []), *status.get("containerStatuses", [])]
 
@@ -240,7 +241,7 @@ def _if_so(replica: Object, reason: str) -> Object:
 
 
 def _plain(objects: list[Object]) -> list[Object]:
-    """Return objects without what only servers read, and without what the pods show as well."""
+    """Return objects without fields for servers, and without those that the pods show as well."""
     for each in objects:
         each["metadata"].pop("managedFields", None)
         each["spec"].pop("template", None)

@@ -1,7 +1,7 @@
-"""Build an image of a user's own, FROM one of the release's: python -m tests.e2e.own_image FOLDER NAME.
+"""Build a user's own image from one of the release's images: python -m tests.e2e.own_image FOLDER NAME.
 
-FOLDER holds the Dockerfile. Prints the path of the archive, which is written beside FOLDER. A process of its
-own, because the lock of the images' store is for the main thread of one.
+FOLDER has the Dockerfile. The program prints the path of the archive, which is written next to FOLDER. It is
+a separate process, because the lock of the image store works only in a main thread.
 """
 
 import os
@@ -12,12 +12,12 @@ from tools.images import cache
 from tools.images.engines import Buildah, Docker, Order
 
 ROOT = Path(__file__).parents[2]
-ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each; tests/cluster/e2e.sh sets it
+ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each, which tests/cluster/e2e.sh sets
 LOCK_DEADLINE_S = 300
 
 
 def main() -> None:
-    """Build it; the command line is in the module's docstring."""
+    """Build the image; the command line is in the module's docstring."""
     context, name = Path(sys.argv[1]), sys.argv[2]
     archive = context.with_name(f"{context.name}.tar")
     store = cache.folder() / "images"
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def archives() -> dict[str, Path]:
-    """Return the archives by image; of the operator, which is there under two tags, the last."""
+    """Return the archives by image; the operator's has two tags, and the last one is used."""
     lines = Path(os.environ[ARCHIVES]).read_text().splitlines()
     return {name: Path(archive) for name, _, archive in (line.partition("=") for line in lines)}
 

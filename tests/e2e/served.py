@@ -1,4 +1,4 @@
-"""What a release of the chart serves to a browser: TensorBoard's page, and notebooks to who has the token."""
+"""Pages that a release of the chart serves to a browser: TensorBoard, and notebooks with a token."""
 
 import base64
 import json
@@ -20,7 +20,7 @@ print(json.dumps(codes))
 
 
 def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str:
-    """Return the first page of a server that no other pod reaches, as `kubectl port-forward` would."""
+    """Return the first page of a server that other pods cannot reach, as `kubectl port-forward` would."""
     fetch = (
         f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
     )
@@ -28,7 +28,7 @@ def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str
 
 
 def inside(cluster: Cluster, namespace: str, deployment: str, *command: str) -> str:
-    """Return all that a command says in a pod of a Deployment of the release."""
+    """Return the whole output of a command in a pod of a Deployment of the release."""
     return cluster.kubectl("exec", "-n", namespace, f"deploy/{deployment}", "--", *command)
 
 
@@ -40,7 +40,10 @@ def token_of(cluster: Cluster, secret: str) -> str:
 
 
 def assert_notebooks_are_served_to_who_has_the_token(cluster: Cluster, right: str) -> None:
-    """Without the token, only the API version, which the kubelet probes, and the login page are served."""
+    """Without the token, the server serves only the API version and the login page.
+
+    The kubelet's probe requests the API version.
+    """
 
     def codes(token: str) -> dict[str, int]:
         asked = ("/api", "/api/contents", "/lab")
@@ -54,7 +57,7 @@ def assert_notebooks_are_served_to_who_has_the_token(cluster: Cluster, right: st
 
 
 def assert_the_first_notebook_drives_a_robot(cluster: Cluster) -> None:
-    """With a kernel as the browser's, a simulator and a ROS master, in a pod that may do nothing else."""
+    """The pod has a kernel as the browser uses it, a simulator, a ROS master and no permissions."""
     look = (
         "touch /usr/written; ls /var/run/secrets/kubernetes.io; jupyter execute --inplace first-steps.ipynb"
     )

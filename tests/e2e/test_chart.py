@@ -1,6 +1,6 @@
-"""A release of the chart for one namespace, while the operator of the cluster is away.
+"""A release of the chart for one namespace, while the cluster's operator is scaled to 0.
 
-The release for the cluster is that of docs/howto/install.md, which tests/e2e/test_pages.py types.
+The release for the whole cluster is that of docs/howto/install.md, which tests/e2e/test_pages.py runs.
 """
 
 import os
@@ -14,12 +14,12 @@ from tests.e2e.tour import tour
 
 pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
-WITHIN_S = 600  # for `helm test`, which pulls nothing here
+WITHIN_S = 600  # for `helm test`, which pulls no image here
 RELEASE = "palaestra"
 
 
 def helm(verb, namespace, *options):
-    """Run Helm for our release on the cluster of $KUBECONFIG; return what it says."""
+    """Run Helm for the release on the cluster of $KUBECONFIG, and return its output."""
     chart = [str(CHART)] if verb == "install" else []
     done = subprocess.run(
         ["helm", verb, RELEASE, *chart, f"--namespace={namespace}", f"--timeout={WITHIN_S}s", *options],
@@ -35,7 +35,7 @@ def helm(verb, namespace, *options):
 
 @pytest.fixture
 def alone(cluster):
-    """The operator of the cluster is away, so that whatever happens another has done."""
+    """Scale the cluster's operator to 0, so that only another operator can act."""
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 0}})
     yield
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 1}})
@@ -43,11 +43,11 @@ def alone(cluster):
 
 
 def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - is put back
-    """With Roles only, and everything in that namespace."""
+    """The release has only Roles, and everything is in that namespace."""
     mode = ("--set=crds.install=false", f"--set=watchNamespaces={{{namespace.name}}}")
     helm("install", namespace.name, *mode, "--wait")
 
     assert f"{namespace.name}/palaestra-test" in helm("test", namespace.name)
     assert namespace.select("trainingjobs") == []
-    tour(namespace, namespace.name)  # of which tests/e2e/test_permissions.py finds the rights that were used
+    tour(namespace, namespace.name)  # test_permissions.py checks the rights that were used
     helm("uninstall", namespace.name, "--wait")

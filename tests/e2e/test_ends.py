@@ -1,4 +1,4 @@
-"""How a trainer's end is read: each row of the podFailurePolicy, and what it leaves in the status."""
+"""The operator evaluates a trainer's end by each row of the podFailurePolicy, and sets the status."""
 
 import pytest
 
@@ -9,11 +9,11 @@ pytestmark = pytest.mark.timeout(1200)
 INTERRUPTED_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen; exit 75"
 )
-# Each attempt adds a line to what the earlier ones have left in the run directory, and says them all.
+# Each attempt adds a line to those that earlier attempts left in the run directory, and prints them all.
 FAILS = (
     "mkdir -p $PALAESTRA_RUN; echo $PALAESTRA_POD_UID >>$PALAESTRA_RUN/pods; cat $PALAESTRA_RUN/pods; exit 70"
 )
-MOST_IGNORED = 10  # more pods than that without a step are not borne
+MOST_IGNORED = 10  # more pods without a step are not tolerated
 GIVEN_UP = {
     "refuses": (2, "ConfigurationRefused"),
     "spent": (80, "SimulatorBudgetSpent"),
@@ -24,7 +24,10 @@ GIVEN_UP = {
 @pytest.mark.beside
 @pytest.mark.parametrize("name", GIVEN_UP)
 def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
-    """Wrong configuration, spent restart budget, diverged: a second pod would come to the same."""
+    """A second pod would only end in the same way.
+
+    This holds after a wrong configuration, a spent restart budget or a divergence.
+    """
     code, reason = GIVEN_UP[name]
 
     namespace.apply(job(name, script=f"exit {code}"))
@@ -38,7 +41,7 @@ def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
 @pytest.mark.beside
 @pytest.mark.after_the_kills
 def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, job):
-    """Limit n: n failures are tried again, so n + 1 pods, which are attempts 1 to n + 1."""
+    """With a limit of n, n failures are retried, so n + 1 pods are made, which are attempts 1 to n + 1."""
     namespace.apply(job("fails", script=FAILS, backoffLimit=2))
 
     assert namespace.wait_for_end("fails", LONG_S) == "Failed"
@@ -60,7 +63,7 @@ def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, jo
 
 @pytest.mark.beside
 def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
-    """It may be tried again, and with a limit of 0 it is not."""
+    """It is retried, but not with a limit of 0."""
     namespace.apply(job("stalls", script="exit 82", backoffLimit=0))
 
     assert namespace.wait_for_end("stalls", LONG_S) == "Failed"
@@ -69,7 +72,10 @@ def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
 
 @pytest.mark.beside
 def test_an_interrupted_trainer_is_tried_again_and_not_counted(namespace, job):
-    """Exit 75 after a checkpoint: with a backoffLimit of 0 it still goes on, on the same volume."""
+    """The exit code is 75 after a checkpoint.
+
+    Even with a backoffLimit of 0 the run resumes, on the same volume.
+    """
     namespace.apply(job("interrupted", script=INTERRUPTED_ONCE, backoffLimit=0))
 
     assert namespace.wait_for_end("interrupted", LONG_S) == "Succeeded"
@@ -80,7 +86,7 @@ def test_an_interrupted_trainer_is_tried_again_and_not_counted(namespace, job):
 @pytest.mark.comes_late
 @pytest.mark.timeout(900)
 def test_a_trainer_that_is_always_interrupted_is_stopped(always_interrupted):
-    """Kubernetes sets no bound to pods whose failure is ignored, so the operator does."""
+    """Kubernetes does not limit pods whose failure is ignored, so the operator does."""
     space = always_interrupted
 
     assert space.wait_for_end("always", 800) == "Failed"
@@ -93,6 +99,6 @@ def test_a_trainer_that_is_always_interrupted_is_stopped(always_interrupted):
 
 
 def has_failed(job):
-    """Return whether a batch/v1 Job has failed for good."""
+    """Return whether a batch/v1 Job has finally failed."""
     conditions = job["status"].get("conditions", [])
     return any(each["type"] == "Failed" and each["status"] == "True" for each in conditions)

@@ -1,8 +1,8 @@
-"""Somebody may write TrainingJobs and make no pods: nothing that they write opens more to them.
+"""A user may write TrainingJobs but create no pods, and must gain no other permission by them.
 
-Their rights are those of the role in manifests/examples/platform/roles.yaml, bound alone. Each attempt stands
-in tests/e2e/escalations.py with what it would gain; here is what becomes of it. Nothing has to run for that:
-every job is suspended, and what the operator has made of it is looked at.
+The user has only the role in manifests/examples/platform/roles.yaml. Each attempt is in
+tests/e2e/escalations.py with its possible gain; these tests check the outcome. Nothing has to run for that:
+every job is suspended, and the operator's objects are checked.
 """
 
 import itertools
@@ -37,12 +37,12 @@ TEXTS = (
 
 
 def each(attempts):
-    """Run a test with every attempt, by its name."""
+    """Run a test with every attempt, by name."""
     return pytest.mark.parametrize("attempt", attempts, ids=[attempt.name for attempt in attempts])
 
 
 class Made(NamedTuple):
-    """What the operator has made of a TrainingJob with one replica."""
+    """The operator's objects for a TrainingJob with one replica."""
 
     owner: Object
     job: Object
@@ -50,13 +50,13 @@ class Made(NamedTuple):
 
     @property
     def template(self) -> Object:
-        """The pods that are to be."""
+        """The template of the pods."""
         found: Object = self.job["spec"]["template"]
         return found
 
     @property
     def training(self) -> Object:
-        """The training.yaml, read."""
+        """The parsed training.yaml."""
         read: Object = yaml.safe_load(self.config_map["data"]["training.yaml"])
         return read
 
@@ -75,7 +75,7 @@ class Made(NamedTuple):
 
 @pytest.fixture(scope="module")
 def author(cluster, shared):
-    """The cluster as it answers to somebody who may write TrainingJobs in the shared namespace."""
+    """The cluster as seen by a user who may write TrainingJobs in the shared namespace."""
     there = cluster.get("clusterroles", None, NAME) is not None
     if not there:
         cluster.create("clusterroles", ROLE)
@@ -90,7 +90,7 @@ def author(cluster, shared):
 
 @pytest.fixture(scope="module")
 def train(author, shared):
-    """Create a TrainingJob as the author; `strict` has it refused for a field that nobody knows."""
+    """Create a TrainingJob as the author; `strict` refuses unknown fields."""
 
     def create(job, *, strict=True):
         options = "?fieldValidation=Strict" if strict else "?fieldValidation=Ignore"
@@ -101,7 +101,7 @@ def train(author, shared):
 
 @pytest.fixture(scope="module")
 def planned(train, shared):
-    """Create a TrainingJob as the author, and return what the operator makes of it."""
+    """Create a TrainingJob as the author, and return the operator's objects for it."""
 
     def make(job, *, strict=True):
         name = train(job, strict=strict)["metadata"]["name"]
@@ -114,12 +114,12 @@ def planned(train, shared):
 
 @pytest.fixture(scope="module")
 def plain(planned):
-    """What comes of a job that attempts nothing."""
+    """The objects of a normal job."""
     return planned(authors("plain"))
 
 
 def nothing_is_left_to_see(planned):
-    """Return when the operator has planned a job that came after everything else."""
+    """Return when the operator has planned a job that was created after everything else."""
     planned(authors(f"later-{next(numbers)}"))
 
 
@@ -136,7 +136,7 @@ def unnamed(made):
 
 
 def test_the_author_trains(plain, author, shared):
-    """The control: without it, everything below would be refused for want of any right."""
+    """This is the control: without it, a missing permission could explain every refusal below."""
     assert plain.job["spec"]["suspend"] is True
     assert author.get("trainingjobs", shared.name, "plain")
 
@@ -144,7 +144,7 @@ def test_the_author_trains(plain, author, shared):
 @each(REQUESTS)
 @pytest.mark.usefixtures("plain")
 def test_a_request_past_the_trainingjob_is_forbidden(author, shared, attempt):
-    """The role holds nothing but TrainingJobs, and not their status."""
+    """The role grants only TrainingJobs, and not their status."""
     with pytest.raises(Refused) as refused:
         author.request(attempt.method, attempt.where.format(namespace=shared.name), attempt.content)
 
@@ -154,7 +154,7 @@ def test_a_request_past_the_trainingjob_is_forbidden(author, shared, attempt):
 
 @each(REFUSED)
 def test_a_value_that_would_open_something_is_refused(train, shared, attempt):
-    """By the API server, with the field, before anything is made."""
+    """The API server refuses it with the field, before any object is made."""
     name = f"refused-{REFUSED.index(attempt)}"
 
     with pytest.raises(Refused) as refused:
@@ -167,7 +167,7 @@ def test_a_value_that_would_open_something_is_refused(train, shared, attempt):
 
 @each(UNKNOWN)
 def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt):
-    """A client that does not ask for strictness loses it on the way; the pods are those of any job."""
+    """A client that is not strict drops the field; the pods are those of any job."""
     name = f"unknown-{UNKNOWN.index(attempt)}"
     job = authors(name, (attempt.path, attempt.value))
 
@@ -181,7 +181,7 @@ def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt
 
 @each((*HELD, *METADATA))
 def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
-    """Though it lies in the author's own namespace, or is only a word that other controllers obey."""
+    """This holds even in the author's own namespace, and for a text that only other controllers use."""
     name = f"held-{(*HELD, *METADATA).index(attempt)}"
     train(authors(name, (attempt.path, attempt.value)))
 
@@ -196,7 +196,7 @@ def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
     [("spec.trainer.image", "mine:1"), ("spec.storage.existingClaim", "kept"), ("spec.managedBy", "a.b/c")],
 )
 def test_what_was_accepted_is_not_exchanged(author, shared, plain, field, value):
-    """What has been looked at once would be another thing afterwards."""
+    """Otherwise an object that was checked could be replaced afterwards."""
     changed = authors("plain", (field, value))
 
     with pytest.raises(Refused, match="cannot be changed") as refused:
@@ -207,7 +207,7 @@ def test_what_was_accepted_is_not_exchanged(author, shared, plain, field, value)
 
 
 def test_an_affinity_holds_nothing_but_an_affinity(planned, plain):
-    """It is passed on as it is, so it could be thought to reach beyond its place."""
+    """The affinity is passed on unchanged, so it might have an effect elsewhere."""
     pod = {"hostNetwork": True, "nodeName": "palaestra-control-plane", "containers": []}
 
     made = planned(authors("reaches-out", ("spec.scheduling.affinity", pod)))
@@ -216,7 +216,7 @@ def test_an_affinity_holds_nothing_but_an_affinity(planned, plain):
 
 
 def test_a_node_selector_goes_past_no_taint(planned, plain):
-    """A control plane may be asked for, and keeps its taint."""
+    """A job may select the control plane's node, but does not tolerate its taint."""
     selector = {"node-role.kubernetes.io/control-plane": ""}
 
     made = planned(authors("on-masters", ("spec.scheduling.nodeSelector", selector)))
@@ -226,7 +226,7 @@ def test_a_node_selector_goes_past_no_taint(planned, plain):
 
 
 def test_strings_stay_strings(planned, plain):
-    """Whatever they look like to YAML, to a shell or to a template."""
+    """This holds whatever they mean to YAML, to a shell or to a template."""
     numbered = dict(enumerate(TEXTS))
     made = planned(
         authors(
@@ -238,7 +238,7 @@ def test_strings_stay_strings(planned, plain):
         )
     )
 
-    kept = [text.replace("$", "$$") for text in TEXTS]  # two of which a kubelet takes for one
+    kept = [text.replace("$", "$$") for text in TEXTS]  # a kubelet reads two of them as one
     environment = {variable["name"]: variable.get("value") for variable in made.trainer["env"]}
     assert {f"TEXT_{n}": text for n, text in enumerate(kept)}.items() <= environment.items()
     assert len(environment) == len(made.trainer["env"]) == len(plain.trainer["env"]) + len(TEXTS)
@@ -253,7 +253,7 @@ def test_strings_stay_strings(planned, plain):
 
 
 def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
-    """A mark that stops, an owner and a label would be believed where they are the operator's own."""
+    """A stop mark, an owner or a label would be trusted on the operator's own objects."""
     job = authors("decorated")
     settings = shared.get("configmaps", "settings")["metadata"]
     stranger = {"apiVersion": "v1", "kind": "ConfigMap", "name": "settings", "uid": settings["uid"]}
@@ -264,7 +264,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
     }
     job["status"] = {
         "phase": "Succeeded",
-        "release": {"trainer": "mine:1", "stub": "mine:1", "webots": "mine:1"},
+        "release": {"trainer": "mine:1", "stub": "mine:1", "mujoco": "mine:1", "webots": "mine:1"},
     }
 
     made = planned(job, strict=False)
@@ -280,7 +280,7 @@ def test_metadata_reaches_no_object_of_the_operator(planned, plain, shared):
 
 
 def test_a_job_of_somebody_else_is_left_alone(train, shared):
-    """A TrainingJob may be named so that its Job would have the name of theirs."""
+    """A TrainingJob's name may give its Job the name of somebody else's."""
     theirs = shared.create("jobs", somebody_s("theirs-0"))
 
     train(authors("theirs", ("spec.suspend", False)))
@@ -292,7 +292,7 @@ def test_a_job_of_somebody_else_is_left_alone(train, shared):
 
 @pytest.fixture
 def held(author, planned, shared):
-    """A deleted TrainingJob that its author's finalizer holds until the test ends."""
+    """A deleted TrainingJob that its author's finalizer keeps until the test ends."""
     job = authors("held")
     job["metadata"]["finalizers"] = ["example.com/mine"]
     planned(job)
@@ -303,10 +303,10 @@ def held(author, planned, shared):
 
 @pytest.mark.usefixtures("held")
 def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
-    """However long its author holds it.
+    """This holds however long its author keeps it.
 
-    The operator watches TrainingJobs and Jobs apart: the first deletion has to reach it before the second is
-    made, else it replaces the Job once.
+    The operator watches TrainingJobs and Jobs separately: the first deletion must reach it before the second,
+    or it replaces the Job once.
     """
     nothing_is_left_to_see(planned)
     shared.cluster.delete("jobs", shared.name, "held-0")
@@ -316,7 +316,7 @@ def test_a_finalizer_brings_a_deleted_job_no_more_pods(planned, shared):
 
 
 def test_a_job_of_another_controller_is_not_planned(train, planned, shared):
-    """Nobody gets anything by naming one."""
+    """A user gains nothing by naming another controller."""
     train(authors("spoofed", ("spec.managedBy", "example.com/other")))
     nothing_is_left_to_see(planned)
 

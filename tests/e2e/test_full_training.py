@@ -1,4 +1,4 @@
-"""move-to-target from `kubectl apply` to a policy, as the README promises it, and a job of two replicas."""
+"""move-to-target from `kubectl apply` to a policy, as in the README, and a job of two replicas."""
 
 import json
 from datetime import datetime
@@ -25,7 +25,7 @@ def ros_names(content):
 
 
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
-    """The paper's one limitation: a world with fixed names allows one simulator only."""
+    """A world with fixed names allows only one simulator, which is the limitation that the paper names."""
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
     generated = [name for each in space.select("configmaps", PAIR) for name in ros_names(each["data"])]
@@ -36,14 +36,14 @@ def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
             names.update(node for node in space.ros_nodes(pod) if "robotino" in node)
         return sum(map(len, known.values())) >= len(generated)
 
-    space.wait(all_known, LONG_S)  # never all at once, perhaps: each is restarted between two episodes
+    space.wait(all_known, LONG_S)  # each is restarted between two episodes, so perhaps not all at once
     first, second = known.values()
     assert first.isdisjoint(second)
     assert first | second == set(generated)
 
 
 def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
-    """From the monitoring namespace and over the pods' network, by the ports that the pods name."""
+    """The monitoring namespace requests the ports that the pods name, over the pods' network."""
     for pod in long_run.pods():
         containers = [*pod["spec"]["initContainers"], *pod["spec"]["containers"]]
         ports = {p["name"]: p["containerPort"] for each in containers for p in each.get("ports", [])}
@@ -56,7 +56,7 @@ def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
 
 
 def test_the_status_tells_where_each_replica_stands(long_run):
-    """Asked of the trainers over the pods' network, though the operator is killed meanwhile."""
+    """The operator polls the trainers over the pods' network, although it is killed meanwhile."""
     long_run.pods()
     space = long_run.namespace
 
@@ -75,7 +75,10 @@ def test_the_status_tells_where_each_replica_stands(long_run):
 
 @pytest.mark.after_the_long_run
 def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times(long_run):
-    """SIGKILL at random moments, of which the pods notice nothing: one pod a replica, the same end."""
+    """SIGKILL at random times does not affect the pods.
+
+    Each replica has one pod and the same end.
+    """
     ends = {name: long_run.end(name) for name in (NAME, PAIR)}
     space = long_run.namespace
 
@@ -99,7 +102,7 @@ def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times
 
 @pytest.mark.after_the_long_run
 def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
-    """The final truth does not hang on having been asked in time."""
+    """The final result does not depend on a poll in time."""
     long_run.end(PAIR)
 
     for pod in long_run.namespace.pods(PAIR, live=False):
@@ -111,7 +114,7 @@ def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
 @pytest.mark.after_the_long_run
 @pytest.mark.parametrize(("name", "replicas", "steps"), [(NAME, "1/1", "50000"), (PAIR, "2/2", "3000")])
 def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
-    """Status, reason, replicas, step and success are what a person looks for first."""
+    """A person first looks for status, reason, replicas, step and success."""
     status = long_run.end(name)
     cluster, space = long_run.namespace.cluster, long_run.namespace
 
@@ -124,7 +127,7 @@ def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
 
 @pytest.mark.after_the_long_run
 def test_what_was_run_stands_in_the_config_maps(long_run):
-    """Anyone can read the resolved job and the source worlds of a replica, after its end too."""
+    """Anyone can read the resolved job and the source worlds of a replica, also after its end."""
     long_run.end(PAIR)
     contents = long_run.namespace.select("configmaps", PAIR)
 

@@ -1,4 +1,4 @@
-"""The images as they were built: how large they are, what they say of themselves, who runs in them."""
+"""The built images: size, labels and user."""
 
 import json
 import os
@@ -35,7 +35,7 @@ def configuration(archive):
 
 
 def member(archive, name):
-    """Return what a file of JSON in an archive holds."""
+    """Return the content of a JSON file in an archive."""
     found = archive.extractfile(name)
     assert found, name
     return json.load(found)
@@ -43,7 +43,7 @@ def member(archive, name):
 
 @pytest.mark.parametrize("name", MOST_MB)
 def test_an_image_holds_no_more_than_it_needs(name, archives):
-    """Each node pulls it, and each new node again; docs/decisions/0005 has the sizes that were measured."""
+    """Every node pulls it, and so does each new node; docs/decisions/0005 has the measured sizes."""
     assert archives[name].stat().st_size / 1e6 < MOST_MB[name]
 
 
@@ -63,7 +63,7 @@ def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
 
 @pytest.mark.after_the_kills
 def test_the_operator_s_image_is_of_this_release(namespace, cluster):
-    """A bug report has to name the release."""
+    """A bug report must name the release."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     pod, *_ = namespace.wait(lambda: operators(namespace))
 

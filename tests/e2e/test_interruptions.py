@@ -13,7 +13,7 @@ AMID = 150
 
 
 def suspend(namespace, name, pod):
-    """Suspend the job, see that it is called suspended once its pod has ended, and resume it."""
+    """Suspend the job, check that its phase is Suspended after its pod has ended, and resume it."""
     namespace.patch(name, suspend=True)
     namespace.wait(lambda: namespace.holds(name, "Suspended"))
     left = namespace.get("pods", pod)
@@ -28,12 +28,12 @@ def delete(namespace, name, pod):  # noqa: ARG001 - each interruption is called 
 
 
 def evict(namespace, name, pod):  # noqa: ARG001
-    """Ask for the pod, as a drain of its node does."""
+    """Evict the pod as a drain of its node does."""
     namespace.cluster.evict(namespace.name, pod)
 
 
 def mark(namespace, name, pod):
-    """Leave the mark of an operator that was killed before it evicted the pod."""
+    """Write the mark of an operator that was killed before it evicted the pod."""
     uid = namespace.get("pods", pod)["metadata"]["uid"]
     annotations = {"palaestra.dev/replaced": f"1 {uid} Stalled: it stands still"}
     namespace.cluster.patch("jobs", namespace.name, f"{name}-0", {"metadata": {"annotations": annotations}})
@@ -44,7 +44,7 @@ def mark(namespace, name, pod):
     [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption"), (mark, "operator")],
 )
 def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
-    """Written on the way out, so nothing is lost; never more than one interval if it is not."""
+    """A checkpoint is written at the end, so nothing is lost; without it, at most one interval is lost."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS, backoffLimit=0))
     first, before = namespace.wait_for_step("amid", AMID)
 
@@ -66,7 +66,7 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
 
 
 def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
-    """Both name one claim; the second goes on to a total of its own."""
+    """Both name one claim, and the second continues to its own total."""
     namespace.create("persistentvolumeclaims", make_claim("runs", labels={"palaestra.dev/for-jobs": "true"}))
     storage = {"existingClaim": "runs"}
     namespace.apply(make_slow_job("first", steps=300, every_steps=EVERY_STEPS, storage=storage))

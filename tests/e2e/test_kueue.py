@@ -1,4 +1,4 @@
-"""docs/howto/queues.md on the real cluster, with a real Kueue: admitted, preempted, admitted again."""
+"""docs/howto/queues.md on the real cluster with a real Kueue: jobs are admitted and preempted."""
 
 import os
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ pytestmark = [pytest.mark.changes_the_cluster, pytest.mark.timeout(900), pytest.
 EVERY_STEPS = 100
 AMID = 150
 TRAINING = {"steps": 2000, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
-# As large as a training, and over at once.
+# It is as large as a training, but ends at once.
 ENDS = {"command": ["bash", "-c", "exit 0"], "evaluation": {"everySteps": 0}}
 SHORT = "insufficient unused quota for"
-# Why a job is never admitted, and Kueue's words for it.
+# The reasons why a job is never admitted, with Kueue's message.
 NEVER = {
     "nowhere": ({}, "nowhere", "LocalQueue nowhere doesn't exist"),
     "device": (
@@ -43,15 +43,15 @@ NEVER = {
 
 @dataclass(frozen=True)
 class Story:
-    """The observed states of three jobs in a queue that has room for one.
+    """The observed states of three jobs in a queue with room for one.
 
     Attributes:
-        waited: the replica of `patient` while `everyday` had the place.
-        short: the message of its status then.
+        waited: the replica of `patient` while `everyday` was admitted.
+        short: the message of its status at that time.
         at: the step of `everyday` when `urgent` came.
         preempted: the replica of `everyday` after that.
-        why: Kueue's words then.
-        attempts: the lines of the run's attempts.jsonl, when `everyday` was back.
+        why: Kueue's message at that time.
+        attempts: the lines of the run's attempts.jsonl, when `everyday` was admitted again.
         ends: the replicas at their ends, by job.
     """
 
@@ -66,7 +66,7 @@ class Story:
 
 @pytest.fixture(scope="module")
 def robots(cluster, tmp_path_factory):
-    """The namespace of the page, with Kueue and the queue; all of it goes again."""
+    """The namespace of the page, with Kueue and the queue; all of it is removed at the end."""
     kueue = Kueue(cluster, tmp_path_factory.mktemp("queues"))
     if taken := kueue.taken():
         (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(taken)
@@ -78,7 +78,7 @@ def robots(cluster, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def story(robots):
-    """`everyday` trains, `patient` waits behind it, `urgent` takes its place, and all of them end."""
+    """`everyday` trains, `patient` waits, `urgent` preempts `everyday`, and all of them end."""
     robots.apply(make_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
     leave_room_for_one(robots, "everyday")
     robots.apply(make_job("patient", trainer=ENDS, scheduling=scheduling()))
@@ -106,7 +106,7 @@ def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(stor
 
 
 def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
-    """The job's status says that its queue took it back; the Workload has Kueue's reason."""
+    """The job's status reports the preemption by its queue; the Workload has Kueue's reason."""
     last = story.preempted["lastAttempt"]
 
     assert story.preempted["phase"] == "Suspended"
@@ -117,7 +117,7 @@ def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
 
 
 def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
-    """Written on the way out, so nothing is lost; with a backoffLimit of 0, as it is no failure."""
+    """The checkpoint is written at the end, so nothing is lost; it works with a backoffLimit of 0."""
     resumed_at = int(story.attempts[1]["reason"].removeprefix("resumed at step "))
 
     assert len(story.attempts) == 2
@@ -126,7 +126,7 @@ def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
 
 
 def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
-    """Both are Kueue's doing, and neither is anybody's fault."""
+    """Kueue causes both, and neither is a failure."""
     none = dict.fromkeys(("trainer", "simulator", "disruption", "suspension"), 0)
 
     assert story.ends["everyday"]["restarts"] == {**none, "suspension": 1}
@@ -140,7 +140,7 @@ def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
 
 @pytest.mark.parametrize("name", NEVER)
 def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
-    """The page shows the words, and what helps."""
+    """The page has the messages and the remedies."""
     asked, queue, told = NEVER[name]
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
     robots.apply(make_job(name, trainer=trainer, scheduling={"queueName": queue}))

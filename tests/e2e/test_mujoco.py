@@ -1,4 +1,4 @@
-"""Jobs with `driver: mujoco`: trainings, and what the image of the simulator can do in a pod."""
+"""Jobs with `driver: mujoco`: trainings, and the abilities of the simulator's image in a pod."""
 
 import io
 import zipfile
@@ -12,7 +12,7 @@ from tests.e2e.test_tools import typed
 
 pytestmark = pytest.mark.timeout(900)
 
-# Steps that take time, so that the simulator still runs when its environment is read.
+# Slow steps, so that the simulator still runs when its environment is read.
 SLOW = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=40"}]
 SIMULATORS = [
     {"name": "collect", "role": "Collect", "driver": "mujoco", "env": SLOW},
@@ -25,7 +25,7 @@ TRAINER = {
 }
 SEEING_STEPS = 256
 COLORS = 3
-# Of the simulator itself: this program has its name in its own command line too.
+# This reads the environment of the simulator; the program itself also has its name in its command line.
 ENVIRONMENT = """
 from pathlib import Path
 for process in Path("/proc").glob("[0-9]*"):
@@ -52,7 +52,7 @@ print("red" if red > 2 * max(green, blue) else (red, green, blue))
 
 
 def test_a_policy_is_trained_in_mujoco(namespace, job):
-    """With the release's image, and on one thread: the simulators of a node share its cores."""
+    """It uses the release's image and one thread, because the simulators of a node share its cores."""
     namespace.apply(job("mujoco", simulators=SIMULATORS, trainer=TRAINER))
     pod = namespace.wait_for_pod("mujoco")
 
@@ -69,7 +69,7 @@ def test_a_policy_is_trained_in_mujoco(namespace, job):
 
 @pytest.fixture
 def seeing():
-    """Return manifests/examples/see-target.yaml with a few steps, and one simulator of a kind."""
+    """Return manifests/examples/see-target.yaml with a few steps, and one simulator of each role."""
     job = example("see-target")
     collect, _ = job["spec"]["simulators"]
     collect |= {"count": 1, "env": SLOW}
@@ -105,7 +105,7 @@ def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
 
 @pytest.mark.beside
 def test_the_image_of_mujoco_draws_without_a_screen(namespace, job):
-    """As a user without rights, on a read-only file system, and without a GPU."""
+    """It runs as a user without permissions, on a read-only file system, and without a GPU."""
     namespace.apply(job("draws", script=WAIT, simulator={"driver": "mujoco"}))
     pod = namespace.wait_for_pod("draws")
 

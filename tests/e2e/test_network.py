@@ -1,4 +1,4 @@
-"""Access to the ports of a training pod: tried where the cluster enforces policies, computed everywhere."""
+"""Access to the ports of a training pod: tested if the cluster enforces policies, and always computed."""
 
 import json
 import os
@@ -19,22 +19,22 @@ OPEN = {STATUS, HEALTH, HEALTH + 31}
 CLOSED = {CONTROL, MASTER, HEALTH - 1, HEALTH + 100}
 VERDICT = re.compile(r"IS ALLOWED\?\s*\|\s*(TRUE|FALSE)")
 STOCK = os.environ.get("PALAESTRA_CLUSTER") == "stock"  # kind's own network, which enforces policies
-ANSWERS = f"python3 -c '{LISTEN}' & {WAIT}"  # on the port of metrics and status, in the trainer's place
+ANSWERS = f"python3 -c '{LISTEN}' & {WAIT}"  # serves the port for metrics and status instead of the trainer
 DENY_ALL = {"metadata": {"name": "deny"}, "spec": {"podSelector": {}, "policyTypes": ["Ingress"]}}
 
 
 @pytest.fixture(scope="module")
 def pod(shared):
-    """A pod in training, with a NetworkPolicy."""
+    """A pod in training, in a namespace with a NetworkPolicy."""
     shared.apply(make_job("guarded", script=ANSWERS))
     return shared.get("pods", shared.wait_for_pod("guarded", LONG_S))
 
 
 @pytest.fixture(scope="session")
 def enforced(shared_listener, monitor):
-    """Whether the cluster enforces NetworkPolicies at all, found out with a policy that denies all.
+    """Whether the cluster enforces NetworkPolicies, tested with a policy that denies everything.
 
-    Kind's own network must, after a while on a busy machine.
+    Kind's own network must do so, but on a busy machine only after a while.
     """
     space, listener = shared_listener
     space.wait(lambda: monitor.reaches(listener, STATUS))
@@ -49,7 +49,7 @@ def enforced(shared_listener, monitor):
 
 @pytest.fixture(scope="session")
 def shared_listener(make_namespace):
-    """A pod that listens, in a namespace where nothing else does."""
+    """A pod that listens, alone in a namespace."""
     space = make_namespace("control")
     space.create("pods", plain_pod("listens", command=["python3", "-c", LISTEN]))
     space.wait(lambda: trains(space.get("pods", "listens")))
@@ -57,14 +57,14 @@ def shared_listener(make_namespace):
 
 
 def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, shared, monitor):
-    """ROS 1 has no authentication; whatever a cluster's network does, nobody outside speaks it."""
+    """ROS 1 has no authentication, so nobody outside may reach it, whatever the cluster's network does."""
     shared.wait(lambda: monitor.reaches(pod, HEALTH))
     assert not monitor.reaches(pod, CONTROL)
     assert not monitor.reaches(pod, MASTER)
 
 
 def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor, enforced):
-    """Neither another namespace nor a pod beside it, even one that wears the operator's label."""
+    """This includes other namespaces and another pod in this one, even with the operator's label."""
     if not enforced:
         pytest.skip("this cluster's network enforces no NetworkPolicy: the control pod was reached")
     beside = Asker(shared, "beside")
@@ -77,7 +77,10 @@ def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor
 
 
 def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, tmp_path):
-    """By cyclonus, which was written to test networks' own reading of policies: not by our reading."""
+    """The tool cyclonus evaluates the policy.
+
+    It was written to test networks, and is independent of Palaestra.
+    """
     labels = shared.cluster.get("deployments", SYSTEM, OPERATOR)["spec"]["template"]["metadata"]["labels"]
     admitted = [peer(SYSTEM, labels), peer("monitoring", {}), peer("monitoring", {"any": "thing"})]
     strangers = [
@@ -99,7 +102,7 @@ def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, 
 
 @pytest.mark.beside
 def test_a_job_may_close_the_way_out(namespace, job, tmp_path):
-    """With `egress: Closed` the pods call nobody; who may call them stays as it was."""
+    """With `egress: Closed` the pods can connect to nobody; who can connect to them does not change."""
     namespace.apply(job("closed", script=WAIT, network={"egress": "Closed"}))
     closed = namespace.get("pods", namespace.wait_for_pod("closed", LONG_S))
     inside = peer(namespace.name, closed["metadata"]["labels"])
@@ -114,7 +117,7 @@ def test_a_job_may_close_the_way_out(namespace, job, tmp_path):
 
 
 def peer(namespace, labels):
-    """Return a pod as cyclonus takes it."""
+    """Return a pod in the format of cyclonus."""
     own = {"kubernetes.io/metadata.name": namespace}
     return {
         "Internal": {"Namespace": namespace, "NamespaceLabels": own, "PodLabels": labels},
@@ -123,12 +126,12 @@ def peer(namespace, labels):
 
 
 def traffic(source, destination, port):
-    """Return a connection as cyclonus takes it."""
+    """Return a connection in the format of cyclonus."""
     return {"Source": source, "Destination": destination, "ResolvedPort": port, "Protocol": "TCP"}
 
 
 def evaluate(namespace, folder, asked):
-    """Return for each connection whether the namespace's policies, as the API server has them, allow it."""
+    """Return for each connection whether the namespace's policies at the API server allow it."""
     cyclonus = shutil.which("cyclonus")
     assert cyclonus, "cyclonus is not on the PATH; `tests/cluster/programs.sh cyclonus` builds it"
     policies = namespace.select("networkpolicies")

@@ -1,4 +1,4 @@
-"""Operators that come and go: two at once, a leader that is gone, another release."""
+"""Operators start and stop: two at once, a leader that is gone, another release."""
 
 import copy
 import os
@@ -20,7 +20,7 @@ KINDS = ("jobs", "pods", "configmaps", "persistentvolumeclaims", "networkpolicie
 
 @pytest.fixture
 def deployment(cluster):
-    """The operator's Deployment, which is put back as it was."""
+    """The operator's Deployment, which is restored at the end."""
     found = cluster.get("deployments", SYSTEM, OPERATOR)
     yield found
     spec = copy.deepcopy(found["spec"])
@@ -30,7 +30,7 @@ def deployment(cluster):
 
 
 def change(cluster, deployment, *options, **container):
-    """Give the operator more options and other fields of its container."""
+    """Give the operator more options, and change other fields of its container."""
     wanted = copy.deepcopy(deployment["spec"]["template"]["spec"]["containers"][0]) | container
     wanted["command"] = [*wanted["command"], *options]
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"template": {"spec": {"containers": [wanted]}}}})
@@ -38,13 +38,13 @@ def change(cluster, deployment, *options, **container):
 
 
 def holder(cluster):
-    """Return who holds the Lease."""
+    """Return the holder of the Lease."""
     lease = cluster.get("leases", SYSTEM, OPERATOR) or {"spec": {}}
     return lease["spec"].get("holderIdentity") or ""
 
 
 def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster, job):
-    """Safety comes from names, not from locks: here three act at once, and nobody asks who leads."""
+    """Names ensure safety, not locks: three operators act at once here, without an election."""
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 3}})
     change(cluster, deployment, "--no-leader-elect")
     assert len(operators(namespace)) == 3
@@ -60,7 +60,7 @@ def test_two_operators_at_once_make_no_second_pod(deployment, namespace, cluster
 
 
 def test_another_operator_takes_over_when_the_leader_is_gone(deployment, namespace, cluster, job):  # noqa: ARG001 - is put back
-    """Killed, it is believed until its Lease has run out; asked to end, it gives the Lease back."""
+    """If the leader is killed, its Lease must expire first; if it is stopped, it releases the Lease."""
     make_killable(namespace)
     cluster.patch("deployments", SYSTEM, OPERATOR, {"spec": {"replicas": 2}})
     cluster.rolled_out(SYSTEM, OPERATOR)
@@ -76,7 +76,7 @@ def test_another_operator_takes_over_when_the_leader_is_gone(deployment, namespa
 
 
 def _leader(namespace):
-    """Return the name of the operator pod that holds the Lease, "" while none does."""
+    """Return the name of the operator pod that holds the Lease, or ""."""
     who = holder(namespace.cluster)
     return next((named(pod) for pod in operators(namespace) if who.startswith(named(pod))), "")
 
@@ -98,9 +98,9 @@ def test_an_upgrade_of_the_operator_touches_no_running_pod(deployment, namespace
 
 
 def fingerprint(namespace, kind):
-    """Return UID and generation of the objects of the job, and of a pod what runs in it.
+    """Return UID and generation of the objects of the job, and the containers of a pod.
 
-    Nothing of it changes if nobody touches them.
+    If nobody changes the objects, nothing of it changes.
     """
     found = namespace.select(kind, "stays")
     return {

@@ -1,4 +1,4 @@
-"""docs/start/your-environment.md on a cluster: the environment in an image of its own, as a pod of a job."""
+"""docs/start/your-environment.md on a cluster: an environment in a user's image, in the pod of a job."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.timeout(1200)
 PAGE = dict(fenced((ROOT / "docs/start/your-environment.md").read_text()))
 IMAGE = "corridor:1"
 BUILD_S, LOAD_S = 600, 300
-# One rollout and one episode: the page's laptop part, tests/integration/run, learns the task.
+# One rollout and one episode; the page's laptop part, in tests/integration/run, learns the task.
 SHORT = {
     "steps": 256,
     "evaluation": {"everySteps": 256, "episodes": 1, "confirmEpisodes": 2},
@@ -29,7 +29,7 @@ WHOSE = "import corridor, os; print(os.getuid(), os.stat(corridor.__file__).st_u
 
 @pytest.fixture(scope="module")
 def image(cluster, tmp_path_factory):
-    """The page's image, in the nodes of the cluster."""
+    """The page's image on the nodes of the cluster."""
     del cluster
     if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
         pytest.skip("the release's archives are not here, or this cluster loads none; `make e2e` has both")
@@ -45,10 +45,10 @@ def image(cluster, tmp_path_factory):
 
 
 def test_an_environment_in_an_image_of_its_own_trains_in_a_restricted_pod(namespace, image):
-    """Only the image can bring the module: the pod has no other file of the user's."""
+    """Only the image can contain the module: the pod has no other file of the user's."""
     job = yaml.safe_load(PAGE["yaml job.yaml"])
     job["spec"]["trainer"] |= {"image": image, **SHORT}
-    job["spec"]["simulators"][0] |= SLOW  # so that the pod is still there when it is looked into
+    job["spec"]["simulators"][0] |= SLOW  # so that the pod still exists when it is checked
     namespace.apply(job)
     pod = namespace.wait_for_pod("corridor", LONG_S)
 

@@ -1,6 +1,6 @@
-"""Pages about installing and training in a cluster, on a real one: every command as it stands.
+"""Pages about installing and training in a cluster, on the real cluster: every command unchanged.
 
-docs/howto/queues.md is typed by tests/e2e/test_kueue.py, which needs its cluster for longer.
+tests/e2e/test_kueue.py runs docs/howto/queues.md, because it needs that page's cluster for longer.
 """
 
 import os
@@ -28,7 +28,7 @@ from tests.e2e.test_operators import KINDS, fingerprint
 from tests.pages import blocks, chapters
 from tests.terminal import Terminal
 
-TYPED_S = 600  # `helm test` trains, and a namespace goes with its pods
+TYPED_S = 600  # `helm test` trains, and a namespace is deleted with its pods
 READY_S = 180
 SESSION_S = 800  # a small training, with a pause
 RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
@@ -37,9 +37,9 @@ FIRST = (ROOT / "docs/start/cluster.md").read_text()
 PYTHON = (ROOT / "docs/howto/python.md").read_text()
 SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
-NAMESPACES = (LAB, "robots", "drones")  # of the page, besides that of the operator
+NAMESPACES = (LAB, "robots", "drones")  # on the page, besides that of the operator
 TENSORBOARD = "palaestra-tensorboard"
-# The Deployments that run once the commands of a chapter of install.md were typed, with their replicas.
+# The Deployments after the commands of each chapter of install.md, with their replicas.
 PROMISED = {
     "Install": {OPERATOR: 1},
     "More than one operator": {OPERATOR: 2},
@@ -65,13 +65,13 @@ def checkout(folder, **environment):
 
 @pytest.fixture
 def terminal(tmp_path):
-    """A checkout of the release."""
+    """A terminal in a checkout of the release."""
     return checkout(tmp_path)
 
 
 @pytest.fixture
 def untouched(cluster, terminal):
-    """The cluster without Palaestra and with what the page expects of it; all is put back at the end."""
+    """Prepare the cluster as the page expects it, without Palaestra; everything is restored at the end."""
     if there := [name for name in NAMESPACES if cluster.get("namespaces", None, name) is not None]:
         (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(
             f"this cluster has the namespaces {there} already"
@@ -96,7 +96,7 @@ def untouched(cluster, terminal):
 
 
 def running(cluster):
-    """Return the Deployments of the release, each with the replicas that are ready."""
+    """Return the Deployments of the release with their ready replicas."""
     for each, namespace in deployments(cluster):
         cluster.rolled_out(namespace, each["metadata"]["name"])
     found = [each for each, _ in deployments(cluster)]
@@ -109,7 +109,7 @@ def deployments(cluster):
 
 
 class Stays:
-    """A job that runs while its operator is upgraded and taken away."""
+    """A job that runs while its operator is upgraded and removed."""
 
     def __init__(self, namespace):
         self._namespace = namespace
@@ -119,7 +119,7 @@ class Stays:
         self._before = self._seen()
 
     def assert_nothing_has_touched_it(self):
-        """Neither its pod nor what else was made for it."""
+        """Neither its pod nor its other objects may have changed."""
         assert self._seen() == self._before
         assert self._namespace.status("stays")["phase"] == "Running"
 
@@ -131,7 +131,7 @@ class Stays:
 @pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("untouched")
 def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(terminal, cluster, namespace):
-    """A command that works alone can fail behind others: values stay, and pods find no image or volume."""
+    """A command that works alone can fail after others: values stay, and pods lack an image or a volume."""
     seen, stays = {}, None
     for heading, text in chapters(INSTALL):
         commands = blocks(text, "sh")
@@ -140,7 +140,7 @@ def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(te
             if stays:
                 stays.assert_nothing_has_touched_it()
             if heading == "Uninstall":
-                stays = None  # what comes next deletes all jobs
+                stays = None  # the next command deletes all jobs
         if commands:
             seen[heading] = running(cluster)
         if heading == "Install":
@@ -152,7 +152,7 @@ def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(te
 
 
 def assert_all_is_served(cluster):
-    """By pods as the page has installed them."""
+    """The pods that the page has installed must serve everything."""
     assert "TensorBoard" in page_of(cluster, LAB, TENSORBOARD, 6006)
     assert_a_run_is_shown_by_the_name_of_its_job(Namespace(cluster, LAB, there=True))
     assert_notebooks_are_served_to_who_has_the_token(cluster, token_of(cluster, "notebooks"))
@@ -160,7 +160,7 @@ def assert_all_is_served(cluster):
 
 
 def assert_a_run_is_shown_by_the_name_of_its_job(lab):
-    """A job with the `storage` of the page trains, and TensorBoard names its run as the page says."""
+    """A job with the page's `storage` trains, and TensorBoard shows its run by the documented name."""
     specs = [yaml.safe_load(block).get("spec", {}) for block in blocks(INSTALL, "yaml")]
     [storage] = [spec["storage"] for spec in specs if "storage" in spec]
     uid = lab.apply(make_job("shown", storage=storage))["metadata"]["uid"]
@@ -171,7 +171,7 @@ def assert_a_run_is_shown_by_the_name_of_its_job(lab):
 
 
 def at_home(namespace, folder):
-    """Return a terminal whose kubeconfig names the namespace; the operator is up."""
+    """Return a terminal whose kubeconfig has the namespace, with the operator running."""
     namespace.cluster.rolled_out(SYSTEM, OPERATOR)
     Terminal(folder).type_in("kubectl config view --raw --flatten >config", READY_S)
     home = checkout(folder, KUBECONFIG=str(folder / "config"))
@@ -183,7 +183,7 @@ def at_home(namespace, folder):
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
 def test_every_command_of_the_first_job_works(namespace, tmp_path):
-    """From a namespace without a job to a policy on this machine, and a job that is gone."""
+    """They lead from an empty namespace to a policy on this machine and a deleted job."""
     [session] = blocks(FIRST, "sh")
 
     printed = at_home(namespace, tmp_path).type_in(session, SESSION_S)
@@ -197,7 +197,7 @@ def test_every_command_of_the_first_job_works(namespace, tmp_path):
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
 def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
-    """The same from Python, with the job of the examples."""
+    """It does the same from Python, with the job of the examples."""
     [script] = blocks(PYTHON, "python with-a-cluster")
     (tmp_path / "train.py").write_text(script)
 
@@ -211,7 +211,7 @@ def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
 def test_the_sweep_of_the_page_trains_in_the_cluster(namespace, tmp_path):
-    """Two trials with two seeds each, compared, listed by their label and deleted."""
+    """Two trials with two seeds each are compared, listed by their label and deleted."""
     [sweep] = blocks(SWEEPS, "yaml sweep")
     (tmp_path / "sweep.yaml").write_text(sweep)
     home = at_home(namespace, tmp_path)

@@ -1,4 +1,4 @@
-"""Limits of a namespace: a refusal sets a reason in the status, which goes away when the limit does."""
+"""Limits of a namespace: a refusal sets a reason in the status, which is removed with the limit."""
 
 from dataclasses import dataclass, field
 
@@ -22,7 +22,7 @@ WAITS_ONCE = (
 
 @dataclass(frozen=True)
 class Refusal:
-    """An object that refuses what a job needs, and in which words; `scheduling` is the job's."""
+    """An object that refuses a job's needs, with its message; `scheduling` is the job's."""
 
     kind: str
     spec: Object
@@ -30,22 +30,22 @@ class Refusal:
     scheduling: Object = field(default_factory=dict)
 
     def begin(self, place: Namespace) -> None:
-        """Let nothing be made in a namespace."""
+        """Add the object, so that nothing can be made in a namespace."""
         place.create(self.kind, {"metadata": {"name": "none"}, "spec": self.spec})
 
     def end(self, place: Namespace) -> None:
-        """Let everything be made."""
+        """Remove the object."""
         place.cluster.delete(self.kind, place.name, "none")
 
 
 class NoSuchClass(Refusal):
-    """A PriorityClass that is not there until the end."""
+    """A PriorityClass that does not exist before the end."""
 
     def begin(self, place: Namespace) -> None:
-        """Leave it as it is."""
+        """Do nothing."""
 
     def end(self, place: Namespace) -> None:
-        """Make it."""
+        """Create it."""
         place.cluster.create(self.kind, priority_class(MISSING))
 
 
@@ -60,12 +60,12 @@ def priority_class(name: str, preemption: str = "Never") -> Object:
 
 
 def at_least(**quantities: str) -> Object:
-    """Return the LimitRange for containers that ask for no less."""
+    """Return a LimitRange for containers that request at least this."""
     return {"limits": [{"type": "Container", "min": quantities}]}
 
 
 def claims_of(most: str) -> Object:
-    """Return the LimitRange for claims that ask for no more."""
+    """Return a LimitRange for claims that request at most this."""
     return {"limits": [{"type": "PersistentVolumeClaim", "max": {"storage": most}}]}
 
 
@@ -89,7 +89,7 @@ REFUSALS = {
 
 @pytest.fixture(scope="module")
 def classes(cluster):
-    """Two PriorityClasses; the one that is missing is taken away too."""
+    """Create PriorityClasses; the missing one is deleted too."""
     cluster.create("priorityclasses", priority_class(LIMITED))
     cluster.create("priorityclasses", priority_class(URGENT, "PreemptLowerPriority"))
     yield
@@ -99,7 +99,7 @@ def classes(cluster):
 
 @pytest.fixture(scope="module")
 def places(make_namespace, classes):  # noqa: ARG001 - is there
-    """A namespace for each refusal, with a job that waits in it, so that they wait side by side."""
+    """A namespace for each refusal, each with a waiting job, so that all wait at the same time."""
     made = {name: make_namespace(f"refuses-{name}") for name in REFUSALS}
     for name, place in made.items():
         REFUSALS[name].begin(place)
@@ -109,7 +109,7 @@ def places(make_namespace, classes):  # noqa: ARG001 - is there
 
 @pytest.fixture(scope="module")
 def refused(places):
-    """What the status said of each replica that was refused; by now nothing refuses it any more."""
+    """The status of each refused replica; by now nothing refuses it any more."""
     told = {name: place.wait_for_reason("waits", "PodsRefused") for name, place in places.items()}
     for name, place in places.items():
         REFUSALS[name].end(place)
@@ -118,7 +118,7 @@ def refused(places):
 
 @pytest.fixture
 def one_place(cluster):
-    """A node that has one of the resource for which jobs compete, however large it is."""
+    """A node with one unit of the resource for which jobs compete, however large it is."""
     node = named(cluster.select("nodes", None)[0])
 
     def give(amount: str | None) -> None:
@@ -132,7 +132,7 @@ def one_place(cluster):
 
 @pytest.mark.parametrize("name", REFUSALS)
 def test_the_status_quotes_the_refusal(name, refused):
-    """There is no pod: only the Job's events, or the API server's answer to the operator, have the reason."""
+    """Without a pod, only the Job's events or the API server's response to the operator have the reason."""
     assert refused[name]["phase"] == "Pending"
     assert REFUSALS[name].words in refused[name]["message"]
     assert refused[name]["attempt"] == 0
@@ -140,7 +140,7 @@ def test_the_status_quotes_the_refusal(name, refused):
 
 @pytest.mark.usefixtures("classes", "one_place")
 def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespace, job):
-    """A PriorityClass makes room without a queue as well; that is a disruption and no failure."""
+    """A PriorityClass preempts without a queue, too; this is a disruption and not a failure."""
     namespace.apply(job("everyday", script=WAITS_ONCE, simulator=IN_PLACE, backoffLimit=0))
     namespace.wait_for_pod("everyday")
 
@@ -158,7 +158,7 @@ def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespac
 @pytest.mark.parametrize("name", REFUSALS)
 @pytest.mark.usefixtures("refused")
 def test_a_job_that_was_refused_goes_on_by_itself(name, places):
-    """Nobody has to touch it, and nothing of it counts as a failure."""
+    """The job needs no change, and nothing counts as a failure."""
     place = places[name]
 
     assert place.wait_for_end("waits", LONG_S) == "Succeeded"

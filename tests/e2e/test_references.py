@@ -1,4 +1,4 @@
-"""A TrainingJob opens nothing that its author could not open before: what it names must be for jobs."""
+"""A TrainingJob gives its author no new access: the objects that it names must be open to jobs."""
 
 import pytest
 
@@ -12,7 +12,7 @@ FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}
 
 
 def let_secrets_be_read(namespace):
-    """Let the operator read Secrets, which it cannot until somebody does so, namespace by namespace."""
+    """Allow the operator to read Secrets, which a person must do for each namespace."""
     role = {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": SECRETS_ROLE}
     subject = {"kind": "ServiceAccount", "name": OPERATOR, "namespace": SYSTEM}
     binding = {"metadata": {"name": SECRETS_ROLE}, "roleRef": role, "subjects": [subject]}

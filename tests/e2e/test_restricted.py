@@ -1,4 +1,4 @@
-"""A training from its first object to its end where nothing is allowed that *restricted* forbids."""
+"""A training from its first object to its end, where everything that *restricted* forbids is refused."""
 
 from datetime import datetime, timedelta
 
@@ -17,7 +17,7 @@ TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
 
 
 def test_a_pod_that_asks_for_more_is_refused_here(namespace):
-    """The control: without it, the tests below would say nothing about *restricted*."""
+    """This is the control: without it, the tests below would prove nothing about *restricted*."""
     pod = plain_pod("control")
     del pod["spec"]["securityContext"]["runAsNonRoot"]
 
@@ -32,11 +32,11 @@ def test_a_pod_that_asks_for_more_is_refused_here(namespace):
 @pytest.mark.after_the_kills
 @pytest.mark.timeout(1200)
 def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
-    """All that a person asks of a run that has ended, without a look into its pod."""
+    """The status has everything that a person needs about an ended run, without a look into its pod."""
     namespace.apply(job("tiny"))
 
     assert namespace.wait_for_end("tiny") == "Succeeded"
-    namespace.wait(lambda: namespace.events("tiny", "Succeeded"))  # which follow the status
+    namespace.wait(lambda: namespace.events("tiny", "Succeeded"))  # it follows the status
 
     status = namespace.status("tiny")
     replica = status["replicas"][0]
@@ -55,9 +55,9 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("moment", ENDS)
 def test_a_pod_ends_with_its_trainer(namespace, job, moment):
-    """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace.
+    """Nobody waits for simulators and the ROS master, and a preempted node gives no time.
 
-    At once means while the sidecars still start, and process 1 of a container loses early signals.
+    The pod ends at once even while the sidecars start, when process 1 of a container loses early signals.
     """
     namespace.apply(job("ends", script=ENDS[moment]))
     assert namespace.wait_for_end("ends") == "Succeeded"
@@ -68,14 +68,14 @@ def test_a_pod_ends_with_its_trainer(namespace, job, moment):
 
 
 def finished(terminated):
-    """Return when a container ended."""
+    """Return the time at which a container ended."""
     return datetime.fromisoformat(terminated["finishedAt"])
 
 
 @pytest.mark.beside
 @pytest.mark.timeout(1200)
 def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
-    """A person who may create TrainingJobs, but no pods, must gain no other right by it."""
+    """A user who may create TrainingJobs but no pods must gain no other permission."""
     namespace.apply(job("waits", script=WAIT))
     pod = namespace.wait_for_pod("waits", LONG_S)
 

@@ -1,4 +1,4 @@
-"""Jobs that do not start: each says why, in a reason and with the container's name."""
+"""Jobs that do not start: each has a reason and the container's name."""
 
 import pytest
 
@@ -30,7 +30,10 @@ def world_map(**labels):
 
 @pytest.mark.after_the_kills
 def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget(namespace, job):
-    """Kubernetes sees a sidecar that runs; only trainer and operator know that nobody answers."""
+    """Kubernetes sees a running sidecar.
+
+    Only trainer and operator know that the simulator does not respond.
+    """
     namespace.apply(job("never-up", simulator=NEVER_UP, trainer={"resources": SMALL}, backoffLimit=0))
 
     assert "collect-0" in namespace.wait_for_reason("never-up", "SimulatorStartDeadline", LONG_S)["message"]
@@ -39,7 +42,7 @@ def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget
 
 
 def test_a_sidecar_that_crash_loops_is_named_and_ends_nothing(namespace, job):
-    """The kubelet starts it again and again; nothing is counted for it."""
+    """The kubelet restarts it repeatedly, and this is not counted."""
     namespace.apply(job("crashes", script=WAIT, simulator=CRASHES))
 
     told = namespace.wait_for_reason("crashes", "SidecarCrashLoop", LONG_S)
@@ -49,9 +52,9 @@ def test_a_sidecar_that_crash_loops_is_named_and_ends_nothing(namespace, job):
 
 
 def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
-    """Told as soon as the kubelet knows it; nothing is ended before its author sets a bound.
+    """The reason is shown at once, and nothing is ended before the author sets a limit.
 
-    The bound comes after the reason is known, because a busy node takes long to find out.
+    The limit is set after the reason is known, because a busy node takes long to find out.
     """
     namespace.apply(job("no-image", script=WAIT, simulator=NO_IMAGE))
 
@@ -66,7 +69,7 @@ def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
 
 
 def test_a_job_starts_when_its_world_appears(namespace, job):
-    """Order of `kubectl apply` does not matter; a ConfigMap that is not for jobs stays closed."""
+    """The order of `kubectl apply` does not matter; a ConfigMap that is not for jobs stays closed."""
     source = {"world": {"configMap": {"name": "arena", "key": "arena.wbt"}}}
     namespace.apply(job("waits", simulator=source, script="exit 0"))
     namespace.wait(lambda: namespace.condition("waits", "Accepted").get("reason") == "WorldMissing")
@@ -81,7 +84,7 @@ def test_a_job_starts_when_its_world_appears(namespace, job):
 
 
 def test_the_status_of_an_unschedulable_pod_quotes_the_scheduler(namespace, job):
-    """Nothing fails: a node may come."""
+    """It does not fail, because a node may be added."""
     namespace.apply(job("no-node", script=WAIT, scheduling=NOWHERE))
 
     told = namespace.wait_for_reason("no-node", "Unschedulable", LONG_S)

@@ -1,4 +1,4 @@
-"""A robot, a world and a program of other people, in a pod."""
+"""Other people's robot, world and program, in a pod."""
 
 import pytest
 
@@ -13,7 +13,10 @@ ENOUGH = {"requests": {"cpu": "50m", "memory": "160Mi"}}
 
 
 def test_a_differential_robot_drives_among_boxes_by_its_own_program(namespace, job):
-    """An E-puck, as its world names it; the program ends with 0 only where the robot must be by then."""
+    """The robot is an E-puck, as its world names it.
+
+    The program exits with 0 only if the robot has arrived.
+    """
     made = job("rover", script=SCRIPT, simulator=rover(), backoffLimit=0)
     made["spec"]["simulators"][0]["resources"] = ENOUGH
     made["spec"]["trainer"] |= {

@@ -1,4 +1,4 @@
-"""The commands that need a kubelet: logs, and fetching from a pod that runs and from a claim."""
+"""The commands that need a kubelet: logs, and fetches from a running pod and from a claim."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 pytestmark = pytest.mark.timeout(1200)
 
 COMMAND_S = 180
-# A program in the place of the training: writes what a run leaves, says so, and stays while it is to.
+# A program instead of the training: it writes the files of a run, prints a line, and stays for a given time.
 LEAVES_A_RUN = (
     "mkdir -p $PALAESTRA_RUN/tensorboard && printf weights > $PALAESTRA_RUN/model.zip"
     " && head -c 3000000 /dev/zero > $PALAESTRA_RUN/tensorboard/events && echo left it"
@@ -23,7 +23,7 @@ LEFT = {"model.zip": b"weights", "tensorboard/events": bytes(3_000_000)}
 
 
 def typed(namespace, *arguments):
-    """Type a command of `palaestra`; return its exit code and its output."""
+    """Run a command of `palaestra`, and return its exit code and output."""
     program = Path(sys.executable).with_name("palaestra")
     done = subprocess.run(
         [program, *arguments, f"--namespace={namespace.name}"],
@@ -38,7 +38,7 @@ def found(folder):
 
 
 def readers(namespace):
-    """Return the pods that were made for reading volumes."""
+    """Return the pods that read volumes."""
     return namespace.cluster.select("pods", namespace.name, "palaestra.dev/fetch")
 
 
@@ -59,7 +59,7 @@ def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
 
 @pytest.mark.beside
 def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
-    """With a pod that *restricted* admits, and that is gone afterwards."""
+    """The pod for it meets *restricted* and is deleted afterwards."""
     namespace.apply(make_job("ended", script=LEAVES_A_RUN))
     assert namespace.wait_for_end("ended", LONG_S) == "Succeeded"
 
@@ -73,7 +73,7 @@ def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
 
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 def test_the_doctor_finds_nothing_wrong_where_jobs_run(namespace, cluster):
-    """Jobs have trained here. Images lie on the nodes, under a tag: that is a warning."""
+    """Jobs have trained here. The images on the nodes have tags, which gives a warning."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     code, told = typed(namespace, "doctor")
 

@@ -1,4 +1,4 @@
-"""A run that nobody attends to, in a cluster that takes its pods away again and again."""
+"""A run without attendance in a cluster that evicts its pods repeatedly."""
 
 import pytest
 

@@ -1,6 +1,6 @@
-"""A grand tour through everything that an operator does in a namespace: each of its rights is used.
+"""A tour through all that an operator does in a namespace uses each of its permissions.
 
-What a person does there, not what the rights are: a right that nobody's wish needs is found by it.
+It lists a person's actions, not the permissions, so that it finds a permission that no action needs.
 """
 
 from palaestra.plan.job import QUEUE_LABEL
@@ -15,9 +15,9 @@ SPENT = {"metadata": {"name": "spent"}, "spec": {"hard": {"pods": "0"}}}
 
 
 def tour(place: Namespace, operators: str) -> None:
-    """Have the operator whose pods are in the namespace `operators` do in `place` all that it ever does."""
+    """Let the operator, whose pods are in the namespace `operators`, do all its work in `place`."""
     refer(place)
-    wait_in_queue(place)  # the operator asks why after 5 s; the steps from here on take longer
+    wait_in_queue(place)  # the operator requests the reason after 5 s; the next steps take longer
     give_up(place)
     stop_suspended(place)
     delete_unbound(place)
@@ -25,7 +25,7 @@ def tour(place: Namespace, operators: str) -> None:
     replace_pod(place)
     suspend(place, flag=True)
     replace_operator(place, operators)
-    suspend(place, flag=False)  # the second operator meets the events of the first
+    suspend(place, flag=False)  # the second operator finds the events of the first
     suspend(place, flag=True)
     place.create("resourcequotas", SPENT)
     place.apply(make_job("refused", script="exit 0"))
@@ -33,7 +33,7 @@ def tour(place: Namespace, operators: str) -> None:
 
 
 def refer(place: Namespace) -> None:
-    """Use a claim and a world that are there, and meet somebody else's Job."""
+    """Use an existing claim and world, and meet somebody else's Job."""
     place.create("persistentvolumeclaims", make_claim("shared", labels=FOR_JOBS))
     world = {"arena.wbt": builtin("arena").decode()}
     place.create("configmaps", {"metadata": {"name": "worlds", "labels": FOR_JOBS}, "data": world})
@@ -54,13 +54,13 @@ def wait_in_queue(place: Namespace) -> None:
 
 
 def give_up(place: Namespace) -> None:
-    """Fail a job at once, and have it deleted."""
+    """Let a job fail at once, and be deleted."""
     place.apply(make_job("brief", trainer={"algorithm": {"name": "SAC"}}, ttlSecondsAfterFinished=1))
     place.wait(lambda: place.get("trainingjobs", "brief") is None, LONG_S)
 
 
 def stop_suspended(place: Namespace) -> None:
-    """Let the time of a job be over while one of its Jobs is suspended: that one is deleted."""
+    """Let the deadline of a job pass while one of its Jobs is suspended, which is then deleted."""
     place.apply(make_job("over", script=WAIT, replicas=2, activeDeadlineSeconds=15))
     place.wait(lambda: len(place.pods("over")) == 2, LONG_S)
     place.cluster.patch("jobs", place.name, "over-0", {"spec": {"suspend": True}})
@@ -68,7 +68,7 @@ def stop_suspended(place: Namespace) -> None:
 
 
 def delete_unbound(place: Namespace) -> None:
-    """Delete a job whose claim was never bound: the claim goes too."""
+    """Delete a job whose claim was never bound, which deletes the claim."""
     place.apply(make_job("unbound", script=WAIT, suspend=True))
     [claim] = place.wait(lambda: place.select("persistentvolumeclaims", "unbound"), LONG_S)
     place.cluster.delete("trainingjobs", place.name, "unbound")
@@ -76,13 +76,13 @@ def delete_unbound(place: Namespace) -> None:
 
 
 def suspend(place: Namespace, *, flag: bool) -> None:
-    """Suspend or resume a job, and wait until its Job is."""
+    """Suspend or resume a job, and wait until its Job follows."""
     place.patch("paused", suspend=flag)
     place.wait(lambda: (place.get("jobs", "paused-0") or {})["spec"]["suspend"] is flag, LONG_S)
 
 
 def replace_pod(place: Namespace) -> None:
-    """Have the pod of a job replaced, as after a mark that an operator left when it was killed."""
+    """Let the operator replace the pod of a job, as after a mark of an operator that was killed."""
     pod = place.wait(lambda: next(iter(place.pods("paused")), None), LONG_S)
     mark = f"1 {pod['metadata']['uid']} Stalled: it stands still"
     annotations = {"metadata": {"annotations": {"palaestra.dev/replaced": mark}}}
@@ -91,7 +91,7 @@ def replace_pod(place: Namespace) -> None:
 
 
 def replace_operator(place: Namespace, operators: str) -> None:
-    """Have another operator lead, which finds no Lease."""
+    """Let another operator lead, which finds no Lease."""
     before = place.cluster.select("pods", operators, "app.kubernetes.io/component=operator")
     for pod in before:
         place.cluster.delete("pods", operators, named(pod))
@@ -101,7 +101,7 @@ def replace_operator(place: Namespace, operators: str) -> None:
 
 
 def somebody_s(name: str) -> Object:
-    """Return a Job that has nothing to do with Palaestra."""
+    """Return a Job that is unrelated to Palaestra."""
     container = {"name": "main", "image": "theirs:1", "resources": LITTLE}
     template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
     return {"metadata": {"name": name}, "spec": {"suspend": True, "template": template}}

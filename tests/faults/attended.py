@@ -1,4 +1,4 @@
-"""An operator that is started again when it dies, as a kubelet does with its container."""
+"""An operator that is restarted when it dies, as a kubelet does with its container."""
 
 import threading
 from pathlib import Path
@@ -10,12 +10,12 @@ UNFORESEEN = "exception"  # the field of a log line that has a traceback
 
 
 class AttendedOperator:
-    """An operator process until the block ends, and another one whenever it has died.
+    """An operator process until the block ends, which is started again whenever it dies.
 
     Args:
-        kubeconfig: with which it connects.
+        kubeconfig: its kubeconfig.
         folder: for its logs.
-        options: more of its command line.
+        options: further options of its command line.
     """
 
     def __init__(self, kubeconfig: Path, folder: Path, *options: str) -> None:
@@ -28,11 +28,11 @@ class AttendedOperator:
 
     @property
     def lives(self) -> int:
-        """How often it was started."""
+        """The number of starts."""
         return len(self._started)
 
     def kill(self) -> None:
-        """Kill it, and return when it is dead; another one is started at once."""
+        """Kill it, and return when it is dead; it is started again at once."""
         self._started[-1].kill()
 
     def unforeseen(self) -> list[dict[str, Any]]:
@@ -48,7 +48,7 @@ class AttendedOperator:
         self._ending.set()
         self._started[-1].kill()
         self._thread.join()
-        self._started[-1].kill()  # where it was being started again just then
+        self._started[-1].kill()  # in case it was just being restarted
 
     def _start(self) -> None:
         log = self._folder / f"operator-{len(self._started)}.log"

@@ -1,4 +1,4 @@
-"""Count what passes between operator and API server, and say when the fault is due."""
+"""Count the requests between operator and API server, and decide when the fault is due."""
 
 import threading
 import time
@@ -9,22 +9,22 @@ from dataclasses import dataclass
 from tests.faults.plans import Fault, Kind
 from tests.faults.requests import ANSWER, CHANGE, LEASE, WATCH, Asked
 
-QUIET_KINDS = frozenset({LEASE, WATCH, ANSWER})  # an operator at rest asks for these, and for nothing else
+QUIET_KINDS = frozenset({LEASE, WATCH, ANSWER})  # an idle operator sends only these
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Passed:
-    """A request that came by: what it was about, and when, in seconds of the monotonic clock."""
+    """A request that passed, with its time in seconds of the monotonic clock."""
 
     asked: Asked
     at: float
 
 
 class Course:
-    """Counts requests and says which of them is disturbed; safe to use from several threads.
+    """Counts requests and decides which of them is disturbed; safe to use from several threads.
 
     Attributes:
-        met: the request that the fault came at; "" until then.
+        met: the request at which the fault occurred; "" until then.
     """
 
     def __init__(self, fault: Fault | None, clock: Callable[[], float] = time.monotonic) -> None:
@@ -38,38 +38,38 @@ class Course:
 
     @property
     def counts(self) -> Counter[str]:
-        """How many requests of each kind came by."""
+        """The number of requests of each kind."""
         with self._lock:
             return Counter(self._counts)
 
     @property
     def away(self) -> bool:
-        """Whether nobody is served now."""
+        """Whether all requests are refused now."""
         return self._clock() < self._away_until
 
     def leave(self, seconds: float) -> None:
-        """Serve nobody from now on for so long."""
+        """Refuse all requests for some seconds."""
         self._away_until = self._clock() + seconds
 
     def request(self, asked: Asked) -> Fault | None:
-        """Count a request; return the fault that it meets."""
+        """Count a request, and return its fault."""
         with self._lock:
             self._passed.append(Passed(asked=asked, at=self._clock()))
             return self._count(asked.kind, asked.words)
 
     def change(self, watched: Asked) -> Fault | None:
-        """Count an event of a watch; return the fault that it meets."""
+        """Count an event of a watch, and return its fault."""
         with self._lock:
             return self._count(CHANGE, watched.words)
 
     def quiet_s(self) -> float:
-        """Return the seconds since anything but a watch or the Lease was asked for."""
+        """Return the seconds since the last request that is not a watch or for the Lease."""
         with self._lock:
             last = max((each.at for each in self._passed if each.asked.kind not in QUIET_KINDS), default=0.0)
         return self._clock() - last
 
     def last(self, count: int) -> list[str]:
-        """Return the last requests but watches and the Lease, for people."""
+        """Return the last requests except watches and those for the Lease, as text."""
         with self._lock:
             return [each.asked.words for each in self._passed if each.asked.kind not in QUIET_KINDS][-count:]
 

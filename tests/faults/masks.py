@@ -1,7 +1,7 @@
-"""What two runs of one workload have in common: their end states, without what differs by nature.
+"""The common part of two runs of one workload: their end states, without values that always differ.
 
 Pure. An end state becomes leaves, each with a path. Times, uids, versions and numbers in sentences are
-replaced by what they are; what differs between two undisturbed runs all the same is masked.
+replaced by their kind; any other difference between two undisturbed runs is masked.
 """
 
 import re
@@ -10,29 +10,29 @@ from typing import Any
 
 Leaves = dict[str, Any]
 
-# In the order in which they are replaced: a uid and a time have numbers in them.
+# The order matters: a uid and a time contain numbers.
 SHAPES = (
     (re.compile(r"\b[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\b"), "<uid>"),
     (re.compile(r"\b\d{4}-\d\d-\d\dT[\d:.]+Z"), "<time>"),
     (re.compile(r"\bplace-\d+-\d+\b"), "<namespace>"),
-    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # of a trainer, where one was free
+    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer's, whichever was free
     (re.compile(r"(?<=[-_])([0-9a-f]{10}|[0-9a-f]{8}|[0-9a-f]{6})\b"), "<digest>"),  # of a uid or a namespace
-    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # what the Job controller adds to a Job's name
+    (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # the Job controller adds it to a Job's name
 )
 NUMBER = re.compile(r"\d+(\.\d+)?")
 DROPPED = frozenset({"managedFields", "resourceVersion"})
-# What only trainers tell: true or not, it is written when a poll brings it, and no count hangs on it.
+# Only trainers report these: they are written when a poll brings them, and no count depends on them.
 TOLD = frozenset(
     {"target", "furthestStep", "lastCheckpoint", "lastProgress", "stepsLost", "goodput", "faults"}
 )
 SENTENCES = frozenset({"message", "note"})
 SECONDS = re.compile(r"(Seconds|_s)$")
 LONGEST = 100  # characters of a value in a report: a world has thousands
-KEYS = ("type", "name", "index", "container")  # what tells the members of a list apart, in this order
+KEYS = ("type", "name", "index", "container")  # the fields that identify the members of a list, in this order
 
 
 def leaves(state: Any, path: str = "") -> Leaves:
-    """Return the leaves of a JSON value by path, with what differs by nature replaced by its shape."""
+    """Return the leaves of a JSON value by path, with values that always differ replaced by their kind."""
     found: Leaves = {}
     for key, value in _members(state):
         below = f"{path}/{key}"
@@ -51,7 +51,7 @@ def mask(first: Leaves, second: Leaves) -> frozenset[str]:
 
 
 def differences(wanted: Leaves, found: Leaves, masked: frozenset[str]) -> list[str]:
-    """Return how a run's end differs from the undisturbed one's, a sentence for each path."""
+    """Return the differences between a run's end and the undisturbed one's, a sentence for each path."""
     return [
         f"{path}: {_shown(path, found)} in place of {_shown(path, wanted)}"
         for path in sorted(wanted.keys() | found.keys())
@@ -60,7 +60,7 @@ def differences(wanted: Leaves, found: Leaves, masked: frozenset[str]) -> list[s
 
 
 def shaped(text: str) -> str:
-    """Return a text with its uids, times and made-up names replaced by what they are."""
+    """Return a text with its uids, times and generated names replaced by their kind."""
     for pattern, shape in SHAPES:
         text = pattern.sub(shape, text)
     return text

@@ -1,4 +1,4 @@
-"""What must hold of every run, however it was disturbed: its end state, its pods, its owners."""
+"""Conditions that hold for every run, however it was disturbed: its end state, its pods, its owners."""
 
 import threading
 from collections import Counter, defaultdict
@@ -20,10 +20,10 @@ Object = dict[str, Any]
 
 
 def end_state(place: Place, changes: Iterable[tuple[str, Object]]) -> dict[str, dict[str, Object]]:
-    """Return all objects of a namespace that are about TrainingJobs, by kind and name.
+    """Return all objects of a namespace that belong to TrainingJobs, by kind and name.
 
-    The name of a pod is made up by the Job controller; pods are numbered by replica instead, as they came by
-    what a watch reported. Their times are whole seconds, and two may be made in one.
+    The Job controller generates the names of pods, so pods are numbered by replica instead, in the order of a
+    watch. Their times are whole seconds, and two may be made in one.
     """
     state = {
         resource.kind: {each["metadata"]["name"]: each for each in place.all(resource)}
@@ -45,9 +45,10 @@ def _numbered(pods: Iterable[Object], changes: Iterable[tuple[str, Object]]) -> 
 
 
 def orphans(state: Mapping[str, Mapping[str, Object]]) -> list[str]:
-    """Return what was left behind: objects whose TrainingJob or owner is gone, but for claims.
+    """Return the orphans: objects whose TrainingJob or owner is gone, except claims.
 
-    A claim outlives its TrainingJob: it holds the run. A pod that is being deleted waits for its kubelet.
+    A claim outlives its TrainingJob, because it holds the run. A pod that is being deleted waits for its
+    kubelet.
     """
     living = {each["metadata"]["uid"] for kind in state.values() for each in kind.values()}
     return [
@@ -69,7 +70,7 @@ def _belonging(metadata: Mapping[str, Any]) -> set[str]:
 
 
 def doubles(changes: Iterable[tuple[str, Object]]) -> list[str]:
-    """Return the replicas that had two pods at one moment, by what a watch reported of all pods, in order."""
+    """Return the replicas that had two pods at the same time, by a watch's ordered reports of all pods."""
     alive: dict[tuple[str, ...], set[str]] = defaultdict(set)
     found = []
     for kind, pod in changes:
@@ -85,13 +86,13 @@ def doubles(changes: Iterable[tuple[str, Object]]) -> list[str]:
 
 
 def _replica(pod: Object) -> tuple[str, str, str]:
-    """Return whose pod it is: uid and name of its TrainingJob, and the replica's index."""
+    """Return uid and name of a pod's TrainingJob, and the replica's index."""
     labels = pod["metadata"].get("labels", {})
     return labels.get(UID_LABEL, ""), labels.get(JOB_LABEL, ""), labels.get(REPLICA_LABEL, "")
 
 
 class PodWatch:
-    """Records everything that happens to the pods of a namespace while its block runs."""
+    """Records all events of the pods of a namespace during its block."""
 
     def __init__(self, api: Api, namespace: str) -> None:
         self._api = api
@@ -102,7 +103,7 @@ class PodWatch:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def changes(self) -> list[tuple[str, Object]]:
-        """Return what was reported so far: kind of change and pod."""
+        """Return the reports so far: kind of change and pod."""
         return list(self._changes)
 
     def __enter__(self) -> Self:

@@ -1,7 +1,7 @@
-"""Plans: which fault comes at which request of which workload. Pure: a number always names the same plan.
+"""Plans: which fault occurs at which request of which workload. Pure: a number always means the same plan.
 
-The plans of a workload are counted through: first each row of `ROWS` at the first request of its kind, then
-at the second, and so on. A plan whose workload asks less often than that has nothing to disturb.
+The plans of a workload are numbered: first each row of `ROWS` at the first request of its kind, then at the
+second, and so on. If a workload sends fewer requests, the plan has nothing to disturb.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +12,7 @@ from tests.faults.requests import ANSWER, CHANGE, EVENT, GET, LIST, WATCH, WRITE
 
 
 class Kind(StrEnum):
-    """What goes wrong."""
+    """The kind of a fault."""
 
     KILL_BEFORE = "kill before"
     """The operator is killed; the API server never gets the request."""
@@ -66,7 +66,7 @@ class Kind(StrEnum):
 CODES = {Kind.CONFLICT: 409, Kind.GONE: 410, Kind.BUSY: 429, Kind.ERROR: 500, Kind.UNAVAILABLE: 503}
 TRAINERS = frozenset({Kind.SLOW, Kind.HALF, Kind.LIES, Kind.MUCH})
 KILLS = frozenset({Kind.KILL_BEFORE, Kind.KILL_AFTER})
-LATE_S = 11.0  # longer than the operator waits for an answer: carried out when it has given up
+LATE_S = 11.0  # longer than the operator waits for a response: the request is done after it has given up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,10 +74,10 @@ class Fault:
     """One fault.
 
     Attributes:
-        kind: what goes wrong.
-        request: the kind of request that it goes wrong at.
+        kind: the kind of the fault.
+        request: the kind of request that it disturbs.
         number: which of these requests, from 1.
-        seconds: how long it lasts; 0 for what is over at once.
+        seconds: its duration; 0 if it is over at once.
     """
 
     kind: Kind
@@ -87,14 +87,14 @@ class Fault:
 
     @property
     def words(self) -> str:
-        """The fault for people: `kill after write 3`."""
+        """The fault as text: `kill after write 3`."""
         lasting = f" for {self.seconds:g} s" if self.seconds else ""
         return f"{self.kind} at {self.request} {self.number}{lasting}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """A workload and the fault that disturbs it; `seed` names both."""
+    """A workload and the fault that disturbs it; `seed` identifies both."""
 
     seed: int
     workload: str
@@ -102,13 +102,13 @@ class Plan:
 
     @property
     def words(self) -> str:
-        """The plan for people."""
+        """The plan as text."""
         return f"{self.seed}: {self.workload}, {self.fault.words}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """A kind of fault at a kind of request; it comes at every `stride`-th of them, from the `first` on."""
+    """A kind of fault at a kind of request; it occurs at every `stride`-th of them, from the `first` on."""
 
     kind: Kind
     request: str
@@ -117,8 +117,9 @@ class Row:
     first: int = 1
 
 
-# Every write meets two faults. After one of the first four the write has succeeded, and the operator does not
-# know; after one of the next six it has failed. Reads repeat, so they meet faults less often.
+# Every write is disturbed by two faults. After one of the first four the write has succeeded, but the
+# operator does not know; after one of the next six it has failed. Reads are repeated, so they are disturbed
+# less often.
 ROWS = (
     Row(kind=Kind.KILL_AFTER, request=WRITE, stride=2, first=1),
     Row(kind=Kind.DROP, request=WRITE, stride=4, first=2),
@@ -149,7 +150,7 @@ ROWS = (
 
 
 def plan(seed: int, workloads: Sequence[str]) -> Plan:
-    """Return the plan that a number from 0 names; each workload begins its rows at another request."""
+    """Return the plan of a number from 0; each workload begins its rows at another request."""
     rest, workload = divmod(seed, len(workloads))
     turn, row_number = divmod(rest, len(ROWS))
     row = ROWS[row_number]
@@ -159,7 +160,7 @@ def plan(seed: int, workloads: Sequence[str]) -> Plan:
 
 
 def plans(counts: Mapping[str, Mapping[str, int]]) -> Iterator[Plan]:
-    """Yield every plan that meets a request, where a workload asks so often by kind of request."""
+    """Yield every plan that disturbs a request, given the number of a workload's requests of each kind."""
     workloads = tuple(counts)
     most = max((number for each in counts.values() for number in each.values()), default=0)
     for seed in range(most * len(ROWS) * len(workloads)):

@@ -1,7 +1,7 @@
-"""Stand between an operator and its API server, let everything pass, and do what a plan says, once.
+"""A proxy between an operator and its API server passes everything on, and disturbs it once by a plan.
 
-The operator speaks plain HTTP to it on the loopback; to the API server it speaks with the operator's
-certificate, so that rights and the audit log are the operator's own. What it passes on it does not change.
+The operator speaks plain HTTP to it on the loopback. To the API server it uses the operator's certificate, so
+that permissions and the audit log are the operator's own. It does not change the data.
 """
 
 import http.server
@@ -31,20 +31,20 @@ REASONS = {
 }
 CONNECTIONS = 64
 LONGEST_S = 700.0  # longer than the operator lets a watch live
-LOOK_S = 0.05  # how soon the server notices that it is to end
+LOOK_S = 0.05  # the delay with which the server notices its end
 BOOKMARK = b'"type":"BOOKMARK"'
 
 
 class Broken(Exception):
-    """The connection is to be closed as it is, without another byte."""
+    """The connection must be closed at once, without another byte."""
 
 
 class Proxy:
     """A proxy on the loopback, until it is closed.
 
     Attributes:
-        course: what came by.
-        kill: ends the operator at once and returns when it is dead; set before the operator starts.
+        course: the counted requests.
+        kill: kills the operator and returns when it is dead; set before the operator starts.
     """
 
     def __init__(self, kubeconfig: Path, course: Course) -> None:
@@ -59,7 +59,7 @@ class Proxy:
         self._thread.start()
 
     def kubeconfig(self, path: Path) -> Path:
-        """Write a kubeconfig that leads here, and return its path."""
+        """Write a kubeconfig for this proxy, and return its path."""
         host, port = self._server.server_address[:2]
         content = {
             "apiVersion": "v1",
@@ -74,18 +74,18 @@ class Proxy:
 
     @property
     def closing(self) -> bool:
-        """Whether everything is to end."""
+        """Whether the proxy is closing."""
         return self._closing.is_set()
 
     def pause(self, seconds: float) -> None:
-        """Wait, but not beyond the end."""
+        """Wait, but not longer than the proxy lives."""
         self._closing.wait(seconds)
 
     def send(self, method: str, target: str, headers: dict[str, str], body: bytes) -> Any:
-        """Return the API server's answer, of which only the head was read.
+        """Return the API server's response, of which only the head was read.
 
         Raises:
-            Broken: there is none.
+            Broken: there was no response.
         """
         try:
             answer = self._pool.request(
@@ -105,18 +105,18 @@ class Proxy:
         return answer
 
     def done(self, answer: Any) -> None:
-        """Close an answer that was read, or is not wanted any more."""
+        """Close a response that was read or is no longer needed."""
         self._open.pop(id(answer), None)
         answer.close()
 
     def break_all(self) -> None:
-        """End every answer that is under way, those of watches too."""
+        """End every response in progress, including those of watches."""
         for answer in list(self._open.values()):
-            with suppress(ValueError, RuntimeError, OSError):  # it has ended already
+            with suppress(ValueError, RuntimeError, OSError):  # it has already ended
                 answer.shutdown()
 
     def close(self) -> None:
-        """End everything: running watches too."""
+        """End everything, including watches."""
         self._closing.set()
         self._server.shutdown()
         self._thread.join()
@@ -131,7 +131,7 @@ class _Server(http.server.ThreadingHTTPServer):
     request_queue_size = CONNECTIONS
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Close the connection and say nothing: breaking them is what this is for."""
+        """Close the connection without a log line: the tests break connections on purpose."""
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -260,7 +260,7 @@ def _status(code: int) -> dict[str, Any]:
 
 
 def _pool(kubeconfig: Path) -> tuple[str, urllib3.PoolManager]:
-    """Return address and connections of the API server that a kubeconfig with certificates names."""
+    """Return address and connection pool of the API server in a kubeconfig with certificates."""
     content = yaml.safe_load(kubeconfig.read_text())
     cluster, user = content["clusters"][0]["cluster"], content["users"][0]["user"]
     pool = urllib3.PoolManager(

@@ -1,11 +1,11 @@
-"""What a request of the operator is about, by its first line: pure, so that plans can name requests."""
+"""The meaning of an operator's request, from its first line; pure, so that plans can name requests."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
 WRITE, EVENT, GET, LIST, WATCH, CHANGE, LEASE = "write", "event", "get", "list", "watch", "change", "lease"
-ANSWER = "answer"  # of a trainer; all others go to the API server
+ANSWER = "answer"  # that of a trainer; all others go to the API server
 METHODS = {"GET": "get", "POST": "create", "PUT": "update", "PATCH": "patch", "DELETE": "delete"}
 APPLY = "application/apply-patch"
 GROUP_PARTS = {"api": 2, "apis": 3}  # /api/v1, /apis/batch/v1
@@ -17,8 +17,8 @@ class Asked:
 
     Attributes:
         verb: `get`, `list`, `watch`, `create`, `apply`, `patch` or `delete`.
-        resource: the plural, with a subresource behind a slash: `trainingjobs/status`.
-        name: of the object; "" where the request names none.
+        resource: the plural, with a subresource after a slash: `trainingjobs/status`.
+        name: of the object; "" if the request names none.
     """
 
     verb: str
@@ -37,12 +37,12 @@ class Asked:
 
     @property
     def words(self) -> str:
-        """The request for people: `patch trainingjobs/status job`."""
+        """The request as text: `patch trainingjobs/status job`."""
         return f"{self.verb} {self.resource} {self.name}".rstrip()
 
 
 def asked(method: str, target: str, headers: Mapping[str, str]) -> Asked:
-    """Return what a request is about, from its method, its path with query, and its headers."""
+    """Return the meaning of a request, from its method, its path with query, and its headers."""
     address = urlsplit(target)
     parts = address.path.strip("/").split("/")
     resource, name = _object(parts[GROUP_PARTS.get(parts[0], len(parts)) :])
@@ -55,8 +55,8 @@ def asked(method: str, target: str, headers: Mapping[str, str]) -> Asked:
 
 
 def _object(parts: list[str]) -> tuple[str, str]:
-    """Return resource and name of what follows group and version."""
-    if len(parts) > 2 and parts[0] == "namespaces":  # else a Namespace itself
+    """Return resource and name from the path after group and version."""
+    if len(parts) > 2 and parts[0] == "namespaces":  # otherwise it is a Namespace itself
         parts = parts[2:]
     plural, name, *below = [*parts, "", ""][: max(len(parts), 2)]
     return (f"{plural}/{below[0]}" if below else plural), name

@@ -21,23 +21,23 @@ from tests.faults.workloads import WORKLOADS, Stage
 from tests.integration.operator.installed import USER
 from tests.waiting import TooLate
 
-CALL_S = 60.0  # of the rig's own requests, on a machine with other work
+CALL_S = 60.0  # of the rig's own requests, on a busy machine
 QUIET_S = 3.0
-SETTLES_S = 90.0  # what failed is tried again after a minute at most
+SETTLES_S = 90.0  # a failed action is retried after a minute at most
 PACE_S = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """How one run of a workload ended.
+    """The result of one run of a workload.
 
     Attributes:
         state: its end state, as leaves.
-        counts: how many requests of each kind the operator sent.
-        met: the request that the fault came at; "": it never came.
-        lives: how many operators it took.
-        wrong: what must never be, in sentences.
-        seconds: that it took.
+        counts: the number of the operator's requests of each kind.
+        met: the request at which the fault occurred; "" if it never did.
+        lives: the number of operators that it took.
+        wrong: violated conditions, as sentences.
+        seconds: its duration.
     """
 
     state: Leaves = field(default_factory=dict)
@@ -50,12 +50,12 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Undisturbed:
-    """What a workload comes to when nothing is wrong.
+    """The result of a workload without a fault.
 
     Attributes:
         state: the end state of its first run.
-        masked: where the second one differs.
-        counts: how many requests of each kind the operator sends, at least.
+        masked: the paths at which the second one differs.
+        counts: the least number of the operator's requests of each kind.
     """
 
     state: Leaves
@@ -64,11 +64,11 @@ class Undisturbed:
 
 
 class Rig:
-    """Runs workloads on a control plane where Palaestra is installed; each run has its namespace.
+    """Runs workloads on a control plane with Palaestra installed; each run has its own namespace.
 
     Args:
         plane: the control plane.
-        api: an administrator's.
+        api: an administrator's client.
     """
 
     def __init__(self, plane: ControlPlane, api: Api) -> None:
@@ -78,10 +78,10 @@ class Rig:
         self._locks = {workload: threading.Lock() for workload in WORKLOADS}
 
     def undisturbed(self, workload: str) -> Undisturbed:
-        """Return what a workload comes to; run twice the first time that somebody asks.
+        """Return the result of a workload without a fault; the first call runs it twice.
 
         Raises:
-            AssertionError: something is wrong although nothing disturbs.
+            AssertionError: a condition is violated although nothing disturbs.
         """
         with self._locks[workload]:
             if workload not in self._undisturbed:
@@ -95,7 +95,7 @@ class Rig:
             return self._undisturbed[workload]
 
     def run(self, plan: Plan) -> Run:
-        """Run a plan and return what came of it; `wrong` is empty where it came to the same."""
+        """Run a plan and return its result; `wrong` is empty if the end is the same."""
         return self._run(plan.workload, plan.fault, self.undisturbed(plan.workload))
 
     def _run(self, workload: str, fault: Fault | None, wanted: Undisturbed | None) -> Run:
@@ -133,7 +133,7 @@ class Rig:
 
 
 def _played(place: Stage, workload: str) -> list[str]:
-    """Play a workload, and return what did not come to pass in it."""
+    """Run a workload's script, and return the condition for which it waited in vain."""
     try:
         WORKLOADS[workload](place)
     except TooLate as late:
@@ -144,7 +144,7 @@ def _played(place: Stage, workload: str) -> list[str]:
 def _settled(
     place: Stage, course: Course, pods: PodWatch, wanted: Undisturbed | None
 ) -> tuple[Leaves, list[str]]:
-    """Return the end state once it is as wanted and nothing is asked for; and what is wrong with it."""
+    """Return the end state when it is as wanted and no request is sent, and the violated conditions."""
     ends = time.monotonic() + SETTLES_S
     while True:
         found = end_state(place, pods.changes())

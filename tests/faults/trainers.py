@@ -1,6 +1,6 @@
-"""Trainers that answer the operator on addresses of the loopback: as they should, or as a plan says.
+"""Trainers that serve their status on addresses of the loopback, correctly or as a plan says.
 
-From the answer on that the plan names, a trainer stays as it is: slow, halved, a liar, or one without an end.
+From the response that the plan names, a trainer keeps its fault: slow, cut in half, false, or endless.
 """
 
 import threading
@@ -19,21 +19,21 @@ LIES = (
     replace(STATUS, step=10**18, target=10**18, attempt=10**9, steps_lost=10**18, phase="\x00" * 63),
     replace(STATUS, step=0, attempt=None, last_progress="9999-12-31T23:59:59Z", success_rate=1.0),
 )
-DRIBBLE_S = 0.2  # between two bytes: an answer takes a minute
+DRIBBLE_S = 0.2  # between two bytes: a response takes a minute
 ENDLESS = b" " * 65_536
-MOST_PIECES = 4096  # 256 MiB, unless the operator hangs up
+MOST_PIECES = 4096  # 256 MiB, unless the operator closes the connection
 
 
 class Trainer:
-    """A trainer's /status on an address of its own, from now until it is closed.
+    """A trainer's /status on its own address, from now until it is closed.
 
     Attributes:
         host: its address.
-        asked: when it was asked, in seconds of the monotonic clock.
+        asked: the times of its requests, in seconds of the monotonic clock.
     """
 
     def __init__(self, course: Course | None) -> None:
-        """Serve honestly, or as the plan of `course` says."""
+        """Serve correctly, or as the plan of `course` says."""
         self.asked: list[float] = []
         self._course = course
         self._is: Kind | None = None
@@ -42,12 +42,12 @@ class Trainer:
         self.host = self._server.host
 
     def close(self) -> None:
-        """End it."""
+        """Stop serving."""
         self._closing.set()
         self._server.close()
 
     def _counted(self) -> Kind | None:
-        """Count a question and return how it is answered; None: as it should be."""
+        """Count a request, and return the fault of its response, or None."""
         self.asked.append(time.monotonic())
         if self._course is not None:
             fault = self._course.request(Asked(verb=ANSWER, resource="trainer"))

@@ -1,6 +1,6 @@
-"""What people, kubelets and queues do while an operator is disturbed: scripts over several jobs.
+"""Actions of people, kubelets and queues while an operator is disturbed: scripts over several jobs.
 
-A script waits for what it sees in the cluster, and leaves nothing that still trains.
+A script waits for states of the cluster, and leaves no job that still trains.
 """
 
 from collections.abc import Callable
@@ -16,23 +16,23 @@ from tests.faults.trainers import Trainer
 from tests.integration.operator.cluster import Place, world_map, world_of
 from tests.waiting import eventually
 
-PATIENCE_S = 90.0  # an operator that was disturbed may come back to a job half a minute later
+PATIENCE_S = 90.0  # a disturbed operator may return to a job half a minute later
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 SAVED = Termination(step=20, reason="Interrupted: SIGTERM received")
 BUDGET_SPENT, INTERRUPTED = 80, 75
-# Times of Kubernetes are whole seconds: what a queue does closer together has no order.
+# Kubernetes' times are whole seconds: a queue's actions that are closer together have no order.
 DISTINCT_S = 3.0
-NOBODY = "127.0.0.1"  # where no trainer answers
+NOBODY = "127.0.0.1"  # no trainer listens here
 
 Object = dict[str, Any]
 
 
 class Stage(Place):
-    """A namespace with people, a kubelet, and trainers that answer; ends with its block.
+    """A namespace with people, a kubelet and trainers that respond; it ends with its block.
 
     Args:
-        api: an administrator's.
-        course: whose plan says how trainers answer.
+        api: an administrator's client.
+        course: its plan sets the trainers' faults.
     """
 
     def __init__(self, api: Api, course: Course) -> None:
@@ -41,7 +41,7 @@ class Stage(Place):
         self._trainers: list[Trainer] = []
 
     def trainer(self, *, honest: bool = True) -> Trainer:
-        """Return a new trainer; one that is not honest answers as the plan says."""
+        """Return a new trainer; one that is not honest responds as the plan says."""
         self._trainers.append(Trainer(None if honest else self._course))
         return self._trainers[-1]
 
@@ -51,7 +51,7 @@ class Stage(Place):
     def __exit__(self, *_: object) -> None:
         for each in self._trainers:
             each.close()
-        with suppress(ApiError):  # left behind it costs the next runs some memory, and nothing else
+        with suppress(ApiError):  # a leftover costs the next runs only some memory
             self.api.delete(NAMESPACES, None, self.name)
 
 
@@ -59,7 +59,7 @@ Script = Callable[[Stage], None]
 
 
 def ends(place: Stage) -> None:
-    """One job succeeds, one fails for good, one is refused, and one gets its world late."""
+    """One job succeeds, one fails finally, one is refused, and one gets its world late."""
     place.train("good", replicas=2)
     place.train("bad")
     place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
@@ -78,7 +78,7 @@ def ends(place: Stage) -> None:
 
 
 def pauses(place: Stage) -> None:
-    """A job is suspended before its pod runs, resumed, suspended as it runs, resumed, and succeeds."""
+    """A job is suspended before its pod runs, resumed, suspended while it runs, resumed, and succeeds."""
     place.train("paused", suspend=True)
     place.train("beside")
     place.until("Suspended", "paused", PATIENCE_S)
@@ -94,7 +94,7 @@ def pauses(place: Stage) -> None:
 
 
 def again(place: Stage) -> None:
-    """A job on a node that is lost is deleted and made again; of another one somebody deletes the Job."""
+    """A job on a lost node is deleted and created again; the Job of another one is deleted."""
     place.train("again")
     place.train("robbed")
     [lost] = place.pods("again", 1, PATIENCE_S)
@@ -112,7 +112,7 @@ def again(place: Stage) -> None:
 
 
 def deadlines(place: Stage) -> None:
-    """One job gets a deadline as it runs, and passes it; one is deleted a second after its end."""
+    """One job gets a deadline while it runs, and exceeds it; one is deleted a second after its end."""
     place.train("slow")
     place.train("brief", ttlSecondsAfterFinished=1)
     _running(place, "slow")
@@ -124,7 +124,7 @@ def deadlines(place: Stage) -> None:
 
 
 def evictions(place: Stage) -> None:
-    """A pod is evicted and the next one trains on; the Job controller pauses in between, for 10 s."""
+    """A pod is evicted and the next one continues; the Job controller waits in between, for 10 s."""
     place.train("taken", backoffLimit=0)
     [pod] = _running(place, "taken")
     place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
@@ -134,7 +134,10 @@ def evictions(place: Stage) -> None:
 
 
 def queues(place: Stage) -> None:
-    """A queue admits a job, takes it off its node and admits it again; another job it takes unasked."""
+    """A queue admits a job, preempts it and admits it again.
+
+    It suspends another job without being named by it.
+    """
     place.train("queued", scheduling={"queueName": "robots"})
     place.train("seized")
     place.until("Suspended", "queued", PATIENCE_S)
@@ -153,7 +156,7 @@ def queues(place: Stage) -> None:
 
 
 def trainers(place: Stage) -> None:
-    """Two jobs train, one beside the other; each is asked how far it is."""
+    """Two jobs train at the same time, and each is polled for its progress."""
     honest, other = place.trainer(), place.trainer(honest=False)
     place.train("honest")
     place.train("other")
@@ -179,7 +182,7 @@ WORKLOADS: dict[str, Script] = {
 
 
 def _running(place: Stage, name: str, count: int = 1, at: str = NOBODY) -> list[Object]:
-    """Let the pods of a job run, and return them once its status says that it runs."""
+    """Let the pods of a job run, and return them when its status says that it runs."""
     pods = place.pods(name, count, PATIENCE_S)
     for pod in pods:
         place.run(pod, at)
@@ -194,7 +197,7 @@ def _succeed(place: Stage, name: str) -> None:
 
 
 def _succeed_at_once(place: Stage, name: str) -> None:
-    """Let a job succeed that may be deleted before anybody sees so."""
+    """Let a job succeed that may be deleted before the operator sees it."""
     for pod in place.pods(name, 1, PATIENCE_S):
         place.run(pod)
         place.end(pod, word=DONE)
@@ -214,7 +217,7 @@ def _age_s(pod: Object) -> float:
 
 
 def _others(place: Stage, name: str, pod: Object) -> list[Object]:
-    """Return the pods of a job that have not ended, but for one."""
+    """Return the pods of a job that have not ended, except one."""
     return [
         each for each in place.pods(name, 1, PATIENCE_S) if each["metadata"]["uid"] != pod["metadata"]["uid"]
     ]

@@ -1,4 +1,4 @@
-"""What several folders here need: a real ROS master, and a real API server without nodes."""
+"""Fixtures for several folders: a real ROS master, and a real API server without nodes."""
 
 import os
 from collections.abc import Iterator
@@ -11,12 +11,15 @@ from tests.control_plane import shared
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place
 
-RUN = shared.Run.of_this_process()  # this module is imported before workers start
+RUN = shared.Run.of_this_process()  # the module is imported before the workers start
 
 
 @pytest.fixture(scope="session")
 def master() -> str:
-    """One master a process, since rospy registers once; it ends with the process."""
+    """Return the master of this process.
+
+    rospy registers only once, so there is one master per process, and it ends with the process.
+    """
     os.environ["ROS_HOSTNAME"] = "localhost"
     os.environ["ROS_MASTER_URI"] = "http://localhost:1"
     ensure_master()
@@ -25,9 +28,9 @@ def master() -> str:
 
 @pytest.fixture(scope="session")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> ControlPlane:
-    """The control plane of the whole run: each test uses a namespace of its own.
+    """Return the control plane of the whole run; each test uses a separate namespace.
 
-    Everything of install.yaml but the Deployment is installed.
+    Everything in install.yaml except the Deployment is installed.
     """
     return shared.joined(RUN, tmp_path_factory.mktemp("clients"))
 
@@ -39,7 +42,7 @@ def pytest_unconfigure() -> None:
 
 @pytest.fixture(scope="session")
 def installed(control_plane: ControlPlane) -> Iterator[Api]:
-    """An administrator's client."""
+    """Yield a client of an administrator."""
     api = connect(str(control_plane.kubeconfig))
     yield api
     api.close()
@@ -47,11 +50,11 @@ def installed(control_plane: ControlPlane) -> Iterator[Api]:
 
 @pytest.fixture
 def prefix() -> str:
-    """How the name of the namespace begins."""
+    """Return the prefix of the namespace's name."""
     return "place"
 
 
 @pytest.fixture
 def place(installed: Api, prefix: str) -> Place:
-    """A namespace of the test's own."""
+    """Return a new namespace for the test."""
     return Place(installed, prefix)

@@ -1,7 +1,7 @@
-"""A dashboard as a picture: its panels where Grafana has them, with what Prometheus answered.
+"""A dashboard as a picture: its panels in their positions in Grafana, with the responses of Prometheus.
 
-For the documentation, where no Grafana is at hand. The content comes from the dashboard's
-JSON. The style is our own and does not claim to be Grafana's.
+It is for the documentation, where there is no Grafana. The content comes from the dashboard's JSON. The style
+is our own and not Grafana's.
 """
 
 import itertools
@@ -22,8 +22,8 @@ from tests.monitoring.questions import panels
 COLUMNS = 24
 COLUMN_IN, UNIT_IN = 0.62, 0.34  # width of a column and height of a unit of the grid, in inches
 MARGINS_IN = {"left": 0.62, "right": 0.15, "top": 0.42, "bottom": 0.62}
-MOST_NAMES = 8  # in a legend; more hide what they explain
-LETTER_IN, MARK_IN = 0.05, 0.35  # in a legend: width of a letter, and of all else of an entry
+MOST_NAMES = 8  # in a legend; more would cover the curves
+LETTER_IN, MARK_IN = 0.05, 0.35  # in a legend: width of a letter, and of the rest of an entry
 DPI = 90
 STYLE: dict[Any, Any] = {
     "font.size": 8,
@@ -47,7 +47,7 @@ PLAIN = FuncFormatter(lambda value, _: f"{value:g}" if abs(value) < 1000 else BI
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What one series of an answer is called, and its values at minutes of the run."""
+    """The name of a series, and its values at minutes of the run."""
 
     name: str
     minutes: Any
@@ -61,7 +61,7 @@ Answers = Mapping[int, Sequence[Line]]  # by the panel's number
 def line(series: Mapping[str, Any], legend: str, began: float) -> Line:
     """Return a series of a range query, with its legend filled in; `began` is Unix time.
 
-    The run's own name is left out of longer ones: a picture shows one run.
+    Longer names leave out the run's own name, because a picture shows one run.
     """
     brief = legend.removeprefix("{{training_job}}/{{replica}} ")
     name = re.sub(r"{{\s*(\w+)\s*}}", lambda label: series["metric"].get(label[1], ""), brief)
@@ -116,14 +116,14 @@ def _timeseries(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> 
 
 
 def _with_gaps(series: Line) -> tuple[Any, Any]:
-    """Return minutes and values, with nothing between points that stand too far apart, as Grafana has it."""
+    """Return minutes and values, with a gap between points that are too far apart, as in Grafana."""
     apart = np.diff(series.minutes)
     gaps = np.flatnonzero(apart > 1.5 * apart.min(initial=np.inf)) + 1
     return np.insert(series.minutes, gaps, np.nan), np.insert(series.values, gaps, np.nan)
 
 
 def _top(lines: Sequence[Line], defaults: Mapping[str, Any]) -> float | None:
-    """Return the upper end of the axis: a little above the values; None: as matplotlib has it."""
+    """Return the upper end of the axis, a little above the values; None leaves it to matplotlib."""
     if "min" not in defaults or not lines or "stacking" in defaults["custom"]:
         return None
     most = np.nanmax([0.0, *(np.nanmax(each.values, initial=0.0) for each in lines)])
@@ -146,7 +146,10 @@ def _stat(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> None:
 
 
 def _heatmap(axes: Axes, panel: Mapping[str, Any], lines: Sequence[Line]) -> None:
-    """Draw how much is in each bucket: the buckets' differences, since each counts all smaller values too."""
+    """Draw the count in each bucket.
+
+    It is a difference of two buckets, because each one also counts all smaller values.
+    """
     buckets = sorted(lines, key=lambda each: float(each.labels["le"]))
     if not buckets:
         return
@@ -191,7 +194,7 @@ def _name(axes: Axes) -> None:
 
 
 def _fitting(axes: Axes, letters: int) -> int:
-    """Return how many entries with so many letters fit beside each other below the axes."""
+    """Return the number of entries with this many letters that fit side by side below the axes."""
     width_in = axes.get_position().width * COLUMNS * COLUMN_IN
     return max(1, int(width_in / (LETTER_IN * letters + MARK_IN)))
 

@@ -1,6 +1,6 @@
 """Draw the drives of a trained policy from above: `python -m tests.monitoring.drives RUN`.
 
-docs/images/drives.png    six episodes that the policy never saw, in the simulator that ships
+docs/images/drives.png    six episodes that the policy never saw, in the included simulator
 """
 
 import sys
@@ -26,7 +26,7 @@ WALL_M = 0.06
 
 
 def main(run: str) -> int:
-    """Draw the policy of this run directory."""
+    """Draw the drives of the policy in a run directory."""
     drives = _drives(run)
     with mpl.rc_context({"font.size": 8}):
         figure = Figure(figsize=(SIDE_IN, SIDE_IN), dpi=DPI, layout="tight")
@@ -41,7 +41,7 @@ def main(run: str) -> int:
 
 
 def _drives(run: str) -> list[tuple[list[arena.Point], arena.Point, bool]]:
-    """Return places (m), target (m) and success of an episode for each seed."""
+    """Return positions (m), target (m) and success of an episode for each seed."""
     policy = load_policy(run)
     with closing(OwnSimulator()) as simulator:
         env = make(simulator.robot, simulator.scene, **policy.environment_options)
@@ -72,7 +72,7 @@ def _draw_arena(axes: Axes) -> None:
 
 
 def _draw_drive(axes: Axes, places: list[arena.Point], target: arena.Point, color: str) -> None:
-    """Draw the target as a ring, the way as a line, and the robot where it started (dashed) and stands."""
+    """Draw the target as a ring, the path as a line, and the robot at its start (dashed) and its end."""
     axes.add_patch(Circle(target, REACHED_M, fill=False, color=color, linewidth=1.2))
     axes.plot(*zip(*places, strict=True), color=color, linewidth=1.4)
     axes.add_patch(Circle(places[0], arena.OUTLINE_M, fill=False, color=color, linestyle=":", linewidth=1))

@@ -1,7 +1,7 @@
 """A local Prometheus that scrapes the given targets and answers queries.
 
-It is Debian's, unpacked by tests/cluster/programs.sh. The labels of a target are given here as the chart's
-PodMonitor and ServiceMonitor would give them.
+It is Debian's, unpacked by tests/cluster/programs.sh. The caller gives a target the labels that the chart's
+PodMonitor and ServiceMonitor would give it.
 """
 
 import json
@@ -27,11 +27,11 @@ PROGRAMS = ("prometheus", "promtool")
 SCRAPE_S = 1
 START_DEADLINE_S = 30
 QUERY_DEADLINE_S = 10
-LOOK_EVERY_S = 0.1  # nothing in its API can be waited for
+LOOK_EVERY_S = 0.1  # its API offers no way to wait
 
 
 class NotAnswered(Exception):
-    """Prometheus did not come up, refused a query, or what was waited for did not come."""
+    """Prometheus did not start, refused a query, or an awaited result did not come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,12 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Prometheus:
-    """A running one."""
+    """A running Prometheus."""
 
     address: str
 
     def query(self, expr: str) -> list[dict[str, Any]]:
-        """Return the series that an expression has now.
+        """Return the series of an expression now.
 
         Raises:
             NotAnswered: the expression is wrong; the message is Prometheus' own.
@@ -57,14 +57,14 @@ class Prometheus:
         return self._ask("query", query=expr)
 
     def over(self, expr: str, since: float, until: float, step_s: float) -> list[dict[str, Any]]:
-        """Return the series that an expression had between two moments (Unix time), with all values."""
+        """Return the series of an expression between two times (Unix time), with all values."""
         return self._ask("query_range", query=expr, start=since, end=until, step=step_s)
 
     def until(self, claim: Callable[[], Any], deadline_s: float) -> Any:
         """Return the first true value of `claim`.
 
         Raises:
-            NotAnswered: there was none within `deadline_s`.
+            NotAnswered: it had no true value within `deadline_s`.
         """
         try:
             return eventually(claim, deadline_s, LOOK_EVERY_S)
@@ -86,7 +86,7 @@ class Prometheus:
 
 @contextmanager
 def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None) -> Iterator[Prometheus]:
-    """Run a Prometheus that asks `targets`, as `configured` runs one.
+    """Run a Prometheus that scrapes `targets`, in the same way as `configured`.
 
     Raises:
         NoPrograms, NotAnswered: as `configured` does.
@@ -100,16 +100,16 @@ def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None)
 def configured(
     scrapes: Sequence[Mapping[str, Any]], folder: Path, rules: Path | None = None
 ) -> Iterator[Prometheus]:
-    """Run a Prometheus with its files in `folder`, which exists and is empty, until the block ends.
+    """Run a Prometheus until the block ends; its `folder` exists and is empty.
 
     Args:
-        scrapes: its scrape_configs; every target is asked every second.
+        scrapes: its scrape_configs; every target is scraped every second.
         folder: for its configuration, data and log.
-        rules: a file of alerting rules, looked at every second.
+        rules: a file of alerting rules, evaluated every second.
 
     Raises:
         NoPrograms: Prometheus is not there.
-        NotAnswered: it did not come up.
+        NotAnswered: it did not start.
     """
     binaries = programs(PROGRAMS)
     with ExitStack() as running:

@@ -1,4 +1,4 @@
-"""What the dashboards ask of Prometheus, as Grafana would send it: read from the JSON that is shipped."""
+"""The dashboards' queries to Prometheus, as Grafana would send them: read from the chart's JSON."""
 
 import json
 import re
@@ -13,7 +13,7 @@ CHART = Path(__file__).parents[2] / "charts/palaestra"
 DASHBOARDS = sorted((CHART / "dashboards").glob("*.json"))
 ALERTS = CHART / "alerts.yaml"
 SELECTOR = re.compile(r"palaestra_\w+(?:{[^}]*})?")
-EVERYTHING = ".+"  # what Grafana sends for All
+EVERYTHING = ".+"  # Grafana sends this for All
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +30,8 @@ def questions(over: str, shown: str) -> Iterator[Question]:
     """Yield every query of every panel, for all namespaces, jobs and replicas.
 
     Args:
-        over: that rates are taken over, as Prometheus has it: 30s.
-        shown: the whole time shown.
+        over: the time range of rates, in the form of Prometheus: 30s.
+        shown: the whole time range of the dashboard.
     """
     for file in DASHBOARDS:
         dashboard = json.loads(file.read_text())
@@ -44,7 +44,7 @@ def questions(over: str, shown: str) -> Iterator[Question]:
 
 
 def looked_at() -> Iterator[Question]:
-    """Yield every metric that an alert looks at, whether it fires or not."""
+    """Yield every metric in the expression of an alert, whether it fires or not."""
     for rule in alerts():
         for selector in SELECTOR.findall(rule["expr"]):
             yield Question("alerts", rule["alert"], selector, "")
@@ -56,7 +56,7 @@ def panels(dashboard: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def values_of(dashboard: Mapping[str, Any], over: str, shown: str) -> dict[str, str]:
-    """Return what stands for each variable in a query while all is chosen."""
+    """Return the value of each variable in a query when all is selected."""
     chosen = {variable["name"]: EVERYTHING for variable in dashboard["templating"]["list"]}
     return {**chosen, "__rate_interval": over, "__range": shown}
 

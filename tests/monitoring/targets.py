@@ -1,4 +1,4 @@
-"""Scrape targets, with the labels that the chart's PodMonitor and ServiceMonitor set in a cluster."""
+"""Scrape targets with the labels that the chart's PodMonitor and ServiceMonitor set in a cluster."""
 
 import re
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ ADDRESSES = re.compile(r"--control=(\S+) --health=(\S+)")
 
 
 def of_run(run: LocalRun, namespace: str) -> list[Target]:
-    """Return the trainer and the sidecars of a local run, once all of them are there."""
+    """Return the targets of a local run, its trainer and sidecars, once all of them exist."""
     simulators = run.until(lambda: list(_sidecars(run)) if run.status() else None)
     pod = {"namespace": namespace, "pod": f"{run.name}-0", "training_job": run.name, "replica": "0"}
     trainer = Target(run.training()["statusAddress"], pod | {"container": "trainer"})
@@ -21,7 +21,7 @@ def of_run(run: LocalRun, namespace: str) -> list[Target]:
 
 
 def of_operator(address: str, pod: str = "palaestra-operator-0") -> Target:
-    """Return an operator that answers at `address`."""
+    """Return the target of an operator that serves at `address`."""
     return Target(address, {"namespace": "palaestra-system", "pod": pod, "container": "operator"})
 
 

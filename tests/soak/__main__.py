@@ -1,9 +1,9 @@
-"""`make soak`: prove that nothing ends a training run which nobody attends to; prints JSON.
+"""`make soak`: prove that nothing ends a training run without supervision; it prints JSON.
 
-Every part runs whole trainings, breaks something in them, and says what came of it: figures, and
-claims that hold or do not. Names as arguments choose parts, e.g. `python -m tests.soak recovery kills`;
-`--scale 0.1` does a tenth of what a part does, to see that the part itself works. `faults --seed N` repeats
-the one plan of that part which N names.
+Every part runs complete trainings, breaks something in them, and reports figures and claims that hold or do
+not. Names as arguments choose parts, e.g. `python -m tests.soak recovery kills`. `--scale 0.1` runs a tenth
+of a part, which shows that the part itself works. `faults --seed N` repeats the one plan of that part with
+the number N.
 """
 
 import argparse
@@ -28,7 +28,10 @@ PARTS = {
 
 
 def main():
-    """Print one JSON object a line: part, seconds it took, figures, claims; return 1 if one does not hold."""
+    """Print a line of JSON for each part, and return 1 if a claim does not hold.
+
+    A line contains the part, its seconds, its figures and its claims.
+    """
     parser = argparse.ArgumentParser(prog="tests.soak", description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
     parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
@@ -44,7 +47,7 @@ def main():
 
 
 def prove(name, scale, measure):
-    """Run a part and print what it found; return whether all its claims hold."""
+    """Run a part, print its results, and return whether all its claims hold."""
     started = time.monotonic()
     try:
         found = measure(scale)

@@ -1,4 +1,4 @@
-"""A training amid crashes, hangs and slow steps learns as much as one without any.
+"""A training with crashes, hangs and slow steps learns as much as one without them.
 
 The job is manifests/examples/chaos.yaml.
 """
@@ -19,7 +19,10 @@ LONGEST_S = 7200.0
 
 
 def measure(scale):
-    """Return what the training came to, and its policy's success on episodes that nothing was chosen on."""
+    """Return the results of the training.
+
+    They include the policy's success on episodes that took no part in any choice.
+    """
     job = example("chaos")
     trainer = job["spec"]["trainer"]
     trainer["steps"] = max(round(trainer["steps"] * scale), LEAST_STEPS)

@@ -1,4 +1,4 @@
-"""Each file of a checkpoint is damaged in turn: it is noticed, and the checkpoint before is used."""
+"""Each file of a checkpoint is damaged in turn: the damage is found, and the checkpoint before is used."""
 
 import shutil
 import tempfile
@@ -13,24 +13,27 @@ NOTICED = "damaged checkpoint skipped"
 
 
 def flip(file):
-    """Change one byte in the middle, as a disk does."""
+    """Change one byte in the middle, as a faulty disk does."""
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 0xFF
     replace(file, bytes(content))
 
 
 def cut(file):
-    """Lose the second half, as a full disk does."""
+    """Remove the second half, as a full disk does."""
     replace(file, file.read_bytes()[: file.stat().st_size // 2])
 
 
 def remove(file):
-    """Lose it."""
+    """Remove the file."""
     file.unlink()
 
 
 def replace(file, content):
-    """Write a file anew: checkpoints may share one that did not change, and only one is to be damaged."""
+    """Write a file as a new one, because checkpoints may share an unchanged file.
+
+    Only one of them is to be damaged.
+    """
     file.unlink()
     file.write_bytes(content)
 
@@ -39,7 +42,7 @@ DAMAGES = (flip, cut, remove)
 
 
 def measure(scale):
-    """Return how many damaged files were noticed, and those that were not."""
+    """Return the number of detected damages, and those that were not detected."""
     with tempfile.TemporaryDirectory() as folder:
         run = interrupted(Path(folder))
         files = files_of(run.checkpoints()[-1])
@@ -69,19 +72,22 @@ def job():
 
 
 def interrupted(folder):
-    """Train until there are several checkpoints, and interrupt; return the run."""
+    """Train until there are several checkpoints, interrupt the run, and return it."""
     with LocalRun(folder, job()) as run:
         run.wait_for_step(STEPS)
     return run
 
 
 def files_of(checkpoint):
-    """Return the names of all files of a checkpoint, those in folders of it too."""
+    """Return the names of all files of a checkpoint, also of those in its folders."""
     return sorted(str(it.relative_to(checkpoint)) for it in checkpoint.rglob("*") if it.is_file())
 
 
 def is_survived(run, name, damage):
-    """Damage a file of the newest checkpoint, go on, and put everything back; return whether it went well."""
+    """Return whether a run survives damage to a file of its newest checkpoint.
+
+    The files are restored afterwards.
+    """
     kept = run.directory.with_name("kept")
     shutil.copytree(run.directory, kept)
     newest, before = run.checkpoints()[-1], run.checkpoints()[-2]

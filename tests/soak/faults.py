@@ -1,4 +1,4 @@
-"""Disturb each write, and much of what is read, between operator and API server once: the end is the same."""
+"""Disturb each write, and many reads, between operator and API server once: the end is the same."""
 
 import json
 import os
@@ -24,11 +24,11 @@ from tests.waiting import eventually
 KINDS = ROOT / "manifests" / "crd.yaml"
 AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # a run waits most of its time
 FEWEST = 200
-SEED = 1  # of the sample that is taken below full scale
+SEED = 1  # of the random sample below full scale
 
 
 def measure(scale):
-    """Return how many plans came to the same end as undisturbed runs, and those that did not."""
+    """Return the number of plans with the same end as undisturbed runs, and the other plans."""
     with rig() as at, several_at_once() as pool:
         undisturbed = dict(zip(WORKLOADS, pool.map(at.undisturbed, WORKLOADS), strict=True))
         every = list(plans({name: each.counts for name, each in undisturbed.items()}))
@@ -55,7 +55,7 @@ def measure(scale):
 
 
 def repeat(seed):
-    """Run the plan of a seed alone and return what came of it."""
+    """Run only the plan of a seed and return its result."""
     chosen = plan(seed, tuple(WORKLOADS))
     with rig() as at:
         run = at.run(chosen)
@@ -70,7 +70,7 @@ def repeat(seed):
 
 @contextmanager
 def several_at_once() -> Iterator[ThreadPoolExecutor]:
-    """Run what the block asks for, several at once; what has not begun when it is interrupted never does."""
+    """Yield a pool that runs several plans at once; after an interruption it starts no further ones."""
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         yield pool
@@ -93,7 +93,7 @@ def rig() -> Iterator[Rig]:
 
 
 def told(chosen, run):
-    """Write a line about a run to standard error, where somebody may wait for it; return the run."""
+    """Write a line about a run to standard error for a user who waits, and return the run."""
     line = {"plan": chosen.words, "met": run.met, "seconds": run.seconds, "wrong": run.wrong}
     sys.stderr.write(json.dumps(line) + "\n")
     return run

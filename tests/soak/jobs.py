@@ -1,4 +1,4 @@
-"""The TrainingJobs of the proof: small ones, whose simulators may break as often as they like."""
+"""The small TrainingJobs of the proof, whose simulators may fail any number of times."""
 
 import copy
 
@@ -6,7 +6,8 @@ import yaml
 
 from tests.local_run import EXAMPLES
 
-# The most that a job can say: a proof is about what a fault costs, not about the budget.
+# This is the largest limit that a job can have. // A proof is about the cost of a fault, not about the
+# budget.
 ANY_NUMBER = {"limit": 1000, "withinSeconds": 600}
 
 LITTLE_DQN = {
@@ -40,7 +41,7 @@ def make_job(*, collect=None, evaluate=None, faults="", seed=1, **trainer):
     Args:
         collect: fields of the group of simulators that collects.
         evaluate: fields of the group that evaluates; leave it out with `evaluation.everySteps` 0.
-        faults: what all simulators do wrong, as PALAESTRA_STUB_FAULTS has it.
+        faults: the faults of all simulators, as in PALAESTRA_STUB_FAULTS.
         seed: of the job.
         trainer: fields of the trainer.
     """

@@ -1,4 +1,4 @@
-"""The trainer is killed, or asked to end, at moments drawn by chance: the run always goes on."""
+"""The trainer is killed or interrupted at random times: the run always continues."""
 
 import random
 import re
@@ -11,7 +11,7 @@ from tests.soak.jobs import LITTLE_DQN, make_job
 TIMES = 50
 SEED = 5
 CHECKPOINT_STEPS = 200
-# After an attempt began: its first second or two are simulators starting.
+# The time since the start of an attempt, which takes a second or two to start simulators.
 MOMENT_S = (0.0, 8.0)
 SAVING_S = (0.0, 0.005)  # after the first sign of a checkpoint being written
 GRACE_S = 60.0
@@ -21,7 +21,7 @@ ENDED = re.compile(r"trainer ended with exit code (\d+)")
 
 
 def measure(scale):
-    """Return how many of the killed trainers resumed, and how many of those asked to end saved in time."""
+    """Return the number of killed trainers that resumed, and of interrupted ones that saved in time."""
     times = max(round(TIMES * scale), 2)
     killed = resumptions_after_kills(times)
     asked = ends_after_sigterm(times)
@@ -42,7 +42,7 @@ def measure(scale):
 
 
 def job():
-    """Return a job without an end, which evaluates and saves all the time."""
+    """Return an endless job that often evaluates and saves."""
     return make_job(
         algorithm=LITTLE_DQN,
         steps=1_000_000,
@@ -52,7 +52,7 @@ def job():
 
 
 def resumptions_after_kills(times):
-    """Kill the trainer again and again, every second time while it saves; return what came of each."""
+    """Return the results after several kills of the trainer, every second one while it saves."""
     moments = random.Random(SEED)
     with running(job()) as run:
         run.until(run.checkpoints)
@@ -65,7 +65,7 @@ def resumptions_after_kills(times):
 
 
 def kill(run, moments, *, while_saving):
-    """Kill the trainer at a moment drawn by chance; return whether it was just saving."""
+    """Kill the trainer at a random time, and return whether it was saving."""
     trainer = run.trainer()
     if while_saving:
         goes_further(run)
@@ -79,9 +79,9 @@ def kill(run, moments, *, while_saving):
 
 
 def resumes(run):
-    """Start the run again; return whether it went on from the newest checkpoint."""
+    """Start the run again, and return whether it continues from the newest checkpoint."""
     newest = int(run.checkpoints()[-1].name)
-    run.stop()  # a runner waits longer and longer for a pod that it sees fail without progress
+    run.stop()  # a runner waits longer and longer for a pod that fails without progress
     attempts = len(run.attempts())
     run.start()
     run.until(lambda: len(run.attempts()) > attempts)
@@ -94,12 +94,12 @@ def goes_further(run):
 
 
 def drafts(run):
-    """Return the folders of checkpoints that are not whole yet."""
+    """Return the folders of checkpoints that are not complete yet."""
     return list((run.directory / "checkpoints").glob(".*.draft"))
 
 
 def ends_after_sigterm(times):
-    """Ask the trainer to end again and again, every fifth time in a hung call; return what came of each."""
+    """Return the results after several SIGTERMs, every fifth one during a hung call."""
     moments = random.Random(SEED)
     with running(job()) as run:
         run.wait_for_step(CHECKPOINT_STEPS)
@@ -107,7 +107,11 @@ def ends_after_sigterm(times):
 
 
 def end(run, moments, *, hung):
-    """Ask the trainer to end at a moment drawn by chance; return how it ended, and the steps it lost."""
+    """Send SIGTERM to the trainer at a random time.
+
+    Returns:
+        How the trainer ended, and the steps that it lost.
+    """
     trainer = run.trainer()
     time.sleep(moments.uniform(*MOMENT_S))
     if hung:
@@ -122,13 +126,13 @@ def end(run, moments, *, hung):
     code = int(run.until(lambda: ENDED.findall(run.output())[ends:])[0])
     run.until(lambda: len(run.attempts()) > attempts)
     step = before["step"] if before else 0
-    # An unfinished rollout is played again: four steps of this algorithm.
+    # An unfinished rollout is repeated: four steps of this algorithm.
     lost = max(step - resumed_at(run) - 4, 0)
     return {"exit": code, "seconds": round(seconds, 2), "lost": lost, "hung": hung}
 
 
 def is_in_time(ended):
-    """Return whether a trainer that was asked to end did so in time, and lost nothing."""
+    """Return whether an interrupted trainer ended in time and lost nothing."""
     return ended["exit"] == 75 and ended["seconds"] <= IN_TIME_S and ended["lost"] == 0
 
 

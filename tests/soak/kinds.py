@@ -1,4 +1,4 @@
-"""Every kind of fault, in short runs of two algorithms: each ends as docs/explain/reliability.md says."""
+"""Every kind of fault in short runs of two algorithms: each run ends as docs/explain/reliability.md says."""
 
 import re
 
@@ -11,21 +11,21 @@ ROW = re.compile(
 )
 ALGORITHMS = (LITTLE_DQN, LITTLE_PPO)
 FAULT_KINDS = {"dead", "hung", "wrong_data"}
-EXIT_CODES = {"Succeeded": 0, "FaultBudgetSpent": 80, "SimulatorBudgetSpent": 80}
+EXIT_CODES = {"Succeeded": 0, "SimulatorBudgetSpent": 80}
 # A multiple of PPO's rollout. Episodes so short that there are more than 25 resets between two restarts.
 STEPS = 96
 EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}
-A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that nothing mends
+A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that fails after every restart
 LONGEST_S = 600.0
 
 
 def rows():
-    """Return the lines of the table that a stub can play: fault, what Palaestra reports, how the run ends."""
+    """Return the lines of the table that a stub can cause: fault, Palaestra's report, end of the run."""
     return [match.groups() for match in ROW.finditer(PAGE.read_text())]
 
 
 def measure(scale):
-    """Return how the run with each fault ended, and those that did not end as the table says."""
+    """Return the end of the run with each fault, and the ends that differ from the table."""
     table = rows()
     chosen = table[:: max(round(1 / scale), 1)]
     runs = [
@@ -47,7 +47,7 @@ def measure(scale):
 
 
 def play(fault, algorithm, ending):
-    """Return exit code, faults by kind and slow steps of a short run whose simulators have a fault."""
+    """Return exit code, faults by kind and slow steps of a short run with a fault."""
     with running(job(fault, algorithm, ending)) as run:
         code, _ = run.end(LONGEST_S)
         slow = run.counters().get("faults", {}).get("slow", 0)
@@ -65,7 +65,7 @@ def is_as_told(found, ending, reported):
 
 
 def job(fault, algorithm, ending):
-    """Return the job: collecting and evaluating simulators have the same fault."""
+    """Return the job whose collecting and evaluating simulators have the same fault."""
     care = {"recycle": {"afterResets": 0}, "restart": ANY_NUMBER if ending == "Succeeded" else A_FEW}
     return make_job(
         faults=fault,

@@ -10,16 +10,16 @@ from tests.soak.jobs import LITTLE_DQN, make_job
 
 RESTARTS = 500
 COLLECTORS = 2
-# A reset is two steps: each life ends in the first episode.
+# A reset is two steps, so each life ends in the first episode.
 DIES = "crash:step=6"
 WATCHED = ("palaestra-train", "palaestra-sidecar")
-# A sidecar holds up to three more of a kind while its simulator lives; what leaks, it holds hundreds of.
+# A sidecar has up to three more of a kind while its simulator lives; of a leak it would have hundreds.
 SWAY = 4
 LONGEST_S = 3600.0
 
 
 def measure(scale):
-    """Return what trainer and sidecars held in the first and in the last tenth of the restarts."""
+    """Return the resources of trainer and sidecars in the first and in the last tenth of the restarts."""
     restarts = max(round(RESTARTS * scale), 20)
     with running(job()) as run:
         run.wait_for_step(1)
@@ -35,7 +35,7 @@ def measure(scale):
 
 
 def job():
-    """Return a job whose simulators die again and again, without an end."""
+    """Return an endless job whose simulators die again and again."""
     return make_job(
         collect={"count": COLLECTORS, "recycle": {"afterResets": 0}},
         faults=DIES,
@@ -47,9 +47,9 @@ def job():
 
 
 def least(run, first, last):
-    """Return the least that each watched program held between two numbers of restarts.
+    """Return the smallest use of each watched program between two numbers of restarts.
 
-    The least, since that is when no restart is under way, or the fewest are.
+    At the smallest use, no restart or the fewest restarts are in progress.
     """
     run.until(lambda: restarts_of(run) >= first, LONGEST_S)
     least_held = {}
@@ -62,7 +62,10 @@ def least(run, first, last):
 
 
 def grown(early, late):
-    """Return what a program holds more of than before; memory may grow, as that of the replay buffer does."""
+    """Return the resources of which a program has more than before.
+
+    Memory may grow, as that of the replay buffer does.
+    """
     return [
         f"{name}: {what}"
         for name, held in early.items()
@@ -72,16 +75,16 @@ def grown(early, late):
 
 
 def restarts_of(run):
-    """Return how often simulators were restarted so far."""
+    """Return the number of restarts of simulators so far."""
     return sum(each["restarts"] for each in run.ask()["simulators"])
 
 
 def holdings(run):
-    """Return what the trainer and each sidecar hold now."""
+    """Return the present resources of the trainer and each sidecar."""
     found = {}
     for program in WATCHED:
         pids = set(run.pids(program))
-        forked = {pid for each in pids for pid, _ in below(each)}  # for a moment they bear its name
+        forked = {pid for each in pids for pid, _ in below(each)}  # for a moment they have its name
         for number, pid in enumerate(sorted(pids - forked)):
             found[f"{program} {number}"] = held_by(pid)
     return found
@@ -102,7 +105,7 @@ def held_by(pid):
 
 
 def kind_of(descriptor):
-    """Return what a descriptor is, as the kernel names it: socket, pipe, a path; "" for a closed one."""
+    """Return the kernel's name for a descriptor: socket, pipe, a path; "" for a closed one."""
     try:
         return str(descriptor.readlink()).partition(":")[0]
     except OSError:

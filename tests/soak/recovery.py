@@ -1,4 +1,4 @@
-"""How soon a simulator that broke steps again, and how soon a hang is noticed."""
+"""The time until a simulator that failed steps again, and until a hang is detected."""
 
 import os
 import signal
@@ -15,12 +15,12 @@ TIMES = 10
 WARM_STEPS = 100
 LOOK_EVERY_S = 0.02
 SIMULATOR = "collect-0"
-# No promise is made about a spare that is still starting; a start takes half a second.
+# There is no promise about a spare that is still starting; a start takes half a second.
 SPARE_READY_S = 30.0
 
 
 def measure(scale):
-    """Return the seconds from SIGKILL to the next step, and to the notice of a hang."""
+    """Return the seconds from SIGKILL to the next step, and from a hang to its detection."""
     times = max(round(TIMES * scale), 2)
     killed = recoveries(times)
     swapped = recoveries(times, standby=True)
@@ -46,7 +46,7 @@ def recoveries(times, *, standby=False):
 
 
 def recovery(run, *, standby):
-    """Kill the collecting simulator; return the seconds until training has stepped again."""
+    """Kill the collecting simulator, and return the seconds until training has stepped again."""
     run.until(lambda: is_ready(run, standby=standby), SPARE_READY_S)
     process, restarts = in_use(run), simulator(run)["restarts"]
     os.kill(process, signal.SIGKILL)
@@ -64,7 +64,7 @@ def noticings(times):
 
 
 def noticing(run):
-    """Stop the collecting simulator; return the seconds until a fault is counted."""
+    """Stop the collecting simulator, and return the seconds until a fault is counted."""
     run.until(lambda: is_ready(run, standby=False))
     process, before = in_use(run), run.faults().get("hung", 0)
     os.kill(process, signal.SIGSTOP)
@@ -75,7 +75,7 @@ def noticing(run):
 
 @contextmanager
 def training(*, standby=False):
-    """Yield a run without an end that collects with one simulator, past its first steps."""
+    """Yield an endless run that collects with one simulator, after its first steps."""
     collect = {"recycle": {"afterResets": 0}} | ({"standby": True} if standby else {})
     job = make_job(
         collect=collect,
@@ -90,18 +90,18 @@ def training(*, standby=False):
 
 
 def is_ready(run, *, standby):
-    """Return whether the simulator, and its spare if it has one, is up."""
+    """Return whether the simulator, and its spare if needed, is ready."""
     seen = simulator(run)
     return seen["state"] == "ready" and (not standby or seen["standby"] == "ready")
 
 
 def simulator(run):
-    """Return what /status says of the collecting simulator."""
+    """Return the collecting simulator's part of /status."""
     return next(each for each in run.ask()["simulators"] if each["name"] == SIMULATOR)
 
 
 def in_use(run):
-    """Return the process of the collecting simulator that is stepped now: a spare uses no processor."""
+    """Return the collecting simulator's process that is stepped now; a spare uses no processor time."""
     before = {pid: processor_s(pid) for pid in run.pids("palaestra-stub", SIMULATOR)}
     step = run.ask()["step"]
     run.wait_for_step(step + WARM_STEPS)
@@ -109,7 +109,7 @@ def in_use(run):
 
 
 def processor_s(pid):
-    """Return the processor seconds that a process has used; 0 for one that is gone."""
+    """Return the processor seconds of a process, or 0 if it no longer exists."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -118,5 +118,5 @@ def processor_s(pid):
 
 
 def spread(seconds):
-    """Return median and largest of some durations, in seconds."""
+    """Return median and maximum of some durations, in seconds."""
     return {"median": round(statistics.median(seconds), 2), "most": round(max(seconds), 2)}

@@ -1,7 +1,7 @@
-"""2,500 episodes with a simulator that dies of a bus error after 24 resets, and nobody there.
+"""2,500 episodes with a simulator that dies of a bus error after 24 resets, without supervision.
 
-What recycling costs is the wall clock of the run against one in which nothing ever breaks: the same
-seed and steps, episodes of 40 steps, steps of 3 ms.
+The cost of recycling is the run's time compared with a run without faults: the same seed and steps, episodes
+of 40 steps, steps of 3 ms.
 """
 
 import time
@@ -14,7 +14,7 @@ STEPS_AN_EPISODE = 40
 RESETS = 24
 DIES = f"crash:signal=SIGBUS,reset={RESETS + 1}"
 STEP_MS = 3
-# Turning on the spot never ends an episode early: all have their 40 steps.
+# A robot that turns on the spot never ends an episode early, so all have their 40 steps.
 TASK = {
     "id": "MoveToTargetEnv-v0",
     "options": {"max_steps": STEPS_AN_EPISODE, "movements": ["STOP", "TURN_LEFT", "TURN_RIGHT"]},
@@ -23,7 +23,7 @@ LONGEST_S = 3600.0
 
 
 def measure(scale):
-    """Return wall clocks, and that of the undisturbed run as a share of the others."""
+    """Return the runs' times, and that of the undisturbed run as a share of the others."""
     episodes = max(round(EPISODES * scale), 3 * RESETS)
     undisturbed = play(episodes, {"recycle": {"afterResets": 0}})
     recycled = play(episodes, {"recycle": {"afterResets": RESETS}}, DIES)
@@ -46,7 +46,7 @@ def measure(scale):
 
 
 def play(episodes, collect, faults=""):
-    """Return how long a whole `palaestra run` took, and what its summary says."""
+    """Return the duration and the summary of a complete `palaestra run`."""
     job = make_job(
         collect={"options": [f"--step-sleep-ms={STEP_MS}"]} | collect,
         faults=faults,

@@ -1,7 +1,7 @@
 """A run that is interrupted anywhere and resumed ends as one that was not, bit for bit.
 
-Compared are the parameters of the last checkpoint's networks and of the best policy, the evaluations,
-and how every counted episode went. All of it needs a simulator that repeats itself, as the stub does.
+It compares the parameters of the last checkpoint's networks and of the best policy, the evaluations, and the
+results of every counted episode. All of this needs a deterministic simulator, such as the stub.
 """
 
 import io
@@ -50,7 +50,7 @@ ASKED, KILLED = WAYS = ("asked to end", "killed")
 
 
 def measure(scale):
-    """Return how many interrupted runs ended as their uninterrupted one, and those that did not."""
+    """Return the number of interrupted runs with the end of the uninterrupted one, and the other runs."""
     points = max(round(POINTS * scale), 1)
     moments = random.Random(SEED)
     compared = [
@@ -69,14 +69,14 @@ def measure(scale):
 
 
 def uninterrupted(name, collectors):
-    """Return the results of a run that nothing interrupts."""
+    """Return the results of a run without an interruption."""
     with running(job(name, collectors)) as run:
         run.end(LONGEST_S)
         return results(run.directory)
 
 
 def difference(name, collectors, wanted, step, way):
-    """Return what differs at the end of a run that was interrupted past a step; nothing if nothing does."""
+    """Return the differences at the end of a run that was interrupted after a step, or ""."""
     with tempfile.TemporaryDirectory() as folder:
         run = LocalRun(Path(folder), job(name, collectors))
         interrupt(run, step, way)
@@ -88,7 +88,7 @@ def difference(name, collectors, wanted, step, way):
 
 
 def interrupt(run, step, way):
-    """Begin a run, and end it once it is past a step: asked, as by Ctrl-C, or killed without a word."""
+    """Begin a run and end it after a step, by an interrupt as of Ctrl-C or by a kill."""
     with run:
         run.wait_for_step(step, LONGEST_S)
         if way == KILLED:
@@ -109,7 +109,7 @@ def job(name, collectors):
 
 
 def results(directory):
-    """Return all of a run's end that must not depend on whether it was interrupted; clocks may differ."""
+    """Return the results of a run that must not depend on an interruption; clocks may differ."""
     last = max((directory / "checkpoints").glob("[0-9]*"), key=lambda path: int(path.name))
     state = json.loads((last / "state.json").read_text())
     return {
@@ -135,7 +135,7 @@ def tensors(path):
 
 
 def flat(value, path=""):
-    """Yield the tensors in nested dictionaries and lists with where they stand."""
+    """Yield the tensors in nested dictionaries and lists with their paths."""
     if isinstance(value, torch.Tensor):
         yield path, value
     elif isinstance(value, dict | list):

@@ -1,4 +1,4 @@
-"""A world and a program as other people bring them: shared by tests of one machine and of a cluster."""
+"""A world and a program from other people, shared by tests of one machine and of a cluster."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ DRIVE = (_FOLDER / "drive.py").read_text()
 
 
 def rover():
-    """Return the group of simulators of a job with that world; devices that the stub lacks are left out."""
+    """Return a job's group of simulators with that world; the stub leaves out the devices that it lacks."""
     return {
         "name": "collect",
         "role": "Collect",

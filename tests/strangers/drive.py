@@ -1,6 +1,6 @@
-"""Drive an E-puck toward a box until its front sensors see it, then turn on the spot; prints where it ends.
+"""Drive an E-puck toward a box until its front sensors detect it, then turn, and print the final pose.
 
-It knows the simulator only by its sidecar, as a program of a TrainingJob does.
+The program knows the simulator only by its sidecar, as a program of a TrainingJob does.
 """
 
 import math
@@ -12,7 +12,7 @@ from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.webots import DistanceSensor, Motor, Stepper, Webots
 
 PERIOD_MS = 64
-NEAR = 100.0  # of the lookup table of ps0 and ps7
+NEAR = 100.0  # a value in the lookup table of ps0 and ps7
 
 (simulator,) = load().simulators
 sidecar = Sidecar(simulator.control, simulator.name)

@@ -67,7 +67,7 @@ class RobotName:
     """The names of a robot in the world.
 
     `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
-    the scene. `definition` is its DEF name; it is absent, not "", in messages of a robot without one.
+    the scene. `definition` is its DEF name; "": it has none.
     """
 
     robot: str
@@ -77,14 +77,12 @@ class RobotName:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        content = {
+        return {
             "robot": clipped(self.robot, MOST_NAME),
             "ros_name": clipped(self.ros_name, MOST_NAME),
             "supervisor": self.supervisor,
+            "definition": clipped(self.definition, MOST_NAME),
         }
-        if self.definition:
-            content["definition"] = clipped(self.definition, MOST_NAME)
-        return content
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -98,7 +96,7 @@ class RobotName:
             robot=fields.text("robot", MOST_NAME),
             ros_name=fields.text("ros_name", MOST_NAME, least=1),
             supervisor=fields.flag("supervisor"),
-            definition=fields.text("definition", MOST_NAME) if fields.has("definition") else "",
+            definition=fields.text("definition", MOST_NAME),
         )
 
 
@@ -149,7 +147,6 @@ class SimulatorState:
         detail: the reason for this state, in a sentence for people; "" if there is nothing to add.
         rss_bytes: the memory of its processes, in responses to GET while it is ready; else None.
         left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
-            Absent, not empty.
     """
 
     state: SidecarState
@@ -166,7 +163,7 @@ class SimulatorState:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
-        content: dict[str, Any] = {
+        return {
             "state": self.state.value,
             "driver": clipped(self.driver, MOST_NAME),
             "world": clipped(self.world, MOST_PATH),
@@ -177,10 +174,8 @@ class SimulatorState:
             "last_exit": None if self.last_exit is None else self.last_exit.to_json(),
             "detail": clipped(self.detail),
             "rss_bytes": self.rss_bytes,
+            "left_out": enumerated(self.left_out, LONGEST_LEFT_OUT, MOST_LEFT_OUT),
         }
-        if self.left_out:
-            content["left_out"] = enumerated(self.left_out, LONGEST_LEFT_OUT, MOST_LEFT_OUT)
-        return content
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:

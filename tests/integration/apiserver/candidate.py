@@ -1,8 +1,8 @@
-"""A candidate for a lease in a process of its own: `candidate.py KUBECONFIG NAMESPACE IDENTITY`.
+"""A candidate for a lease in a separate process: `candidate.py KUBECONFIG NAMESPACE IDENTITY`.
 
-Writes a line for each change: `leads` and `follows`, and with each line whether `leads()` agrees. A line on
-its standard input makes it say what `leads()` is now; the end of its input makes it end and give the lease
-back.
+It writes a line for each change, `leads` or `follows`, and on each line whether `leads()` agrees. After a
+line on its standard input it writes the value of `leads()` now. At the end of its input it ends and releases
+the lease.
 """
 
 import sys
@@ -15,7 +15,7 @@ DURATION_S, RENEW_S = 3, 0.3
 
 
 def main(kubeconfig: str, namespace: str, identity: str) -> None:
-    """Stand for election until the input ends."""
+    """Take part in the election until the input ends."""
 
     def say(word: str) -> None:
         sys.stdout.write(f"{word} {leadership.leads()}\n")

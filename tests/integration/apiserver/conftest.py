@@ -1,4 +1,4 @@
-"""A rude API server, and clients of it and of the real one."""
+"""An API server that misbehaves, and clients of it and of the real one."""
 
 import itertools
 import json
@@ -19,7 +19,7 @@ numbers = itertools.count(1)
 
 
 def write_kubeconfig(path, server, user):
-    """Write a kubeconfig with two contexts, of which `usual` is the current one."""
+    """Write a kubeconfig with two contexts; the current one is `usual`."""
     content = {
         "clusters": [{"name": "here", "cluster": {"server": server}}],
         "users": [{"name": "me", "user": user}, {"name": "other", "user": {"token": "other-token"}}],
@@ -35,7 +35,7 @@ def write_kubeconfig(path, server, user):
 
 @pytest.fixture
 def rude(tmp_path):
-    """A server that answers what a test wrote down, and an impatient client of it."""
+    """Return a server with the responses of a test, and a client of it with short timeouts."""
     with serving() as (address, script):
         kubeconfig = write_kubeconfig(tmp_path / "kubeconfig", address, {"token": "my-token"})
         api = connect(kubeconfig, limits=HASTE)
@@ -45,7 +45,7 @@ def rude(tmp_path):
 
 @pytest.fixture(scope="session")
 def real(control_plane):
-    """A client of a real API server, as administrator."""
+    """Return a client of a real API server, as administrator."""
     api = connect(str(control_plane.kubeconfig))
     yield api
     api.close()
@@ -53,7 +53,7 @@ def real(control_plane):
 
 @pytest.fixture
 def namespace(real):
-    """A namespace of the test's own."""
+    """Return the name of a new namespace for the test."""
     name = f"test-{next(numbers)}-{os.getpid()}"
     real.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": name}})
     return name

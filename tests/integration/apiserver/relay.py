@@ -1,4 +1,4 @@
-"""Proxies that speak CONNECT or SOCKS5 and take notes; whatever is asked for, they connect to one server."""
+"""Proxies that speak CONNECT or SOCKS5 and record requests; they connect to one server for every target."""
 
 import selectors
 import socket
@@ -17,12 +17,12 @@ BY_PASSWORD = 2
 
 @dataclass
 class Notes:
-    """What was asked of a proxy.
+    """The requests that a proxy received.
 
     Attributes:
         targets: host and port of each connection.
         users: the user and password of each, or "".
-        refuses: whether it lets nobody through.
+        refuses: whether it refuses all connections.
     """
 
     targets: list[str] = field(default_factory=list)
@@ -38,14 +38,14 @@ class _Relay(StreamRequestHandler):
     tls: ssl.SSLContext | None
 
     def setup(self):
-        """Let clients that connect by TLS do so."""
+        """Let clients connect by TLS."""
         if self.tls is not None:
             self.request = self.tls.wrap_socket(self.request, server_side=True)
-        self.rbufsize = 0  # what follows the request is the server's
+        self.rbufsize = 0  # what follows the request is for the server
         super().setup()
 
     def handle(self):
-        """Find out what is asked for, by the first byte, and relay."""
+        """Find the target by the protocol of the first byte, and relay the connection."""
         first = self.rfile.read(1)
         granted = self._socks() if first == b"\x05" else self._connect(first)
         if not granted:
@@ -54,7 +54,7 @@ class _Relay(StreamRequestHandler):
             _relay(self.request, server)
 
     def finish(self):
-        """Close the connection: the server knows only what is below TLS."""
+        """Close the connection, because the server knows only what is below TLS."""
         super().finish()
         self.request.close()
 
@@ -114,7 +114,11 @@ def _relay(client: socket.socket, server: socket.socket) -> None:
 
 @contextmanager
 def relaying(port: int, tls: ssl.SSLContext | None = None) -> Iterator[tuple[str, Notes]]:
-    """Run a proxy before a server's port of this machine; yields its host and port, and its notes."""
+    """Run a proxy for one port of this machine.
+
+    Yields:
+        Its host and port, and its record of requests.
+    """
     notes = Notes()
     handler = type("Noted", (_Relay,), {"notes": notes, "to": ("127.0.0.1", port), "tls": tls})
 
@@ -122,7 +126,7 @@ def relaying(port: int, tls: ssl.SSLContext | None = None) -> Iterator[tuple[str
         daemon_threads = True
 
         def handle_error(self, *arguments):
-            """A client that left is no fault of the proxy."""
+            """Ignore the error: a client that disconnected is not a fault of the proxy."""
 
     server = Server(("127.0.0.1", 0), handler)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})

@@ -1,4 +1,4 @@
-"""An API server that misbehaves: real sockets, and answers that a test writes down beforehand."""
+"""An API server that misbehaves: it has real sockets, and a test prepares its responses."""
 
 import json
 import socket
@@ -20,24 +20,24 @@ Answer = Callable[["Exchange"], None]
 
 @dataclass(frozen=True)
 class Asked:
-    """One request as it came."""
+    """One request as it was received."""
 
     method: str
     path: str
     query: dict[str, str]
     headers: dict[str, str]
     body: Any
-    lines: tuple[tuple[str, str], ...] = ()  # all headers: a name may come several times
+    lines: tuple[tuple[str, str], ...] = ()  # all headers, because a name may occur several times
 
     @property
     def watches(self):
-        """Whether it is a watch."""
+        """Return whether it is a watch."""
         return self.query.get("watch") == "true"
 
 
 @dataclass
 class Script:
-    """Recorded requests and prepared answers; the last answer of each kind repeats."""
+    """Recorded requests and prepared responses; the last response of each kind repeats."""
 
     asked: list[Asked] = field(default_factory=list)
     calls: list[Answer] = field(default_factory=list)
@@ -46,26 +46,26 @@ class Script:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def next(self, asked: Asked) -> Answer:
-        """Take notice of a request and return its answer."""
+        """Record a request and return its response."""
         with self.lock:
             self.asked.append(asked)
             answers = self.watches if asked.watches else self.calls
             return answers.pop(0) if len(answers) > 1 else answers[0]
 
     def of(self, *, watches: bool) -> list[Asked]:
-        """Return the watches that were asked for, or all other requests."""
+        """Return the watches that were received, or all other requests."""
         with self.lock:
             return [asked for asked in self.asked if asked.watches == watches]
 
 
 class Exchange(BaseHTTPRequestHandler):
-    """One connection; answers come from the script of its server."""
+    """One connection; the script of its server has the responses."""
 
     protocol_version = "HTTP/1.1"
     script: Script
 
     def answer(self):
-        """Answer as the script says."""
+        """Respond as the script says."""
         address = urlsplit(self.path)
         length = int(self.headers.get("Content-Length") or 0)
         body = json.loads(self.rfile.read(length)) if length else None
@@ -76,7 +76,7 @@ class Exchange(BaseHTTPRequestHandler):
     do_GET = do_POST = do_PATCH = do_DELETE = answer  # noqa: N815 - the names are http.server's
 
     def send(self, code: int, body: bytes, **headers: str) -> None:
-        """Send a whole answer."""
+        """Send a complete response."""
         self.send_response(code)
         for name, value in {"Content-Length": str(len(body)), **headers}.items():
             self.send_header(name.replace("_", "-"), value)
@@ -84,42 +84,42 @@ class Exchange(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def chunk(self, data: bytes) -> None:
-        """Send a part of a chunked answer."""
+        """Send a part of a chunked response."""
         self.wfile.write(b"%x\r\n%s\r\n" % (len(data), data))
         self.wfile.flush()
 
     def log_message(self, *arguments):
-        """Say nothing."""
+        """Write no log."""
 
 
 def reply(code: int = 200, obj: Any = None, **headers: str) -> Answer:
-    """Answer with JSON."""
+    """Respond with JSON."""
     return lambda exchange: exchange.send(code, json.dumps(obj or {}).encode(), **headers)
 
 
 def raw(body: bytes, code: int = 200) -> Answer:
-    """Answer with something else."""
+    """Respond with the bytes of a body as they are."""
     return lambda exchange: exchange.send(code, body)
 
 
 def refusal(code: int, reason: str, **headers: str) -> Answer:
-    """Answer with a Status."""
+    """Respond with a Status."""
     return reply(code, {"kind": "Status", "code": code, "reason": reason, "message": "no"}, **headers)
 
 
 def hang(exchange: Exchange) -> None:
-    """Say nothing, as a server behind a half-open connection."""
+    """Send nothing, as a server behind a half-open connection."""
     exchange.script.over.wait(30)
     exchange.close_connection = True
 
 
 def hang_up(exchange: Exchange) -> None:
-    """Close the connection without an answer."""
+    """Close the connection without a response."""
     exchange.close_connection = True
 
 
 def trickle(exchange: Exchange) -> None:
-    """Send a byte now and then, for ever."""
+    """Send a byte from time to time, without end."""
     exchange.send_response(200)
     exchange.send_header("Content-Length", "100000")
     exchange.end_headers()
@@ -128,7 +128,10 @@ def trickle(exchange: Exchange) -> None:
 
 
 def stream(*events: Any, ends: str = "properly") -> Answer:
-    """Send events of a watch; it `ends` properly, is silent for ever, or is broken in mid-line."""
+    """Send events of a watch.
+
+    The watch `ends` properly, is silent for ever, or is cut in the middle of a line.
+    """
 
     def answer(exchange: Exchange) -> None:
         exchange.send_response(200)
@@ -148,9 +151,9 @@ def stream(*events: Any, ends: str = "properly") -> Answer:
 
 
 def command(*messages: bytes, ends: str = "properly") -> Answer:
-    """Run a command: send messages, each with the number of its stream first.
+    """Run a command: send messages, each of which begins with the number of its stream.
 
-    It `ends` properly, by closing the websocket; is silent for ever; or is broken off.
+    The command `ends` properly by closing the websocket, is silent for ever, or is cut.
     """
 
     def answer(exchange: Exchange) -> None:
@@ -174,7 +177,7 @@ def command(*messages: bytes, ends: str = "properly") -> Answer:
 
 @contextmanager
 def serving(tls: ssl.SSLContext | None = None, address: str = "127.0.0.1") -> Iterator[tuple[str, Script]]:
-    """Serve on a free port; yields the URL and the script."""
+    """Serve on a free port, and yield the URL and the script."""
     script = Script()
     handler = type("Scripted", (Exchange,), {"script": script})
 
@@ -183,10 +186,10 @@ def serving(tls: ssl.SSLContext | None = None, address: str = "127.0.0.1") -> It
         address_family = socket.AF_INET6 if ":" in address else socket.AF_INET
 
         def handle_error(self, *arguments):
-            """The client left first: that is what the tests are about."""
+            """Ignore the error: the tests make clients disconnect first."""
 
     server = Server((address, 0), handler)
-    if tls is not None:  # the handshake is the exchange's, so that a client that refuses stops nobody else
+    if tls is not None:  # the connection's thread does the handshake, so a client that refuses blocks nobody
         server.socket = tls.wrap_socket(server.socket, server_side=True, do_handshake_on_connect=False)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()

@@ -1,4 +1,4 @@
-"""What Helm refuses in a cluster that lacks something; no kinds of others are known here."""
+"""The errors of Helm in a cluster that lacks a kind; this cluster knows only Kubernetes' own kinds."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every kind of request against a real API server: what it answers is what we say it answers."""
+"""Every kind of request against a real API server, which must respond as our code expects."""
 
 import threading
 import time
@@ -21,13 +21,13 @@ from palaestra.cluster.store import JOB_LABEL
 
 
 def config_map(namespace, name="c", data=None, **labels):
-    """A small object."""
+    """Return a small object."""
     metadata = {"name": name, "namespace": namespace, "labels": labels}
     return {"apiVersion": "v1", "kind": "ConfigMap", "metadata": metadata, "data": data or {}}
 
 
 def child(namespace, name):
-    """A Job that nobody will ever run."""
+    """Return a Job that never runs."""
     container = {"name": "c", "image": "none"}
     template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
     metadata = {"name": name, "namespace": namespace}
@@ -35,12 +35,12 @@ def child(namespace, name):
 
 
 def test_the_version_of_the_api_server_is_returned(real):
-    """Proof that credentials and certificates work."""
+    """This shows that credentials and certificates work."""
     assert real.version().startswith("v1.")
 
 
 def test_a_group_that_is_not_served_is_no_error(real):
-    """Whether Kueue is there is a question."""
+    """A cluster without Kueue is normal."""
     assert real.serves("batch/v1")
     assert not real.serves("kueue.x-k8s.io/v1beta1")
 
@@ -54,7 +54,7 @@ def test_what_was_created_is_read_back(real, namespace):
 
 
 def test_a_name_is_given_once(real, namespace):
-    """Safety from names: of two operators one is refused."""
+    """The names protect: of two operators that create the same object, one is refused."""
     with ThreadPoolExecutor(8) as pool:
         attempts = [pool.submit(real.create, CONFIG_MAPS, config_map(namespace)) for _ in range(8)]
     errors = [attempt.exception() for attempt in attempts]
@@ -64,7 +64,7 @@ def test_a_name_is_given_once(real, namespace):
 
 
 def test_what_is_not_there_is_not_found(real, namespace):
-    """Neither an object nor a kind."""
+    """This holds for a missing object and for a missing kind."""
     with pytest.raises(NotFound):
         real.get(PODS, namespace, "none")
     with pytest.raises(NotFound):
@@ -72,7 +72,7 @@ def test_what_is_not_there_is_not_found(real, namespace):
 
 
 def test_a_wrong_object_is_refused_with_the_name_of_the_field(real, namespace):
-    """What becomes the reason of a condition."""
+    """The message becomes the reason of a condition."""
     wrong = child(namespace, "j")
     wrong["spec"]["template"]["spec"]["restartPolicy"] = "Always"
 
@@ -90,7 +90,7 @@ def test_what_rbac_does_not_allow_is_forbidden(control_plane, namespace):
 
 
 def test_a_merge_changes_what_it_names_and_removes_what_is_null(real, namespace):
-    """RFC 7386."""
+    """This is a merge patch (RFC 7386)."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"a": "1", "b": "2"}))
 
     merged = real.merge(CONFIG_MAPS, namespace, "c", {"data": {"a": None, "c": "3"}})
@@ -99,7 +99,7 @@ def test_a_merge_changes_what_it_names_and_removes_what_is_null(real, namespace)
 
 
 def test_a_merge_into_another_version_is_a_conflict(real, namespace):
-    """Somebody else wrote first."""
+    """Another client has written first."""
     made = real.create(CONFIG_MAPS, config_map(namespace))
     version = made["metadata"]["resourceVersion"]
     real.merge(CONFIG_MAPS, namespace, "c", {"data": {"a": "1"}}, resource_version=version)
@@ -109,7 +109,7 @@ def test_a_merge_into_another_version_is_a_conflict(real, namespace):
 
 
 def test_a_status_is_merged_through_its_subresource(real, namespace):
-    """The rest of the patch is not looked at there."""
+    """The subresource ignores the rest of the patch."""
     real.create(NODES, {"apiVersion": "v1", "kind": "Node", "metadata": {"name": namespace}})
     patch = {"spec": {"unschedulable": True}, "status": {"phase": "Running"}}
 
@@ -121,7 +121,7 @@ def test_a_status_is_merged_through_its_subresource(real, namespace):
 
 
 def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
-    """Server-side apply owns fields; that is why Jobs are never applied."""
+    """Server-side apply owns fields. For this reason the operator never applies Jobs."""
     real.apply(config_map(namespace, data={"a": "1", "b": "2"}))
     applied = real.apply(config_map(namespace, data={"a": "1"}))
 
@@ -129,7 +129,7 @@ def test_applying_makes_it_so_and_applying_less_takes_it_back(real, namespace):
 
 
 def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
-    """Both ways are the API server's."""
+    """The API server supports both ways: with a conflict, and with force."""
     real.apply(config_map(namespace, data={"a": "1"}), manager="another")
 
     with pytest.raises(Conflict, match="another"):
@@ -139,7 +139,7 @@ def test_a_field_of_another_manager_is_taken_by_force_only(real, namespace):
 
 
 def test_a_deletion_that_names_a_uid_spares_a_later_object_of_the_same_name(real, namespace):
-    """A cache that is a minute old deletes nothing that is new."""
+    """Otherwise a cache that is a minute old would delete a new object."""
     first = real.create(CONFIG_MAPS, config_map(namespace))
     real.delete(CONFIG_MAPS, namespace, "c", uid=first["metadata"]["uid"])
     real.create(CONFIG_MAPS, config_map(namespace))
@@ -151,7 +151,7 @@ def test_a_deletion_that_names_a_uid_spares_a_later_object_of_the_same_name(real
 
 
 def test_six_hundred_objects_are_listed_in_pages_and_all_of_one_moment(real, namespace):
-    """Six requests; no name is missing and none comes twice."""
+    """Six requests list them; no name is missing or occurs twice."""
     with ThreadPoolExecutor(8) as pool:
         made = pool.map(
             lambda number: real.create(CONFIG_MAPS, config_map(namespace, f"c{number}", kind="many")),
@@ -169,7 +169,7 @@ def test_six_hundred_objects_are_listed_in_pages_and_all_of_one_moment(real, nam
 
 
 def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace):
-    """Created before, created, changed and deleted while it watches."""
+    """Objects are created before it starts, and created, changed and deleted while it watches."""
     reports, more = [], threading.Condition()
 
     def changed(obj):
@@ -192,7 +192,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
     reported("after", {"a": "2"})
     both = reflector.store.select(namespace, {JOB_LABEL: "x"})
     real.delete(CONFIG_MAPS, namespace, "before")
-    reported("before", None, times=2)  # its creation was reported alike
+    reported("before", None, times=2)  # its creation gave the same report
     started = time.monotonic()
     reflector.stop(5)
 
@@ -205,7 +205,7 @@ def test_a_reflector_follows_what_happens_and_looks_up_by_label(real, namespace)
 
 
 def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
-    """A list of a thousand worlds is a list of a thousand names."""
+    """A list of a thousand worlds then holds only a thousand names."""
     real.create(CONFIG_MAPS, config_map(namespace, data={"world": "x" * 1000}, mine="yes"))
 
     found = real.list(CONFIG_MAPS.only_metadata(), namespace, labels="mine=yes")
@@ -215,7 +215,7 @@ def test_contents_of_objects_can_stay_with_the_api_server(real, namespace):
 
 
 def test_a_happening_that_repeats_is_one_event_with_a_count(real, namespace):
-    """Also when the operator was started anew in between."""
+    """This also holds after a restart of the operator in between."""
     made = real.create(JOBS, child(namespace, "j"))
     recorder = Recorder(real)
     recorder.record(made, "Warning", "Stalled", "no step for 600 s")
@@ -234,7 +234,7 @@ def test_a_happening_that_repeats_is_one_event_with_a_count(real, namespace):
 
 
 def test_an_event_that_the_api_server_forgot_is_written_again(real, namespace):
-    """Events live for an hour."""
+    """The API server keeps events for an hour."""
     made = real.create(JOBS, child(namespace, "j"))
     recorder = Recorder(real)
     recorder.record(made, "Normal", "Planned", "one replica")
@@ -247,7 +247,7 @@ def test_an_event_that_the_api_server_forgot_is_written_again(real, namespace):
 
 
 def test_an_event_that_cannot_be_written_stops_nobody(control_plane, real, namespace):
-    """No right to write events, a message that is too long."""
+    """The permission to write events may be missing, or a message may be too long."""
     made = real.create(JOBS, child(namespace, "j"))
     nobody = connect(str(control_plane.kubeconfig_of("nobody")))
 

@@ -1,4 +1,4 @@
-"""The certificate of an API server: what kubectl takes is taken, and what it refuses is refused."""
+"""The certificate of an API server: the client accepts and refuses the same certificates as kubectl."""
 
 import json
 import socket
@@ -14,15 +14,15 @@ from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
 from tests.integration.apiserver.server import command, reply, serving
 
-# An authority without key identifiers, as EKS made them in 2019, and one with them and without a key usage,
-# as MicroK8s makes them.
+# EKS made authorities without key identifiers in 2019. MicroK8s makes them with key identifiers and without a
+# key usage.
 KINDS = {"EKS": ("subjectKeyIdentifier=none", "authorityKeyIdentifier=none"), "MicroK8s": ()}
 WORKED = b'\x03{"status": "Success"}'
 
 
 @pytest.fixture(autouse=True)
 def strict(monkeypatch):
-    """Let every new context ask for the extensions that Python 3.13 asks for, on each Python."""
+    """Make every new context require the extensions that Python 3.13 requires, on each Python."""
     usual = ssl.create_default_context
 
     def strictly(*arguments, **options):
@@ -35,7 +35,7 @@ def strict(monkeypatch):
 
 
 def shown(pair):
-    """Return what a server shows its certificate with."""
+    """Return the TLS context with which a server presents its certificate."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(pair.certificate, pair.key)
     return context
@@ -52,7 +52,7 @@ def authorities(tmp_path_factory):
 
 @pytest.fixture(scope="module", params=KINDS)
 def lenient(request, authorities):
-    """A server whose authority lacks extensions."""
+    """Yield a server whose authority lacks extensions."""
     authority = authorities[request.param]
     pair = (
         authority.bare_server(["127.0.0.1"], 1) if KINDS[request.param] else authority.server(["127.0.0.1"])
@@ -62,7 +62,7 @@ def lenient(request, authorities):
 
 
 def kubeconfig_of(path, address, **cluster):
-    """Write a kubeconfig for a server with these fields of the cluster."""
+    """Write a kubeconfig for a server with the given fields of the cluster."""
     file = write_kubeconfig(path / "kubeconfig", address, {"token": "my-token"})
     content = json.loads((path / "kubeconfig").read_text())
     content["clusters"][0]["cluster"] |= cluster
@@ -71,7 +71,7 @@ def kubeconfig_of(path, address, **cluster):
 
 
 def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
-    """So that the other tests mean something on every Python."""
+    """Otherwise the other tests would prove nothing on an older Python."""
     context = strict(cafile=lenient.authority)
     assert context.verify_flags & ssl.VERIFY_X509_STRICT
     host, port = lenient.address.removeprefix("https://").split(":")
@@ -84,7 +84,7 @@ def test_python_of_the_images_would_refuse_these_authorities(lenient, strict):
 
 
 def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path):
-    """Requests and commands alike: kubectl asks for no such extensions."""
+    """This holds for requests and for commands, because kubectl does not require these extensions."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"}), command(b"\x01hello", WORKED)]
     file = kubeconfig_of(tmp_path, lenient.address, **{"certificate-authority": str(lenient.authority)})
 
@@ -96,7 +96,7 @@ def test_a_kubeconfig_reaches_a_server_whose_authority_lacks_extensions(lenient,
 
 
 def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_path, monkeypatch):
-    """The operator would never become ready otherwise."""
+    """Otherwise the operator would never become ready."""
     lenient.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
     (tmp_path / "ca.crt").write_bytes(lenient.authority.read_bytes())
     (tmp_path / "token").write_text("of-the-pod")
@@ -112,7 +112,7 @@ def test_a_pod_reaches_a_server_whose_authority_lacks_extensions(lenient, tmp_pa
 
 @pytest.fixture(scope="module")
 def wrong(authorities, tmp_path_factory):
-    """Servers with a certificate that is wrong in one way; the address and authority to ask each with."""
+    """Yield servers whose certificate is wrong in one way, with the address and authority to use."""
     good = authorities["MicroK8s"]
     other = Authority.create(tmp_path_factory.mktemp("other"))
     with (
@@ -135,7 +135,7 @@ def wrong(authorities, tmp_path_factory):
     ],
 )
 def test_what_is_wrong_with_a_certificate_is_named(wrong, tmp_path, way, fact, remedy):
-    """By requests, commands and the doctor; no credentials are sent."""
+    """Requests, commands and the doctor name it, and no credentials are sent."""
     address, authority = wrong[way]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
@@ -147,7 +147,7 @@ def test_what_is_wrong_with_a_certificate_is_named(wrong, tmp_path, way, fact, r
 
 
 def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
-    """`check the connection` would mislead: the connection stands."""
+    """`check the connection` would mislead, because the connection works."""
     address, authority = wrong["name"]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
@@ -159,7 +159,7 @@ def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
 
 
 def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
-    """`tls-server-name`, which the remedy names."""
+    """The remedy names this setting, `tls-server-name`."""
     address, authority = wrong["name"]
     settings = {"certificate-authority": authority, "tls-server-name": "localhost"}
     api = connect(kubeconfig_of(tmp_path, address, **settings))
@@ -169,7 +169,7 @@ def test_a_server_may_have_another_name_in_its_certificate(wrong, tmp_path):
 
 
 def test_an_unverified_server_is_warned_of_once(wrong, tmp_path, caplog):
-    """`insecure-skip-tls-verify`: other warnings would be errors here."""
+    """This is `insecure-skip-tls-verify`. Any other warning would be an error in these tests."""
     address, _ = wrong["dates"]
     file = kubeconfig_of(tmp_path, address, **{"insecure-skip-tls-verify": True})
     api = connect(file)

@@ -1,4 +1,4 @@
-"""A kubeconfig is understood as kubectl does: whom requests act for, and the way that they take."""
+"""The client reads a kubeconfig as kubectl does: the user of its requests, and their way to the server."""
 
 import io
 import json
@@ -26,7 +26,7 @@ PROXIES = ("HTTPS_PROXY", "https_proxy", "HTTP_PROXY", "http_proxy", "NO_PROXY",
 
 @pytest.fixture(autouse=True)
 def _elsewhere(monkeypatch, tmp_path):
-    """No kubeconfig and no proxies of the person who runs the tests."""
+    """Hide the kubeconfig and the proxies of the person who runs the tests."""
     monkeypatch.setenv("HOME", str(tmp_path))
     for name in ("KUBECONFIG", *PROXIES):
         monkeypatch.delenv(name, raising=False)
@@ -34,13 +34,13 @@ def _elsewhere(monkeypatch, tmp_path):
 
 @pytest.fixture(scope="module")
 def authority(tmp_path_factory):
-    """The authority of the servers and proxies."""
+    """Return the authority of the servers and proxies."""
     return Authority.create(tmp_path_factory.mktemp("authority"))
 
 
 @pytest.fixture(scope="module")
 def shown(authority):
-    """What servers and proxies show their certificate with."""
+    """Return the TLS context with which servers and proxies present their certificate."""
     pair = authority.server(["127.0.0.1", "::1", "10.96.0.1"])
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(pair.certificate, pair.key)
@@ -49,7 +49,7 @@ def shown(authority):
 
 @pytest.fixture
 def secure(shown, authority):
-    """A server with TLS that answers one request, one watch and one command."""
+    """Yield a server with TLS that responds to one request, one watch and one command."""
     with serving(shown) as (address, script):
         prepare(script)
         port = int(address.rpartition(":")[2])
@@ -58,13 +58,13 @@ def secure(shown, authority):
 
 
 def prepare(script):
-    """Let a server answer a request and a command, and any watch."""
+    """Prepare the responses to a request, a command and any number of watches."""
     script.calls = [reply(obj={"gitVersion": "v1.36.4"}), command(b"\x01hello", WORKED)]
     script.watches = [stream()]
 
 
 def written(path, address, user, **cluster):
-    """Write a kubeconfig with a user and fields of the cluster."""
+    """Write a kubeconfig with a user and the given fields of the cluster."""
     file = write_kubeconfig(path / "kubeconfig", address, user)
     content = json.loads((path / "kubeconfig").read_text())
     content["clusters"][0]["cluster"] |= cluster
@@ -86,7 +86,7 @@ def authorizations(script):
 
 
 def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
-    """Requests, watches and commands: otherwise a student acts as the administrator."""
+    """This holds for requests, watches and commands. Otherwise a student would act as the administrator."""
     user = {
         "token": "of-the-administrator",
         "as": "Jürgen",
@@ -96,7 +96,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
     }
     ask_all(connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca})))
 
-    # The bytes of UTF-8, which http.server reads as Latin-1.
+    # The header has the bytes of UTF-8, which http.server reads as Latin-1.
     whom = [("Impersonate-User", "Jürgen".encode().decode("latin-1")), ("Impersonate-Uid", "7")]
     whom += [("Impersonate-Group", "students"), ("Impersonate-Group", "system:serviceaccounts")]
     whom += [("Impersonate-Extra-example.org%2Fscope%20%25", value) for value in "ab"]
@@ -134,7 +134,7 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
     ],
 )
 def test_a_wrong_user_is_refused_in_one_sentence(tmp_path, user, fact):
-    """Before anything is sent, with the file and the field."""
+    """The error comes before anything is sent, and names the file and the field."""
     file = written(tmp_path, "https://127.0.0.1:1", user)
 
     with pytest.raises(NotConfigured, match=f"^{file}: .*{fact}") as refused:
@@ -155,7 +155,7 @@ def test_a_wrong_user_is_refused_in_one_sentence(tmp_path, user, fact):
     ],
 )
 def test_a_wrong_cluster_is_refused_in_one_sentence(tmp_path, cluster, fact):
-    """Before anything is sent, with the file and the field, and without a proxy's password."""
+    """The error comes before anything is sent, and names file and field without a password."""
     file = written(tmp_path, "https://127.0.0.1:1", {"token": "x"}, **cluster)
 
     with pytest.raises(NotConfigured, match=f"^{file}: .*{fact}") as refused:
@@ -165,7 +165,7 @@ def test_a_wrong_cluster_is_refused_in_one_sentence(tmp_path, cluster, fact):
 
 
 def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
-    """`echo` writes one; kubectl cuts it off. The path begins at the kubeconfig."""
+    """`echo` writes a newline, and kubectl removes it. The path is relative to the kubeconfig."""
     (tmp_path / "token").write_text("in-a-file\n")
     user = {"tokenFile": "token", "token": "older"}
 
@@ -175,7 +175,7 @@ def test_a_tokens_file_may_end_with_a_newline(secure, tmp_path):
 
 
 def test_a_user_may_have_a_password(secure, tmp_path):
-    """API servers themselves take none any more; proxies before them do."""
+    """API servers no longer accept passwords, but proxies in front of them do."""
     user = {"username": "me", "password": "p:w"}
 
     ask_all(connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca})))
@@ -184,7 +184,7 @@ def test_a_user_may_have_a_password(secure, tmp_path):
 
 
 def plugin_of(path, script, **fields):
-    """Return a user with a plugin, a shell script."""
+    """Return a user with a plugin, which is a shell script."""
     plugin = path / "plugin"
     plugin.write_text(f"#!/bin/sh\n{script}\n")
     plugin.chmod(plugin.stat().st_mode | stat.S_IXUSR)
@@ -193,12 +193,12 @@ def plugin_of(path, script, **fields):
 
 
 def given(**status):
-    """Return what a plugin prints."""
+    """Return the output of a plugin."""
     return json.dumps({"apiVersion": V1, "kind": "ExecCredential", "status": status})
 
 
 def test_a_plugin_is_run_where_the_kubeconfig_lies_and_again_when_its_token_has_expired(secure, tmp_path):
-    """It is told about the cluster if it asks to be."""
+    """The plugin receives the cluster's data if its kubeconfig requests them."""
     count = f'echo "$KUBERNETES_EXEC_INFO $REGION" >> {tmp_path}/runs'
     old = given(token="mine", expirationTimestamp="2020-01-01T00:00:00Z")
     variables = [{"name": "REGION", "value": "eu"}]
@@ -214,7 +214,7 @@ def test_a_plugin_is_run_where_the_kubeconfig_lies_and_again_when_its_token_has_
 
 
 def test_a_plugin_may_give_a_certificate(authority, tmp_path):
-    """As some companies' log-ins do; the server asks for one here."""
+    """The log-ins of some companies do this; the server requires a certificate here."""
     server, client = authority.server(["127.0.0.1"]), authority.client("me", "", tmp_path)
     asking = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     asking.load_cert_chain(server.certificate, server.key)
@@ -255,7 +255,7 @@ def test_a_plugin_may_give_a_certificate(authority, tmp_path):
 def test_a_plugin_that_gives_nothing_is_named_in_one_sentence(
     secure, tmp_path, monkeypatch, script, fields, fact
 ):
-    """Nothing is sent: without credentials the answer would be about rights."""
+    """Nothing is sent, because a response to a request without credentials would be about permissions."""
     monkeypatch.setattr(sys, "stdin", io.StringIO())
     user = plugin_of(tmp_path, script, **fields)
     api = connect(written(tmp_path, secure.address, user, **{"certificate-authority": secure.ca}))
@@ -281,7 +281,10 @@ def test_a_plugin_that_gives_nothing_is_named_in_one_sentence(
     ],
 )
 def test_the_proxy_of_a_cluster_is_used_in_every_form(secure, shown, tmp_path, form, target, user):
-    """By requests, watches and commands; SOCKS proxies resolve names, as kubectl leaves it to them."""
+    """Requests, watches and commands use it.
+
+    SOCKS proxies resolve names, because kubectl leaves that to them.
+    """
     tls = shown if form.startswith("https") else None
     server = f"https://{target}:{secure.port}"
     with relaying(secure.port, tls) as (address, notes):
@@ -297,7 +300,7 @@ def test_the_proxy_of_a_cluster_is_used_in_every_form(secure, shown, tmp_path, f
 
 @pytest.mark.parametrize("scheme", ["http", "https", "socks5"])
 def test_a_proxy_that_is_not_there_is_named(tmp_path, scheme):
-    """With its address, without its password; by requests and commands."""
+    """The errors of requests and commands contain its address without its password."""
     proxy = f"{scheme}://me:secret@127.0.0.1:1"
     file = written(tmp_path, "https://10.99.0.1:6443", {"token": "x"}, **{"proxy-url": proxy})
     api = connect(file, limits=HASTE)
@@ -310,7 +313,7 @@ def test_a_proxy_that_is_not_there_is_named(tmp_path, scheme):
 
 
 def test_a_proxy_that_refuses_is_named(secure, tmp_path):
-    """A company's proxy wants a user."""
+    """The proxy of a company requires a user."""
     with relaying(secure.port) as (address, notes):
         notes.refuses = True
         settings = {"certificate-authority": secure.ca, "proxy-url": f"http://{address}"}
@@ -324,7 +327,7 @@ def test_a_proxy_that_refuses_is_named(secure, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["http", "socks5"])
 def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, scheme):
-    """For a server elsewhere."""
+    """It is used for a server on another machine."""
     with relaying(secure.port) as (address, notes):
         monkeypatch.setenv("HTTPS_PROXY", f"{scheme}://{address}")
         settings = {"certificate-authority": secure.ca, "tls-server-name": "localhost"}
@@ -336,7 +339,7 @@ def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, sch
 
 
 def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
-    """A cluster whose nodes reach the API server through one."""
+    """The nodes of some clusters reach the API server through a proxy."""
     (tmp_path / "ca.crt").write_bytes(Path(secure.ca).read_bytes())
     (tmp_path / "token").write_text("of-the-pod\n")
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "10.96.0.1")
@@ -350,7 +353,7 @@ def test_a_pod_uses_the_proxy_of_the_environment(secure, tmp_path, monkeypatch):
 
 
 def test_a_proxy_of_the_environment_is_not_asked_for_this_machine(secure, tmp_path, monkeypatch):
-    """Whatever the variable says: Go excepts loopback addresses."""
+    """This holds for any value of the variable, because Go excludes loopback addresses."""
     monkeypatch.setenv("HTTPS_PROXY", "http://127.0.0.1:1")
 
     ask_all(
@@ -359,7 +362,7 @@ def test_a_proxy_of_the_environment_is_not_asked_for_this_machine(secure, tmp_pa
 
 
 def test_a_server_may_have_an_address_of_ipv6(shown, authority, tmp_path):
-    """Requests, watches and commands, directly and through a proxy."""
+    """This holds for requests, watches and commands, directly and through a proxy."""
     ca = {"certificate-authority": str(authority.pair.certificate)}
     with serving(shown, "::1") as (address, script):
         prepare(script)
@@ -375,14 +378,14 @@ def test_a_server_may_have_an_address_of_ipv6(shown, authority, tmp_path):
 
 
 def test_a_server_without_a_scheme_is_https_where_there_are_settings_for_it(secure, tmp_path):
-    """As client-go completes it."""
+    """client-go completes the address in the same way."""
     server = secure.address.removeprefix("https://")
 
     ask_all(connect(written(tmp_path, server, {"token": "x"}, **{"certificate-authority": secure.ca})))
 
 
 def test_the_first_file_decides_the_current_context(secure, tmp_path):
-    """KUBECONFIG may name several, and the first that sets a value wins."""
+    """KUBECONFIG may name several files, and the first that sets a value applies."""
     first = tmp_path / "first"
     first.write_text(json.dumps({"current-context": "other"}))
     second = written(tmp_path, secure.address, {"token": "x"}, **{"certificate-authority": secure.ca})

@@ -1,4 +1,4 @@
-"""Two operators, one lease, a real API server: one leads, and another follows however the first one ends."""
+"""Two operators share a lease on a real API server: when the leader ends in any way, the other one leads."""
 
 import os
 import select
@@ -22,13 +22,13 @@ from tests.faults.proxy import Proxy
 
 PROGRAM = Path(__file__).with_name("candidate.py")
 DURATION_S = 3
-ABSENT_S = 6.0  # the duration of the leases of leaders whose API server goes away, for up to 8 s
+ABSENT_S = 6.0  # duration of the leases of leaders that lose their API server, for up to 8 s
 SOON_S = 5.0
 WAIT_S = 20.0
 
 
 class Candidate:
-    """A process that stands for election."""
+    """A process that takes part in the election."""
 
     def __init__(self, control_plane, namespace, identity):
         arguments = [str(control_plane.kubeconfig), namespace, identity]
@@ -42,7 +42,7 @@ class Candidate:
         self.unread = b""
 
     def line(self, deadline_s=15):
-        """Return its next line, or None when there is none in time."""
+        """Return its next line, or None if no line comes in time."""
         ends = time.monotonic() + deadline_s
         while b"\n" not in self.unread:
             ready, _, _ = select.select([self.process.stdout], [], [], max(0, ends - time.monotonic()))
@@ -54,12 +54,12 @@ class Candidate:
         return line.decode()
 
     def ask(self):
-        """Make it say what it thinks now, and return the first line that says so or anything else."""
+        """Make the process write whether it leads now, and return its next line."""
         self.process.stdin.write(b"\n")
         return self.line()
 
     def close(self):
-        """End it, whatever its state."""
+        """End the process in any state."""
         self.process.kill()
         self.process.wait()
         self.process.stdin.close()
@@ -68,7 +68,7 @@ class Candidate:
 
 @pytest.fixture
 def candidate(control_plane, namespace):
-    """Start candidates for one lease; all are ended."""
+    """Yield a function that starts candidates for one lease, and end them all."""
     started = []
 
     def start(identity):
@@ -81,7 +81,7 @@ def candidate(control_plane, namespace):
 
 
 def test_one_of_two_leads(candidate):
-    """The second one waits as long as the first one lives."""
+    """The second one waits while the first one lives."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -93,7 +93,7 @@ def test_one_of_two_leads(candidate):
 
 
 def test_a_leader_that_ends_hands_over_at_once(candidate, real, namespace):
-    """Released, not left to run out."""
+    """The leader releases the lease, so nobody waits for it to expire."""
     first, second = candidate("first"), None
     assert first.line() == "leads True"
     second = candidate("second")
@@ -110,7 +110,7 @@ def test_a_leader_that_ends_hands_over_at_once(candidate, real, namespace):
 
 
 def test_a_leader_that_is_killed_is_followed_after_its_lease(candidate):
-    """Nobody gave the lease back."""
+    """A killed leader does not release the lease."""
     first = candidate("first")
     assert first.line() == "leads True"
     second = candidate("second")
@@ -124,7 +124,7 @@ def test_a_leader_that_is_killed_is_followed_after_its_lease(candidate):
 
 
 def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate):
-    """Before it does anything else: `leads()` asks the clock."""
+    """It knows this before it does anything else, because `leads()` compares the time."""
     first = candidate("first")
     assert first.line() == "leads True"
     second = candidate("second")
@@ -140,7 +140,7 @@ def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate)
 
 
 def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namespace):
-    """A person may delete anything."""
+    """A user may delete any object."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -155,7 +155,7 @@ def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namesp
 
 
 def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace):
-    """A person may write anything too."""
+    """A user may also write any object."""
     first = candidate("first")
     assert first.line() == "leads True"
 
@@ -179,7 +179,7 @@ def test_a_leader_that_ends_leaves_the_lease_to_nobody(real, namespace):
 
 
 def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
-    """Whatever went wrong before."""
+    """An operator may fail before it starts its candidate."""
     leadership = Leadership(real, namespace, "operator", "me")
     leadership.stop()
 
@@ -205,10 +205,10 @@ def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
 
 
 class Absent:
-    """A leader with one worker, and an API server that is away for some time.
+    """A leader with one worker, and an API server that is unreachable for some time.
 
     Attributes:
-        absence_s: for how long it is away.
+        absence_s: the time for which it is unreachable.
         renewed: set once the lease was renewed after a renewal had failed.
     """
 
@@ -234,7 +234,7 @@ class Absent:
         )
 
     def play(self):
-        """Lead, meet the absence amid changes, and return the keys that are not written soon after it."""
+        """Lead during changes and the absence, and return the keys that are not written."""
         keys = {f"{self._name}-{number}" for number in range(5)}
         self._workers.start()
         self._leadership.start(self._gate.set, self._gate.clear, self.renewed.set)
@@ -242,7 +242,7 @@ class Absent:
             assert self._gate.wait(WAIT_S)
             self._course.leave(self.absence_s)
             self._proxy.break_all()
-            for key in sorted(keys):  # some come while it is away, and some when it is back
+            for key in sorted(keys):  # some come during the absence, and some after it
                 self._queue.add((self._namespace, key))
                 time.sleep(self.absence_s / 4)
             ends = time.monotonic() + SOON_S
@@ -264,7 +264,8 @@ class Absent:
 def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, namespace, tmp_path):
     """Between two thirds of a lease's duration and the next renewal, a leader writes nothing and still leads.
 
-    What it gave up then was forgotten: no change followed, and no new tenure began.
+    Once, the changes that it gave up in this time were lost, because no later change and no new tenure
+    brought them back.
     """
     absences = [Absent(control_plane, namespace, tmp_path, step * ABSENT_S / 30) for step in range(1, 41)]
 
@@ -272,5 +273,6 @@ def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, na
         forgotten = list(together.map(Absent.play, absences))
 
     assert {it.absence_s: keys for it, keys in zip(absences, forgotten, strict=True) if keys} == {}
-    # The case was met. On a busy machine some of these lose the lease instead, and lead anew.
+    # This shows that the case occurred. On a busy machine some leaders lose the lease instead, and lead
+    # again.
     assert any(it.renewed.is_set() for it in absences if ABSENT_S / 3 < it.absence_s < ABSENT_S / 2)

@@ -1,4 +1,4 @@
-"""The cache under an API server that misbehaves: it goes on, knows the truth again, and does not hammer."""
+"""The cache with an API server that misbehaves: it continues, finds the true state, and sends no storm."""
 
 import threading
 import time
@@ -11,22 +11,22 @@ from tests.integration.apiserver.server import hang, raw, refusal, reply, stream
 
 
 def pod(name, version="1"):
-    """A pod as the API server sends it; `bad` ones make the cache's user stumble."""
+    """Return a pod as the API server sends it; a pod called `bad` makes the cache's user fail."""
     return {"metadata": {"name": name, "namespace": "n", "resourceVersion": version, "labels": {}}}
 
 
 def listed(*names, version="10"):
-    """A whole list."""
+    """Return a complete list."""
     return reply(obj={"metadata": {"resourceVersion": version}, "items": [pod(name) for name in names]})
 
 
 def added(name, version):
-    """An event."""
+    """Return an event."""
     return {"type": "ADDED", "object": pod(name, version)}
 
 
 def bookmark(version):
-    """An event that says no more than how far things are."""
+    """Return an event that contains only the current version."""
     return {"type": "BOOKMARK", "object": {"metadata": {"resourceVersion": version}}}
 
 
@@ -37,7 +37,7 @@ EXPIRED = {
 
 
 class Followed:
-    """A reflector of pods, and what it reported."""
+    """A reflector of pods, and its reports."""
 
     def __init__(self, rude, resource=PODS):
         self.script, self.names, self.labels = rude.script, [], []
@@ -45,40 +45,40 @@ class Followed:
         self.reflector = Reflector(rude.api, resource, namespace="n", keep=self.keep, changed=self.changed)
 
     def keep(self, obj):
-        """Keep everything, but stumble over a pod called bad."""
+        """Keep everything, but fail for a pod called bad."""
         if obj["metadata"]["name"] == "bad":
             raise ValueError("nobody foresaw this")
         return obj
 
     def changed(self, obj):
-        """Note the name."""
+        """Record the name."""
         with self.more:
             self.names.append(obj["metadata"]["name"])
             self.labels.append(obj["metadata"]["labels"].get("palaestra.dev/job"))
             self.more.notify_all()
 
     def wait_reported(self, *names):
-        """Wait for all of these names."""
+        """Wait until all of these names were reported."""
         with self.more:
             assert self.more.wait_for(lambda: set(names) <= set(self.names), timeout=5), self.names
 
     def wait_asked(self, count, *, watches):
-        """Wait until there were so many watches, or lists, and return them."""
+        """Wait for this many watches, or this many lists, and return them."""
         ends = time.monotonic() + 5
         while len(asked := self.script.of(watches=watches)) < count:
             assert time.monotonic() < ends, f"only {len(asked)} of {count}"
-            threading.Event().wait(0.01)  # the server tells nobody
+            threading.Event().wait(0.01)  # the server sends no notice
         return asked
 
     def known(self):
-        """The names in the cache."""
+        """Return the names in the cache."""
         keys = self.reflector.store.keys()
         return {name for _, name in keys}
 
 
 @pytest.fixture
 def follow(rude):
-    """Start a reflector against a list and some watches; the last watch is silent."""
+    """Start a reflector with a list and some watches; the last watch is silent."""
     started = []
 
     def start(*watches, lists=(), resource=PODS):
@@ -97,7 +97,7 @@ def follow(rude):
 
 
 def test_what_is_listed_and_what_is_added_is_known(follow):
-    """The way without trouble."""
+    """This is the case without failures."""
     followed = follow(stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("a", "b", "c")
@@ -107,9 +107,10 @@ def test_what_is_listed_and_what_is_added_is_known(follow):
 
 
 def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow):
-    """The job that it is taken from has lost it, and would not look until something else wakes it.
+    """The old label's job has lost the object, and would not look until another change wakes it.
 
-    As it is now is reported last: who counts what is reported would keep the old state.
+    The present state is reported last, because a program that counts the reports would otherwise keep the old
+    state.
     """
     first, later = added("c", "11"), {**added("c", "12"), "type": "MODIFIED"}
     first["object"]["metadata"]["labels"] = {"palaestra.dev/job": "one"}
@@ -123,7 +124,7 @@ def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow)
 
 
 def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
-    """A half-open connection looks alive for ever; nothing is listed anew for it."""
+    """A half-open connection looks alive for ever. The next watch continues without a new list."""
     followed = follow(stream(added("c", "11"), ends="silent"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")
@@ -134,7 +135,7 @@ def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
 
 
 def test_a_watch_whose_answer_never_begins_is_given_up(follow):
-    """The server accepted the connection, and no more."""
+    """The server accepted the connection and did nothing more."""
     followed = follow(hang, stream(added("c", "11"), ends="silent"))
 
     followed.wait_reported("c")
@@ -144,7 +145,7 @@ def test_a_watch_whose_answer_never_begins_is_given_up(follow):
     "forgotten", [refusal(410, "Expired"), stream(EXPIRED)], ids=["as a status", "as an event"]
 )
 def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, forgotten):
-    """While nobody watched, b was deleted."""
+    """The pod b was deleted while no watch was open."""
     followed = follow(forgotten, lists=[listed("a", "b"), listed("a", "c", version="90")])
 
     followed.wait_reported("c")
@@ -156,7 +157,7 @@ def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, for
 
 
 def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(follow, rude):
-    """Some clients give up at the second 410, others ask 3,000 times a second."""
+    """Some clients stop at the second 410, others send 3,000 requests a second."""
     followed = follow()
     rude.script.watches = [refusal(410, "Expired")]
     followed.wait_reported("a", "b")
@@ -170,7 +171,7 @@ def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(fol
     ids=["500", "garbage", "ends at once", "garbage lines"],
 )  # fmt: skip
 def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
-    """Waits of 0.05 to 0.2 s here; 0.5 to 30 s in a cluster."""
+    """The waits are 0.05 to 0.2 s here, and 0.5 to 30 s in a cluster."""
     follow()
     rude.script.watches = [trouble]
     rude.script.calls = [listed("a")]
@@ -180,7 +181,7 @@ def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
 
 
 def test_an_event_that_was_cut_is_never_seen(follow):
-    """The next watch brings it whole."""
+    """The next watch brings the complete event."""
     followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
 
     followed.wait_reported("d")
@@ -190,7 +191,7 @@ def test_an_event_that_was_cut_is_never_seen(follow):
 
 
 def test_bookmarks_alone_move_the_version_on(follow):
-    """Where nothing changes for an hour, the version is not forgotten all the same."""
+    """The version does not expire, even where nothing changes for an hour."""
     followed = follow(stream(bookmark("50")), stream(bookmark("60"), ends="silent"))
 
     asked = followed.wait_asked(3, watches=True)
@@ -202,7 +203,7 @@ def test_bookmarks_alone_move_the_version_on(follow):
 
 
 def test_lists_that_fail_are_tried_until_one_succeeds(follow):
-    """The API server starts after the operator."""
+    """The API server may start after the operator."""
     followed = follow(lists=[refusal(503, "ServiceUnavailable"), raw(b"garbage"), listed("a")])
 
     assert followed.reflector.wait_synced(5)
@@ -217,7 +218,7 @@ def test_before_the_first_whole_list_nothing_is_in_step(follow):
 
 
 def test_one_object_that_nobody_foresaw_hides_no_other(follow):
-    """One bad object never delays another."""
+    """One wrong object never delays another."""
     followed = follow(stream(added("bad", "11"), added("c", "12"), ends="silent"), lists=[listed("bad", "a")])
 
     followed.wait_reported("a", "c")
@@ -226,7 +227,7 @@ def test_one_object_that_nobody_foresaw_hides_no_other(follow):
 
 
 def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
-    """Heartbeats wake no worker."""
+    """Heartbeats do not wake a worker."""
     same = {"type": "MODIFIED", "object": pod("a", "1")}
     followed = follow(stream(same, added("c", "12"), ends="silent"))
 
@@ -236,7 +237,7 @@ def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
 
 
 def test_metadata_are_kept_under_the_name_of_their_kind(follow):
-    """The API server sends PartialObjectMetadata; nobody else has to know."""
+    """The API server sends PartialObjectMetadata, and no other code has to know that."""
     followed = follow(stream(added("c", "11"), ends="silent"), resource=CONFIG_MAPS.only_metadata())
 
     followed.wait_reported("a", "c")
@@ -246,7 +247,7 @@ def test_metadata_are_kept_under_the_name_of_their_kind(follow):
 
 @pytest.mark.parametrize("watch", [stream(ends="silent"), hang], ids=["watching", "not answered"])
 def test_stopping_takes_no_longer_than_it_may(follow, rude, watch):
-    """The operator ends in two seconds."""
+    """The operator must end within two seconds."""
     followed = follow(watch)
     followed.wait_asked(1, watches=True)
     started = time.monotonic()

@@ -1,4 +1,4 @@
-"""One request to an API server that misbehaves: a typed error in time, and no write done twice."""
+"""One request to an API server that misbehaves: a typed error comes in time, and no write is repeated."""
 
 import time
 from itertools import pairwise
@@ -15,7 +15,7 @@ POD = {"apiVersion": "v1", "kind": "Pod", "metadata": {"name": "p", "namespace":
 
 @pytest.mark.parametrize("answer", [hang, trickle], ids=["silent", "byte by byte"])
 def test_an_answer_that_does_not_end_is_given_up(rude, answer):
-    """No call takes longer than twice its deadline, here 1 s."""
+    """No call takes longer than twice its deadline, which is 1 s here."""
     rude.script.calls = [answer]
     started = time.monotonic()
 
@@ -27,7 +27,7 @@ def test_an_answer_that_does_not_end_is_given_up(rude, answer):
 
 @pytest.mark.parametrize("body", [b"<html>", b"[]", b"", b'"text"', b"\xff\xfe"])
 def test_an_answer_that_is_no_object_is_no_answer(rude, body):
-    """A proxy in between may say anything."""
+    """A proxy between client and server may send anything."""
     rude.script.calls = [raw(body)]
 
     with pytest.raises(Unreachable, match="JSON"):
@@ -35,7 +35,7 @@ def test_an_answer_that_is_no_object_is_no_answer(rude, body):
 
 
 def test_a_gateway_that_answers_in_html_is_a_server_error(rude):
-    """There is no Status object to read."""
+    """Such a response has no Status object."""
     rude.script.calls = [raw(b"<html>", 502)]
 
     with pytest.raises(ServerError, match="502"):
@@ -43,14 +43,14 @@ def test_a_gateway_that_answers_in_html_is_a_server_error(rude):
 
 
 def test_a_read_on_a_connection_that_broke_is_repeated_once(rude):
-    """Idle connections are closed by servers at any moment."""
+    """Servers close idle connections at any moment."""
     rude.script.calls = [hang_up, reply(obj=POD)]
 
     assert rude.api.get(PODS, "n", "p") == POD
 
 
 def test_a_write_on_a_connection_that_broke_is_not_repeated(rude):
-    """It may have been done; the caller reads before it writes again."""
+    """The server may have done the write. The caller reads before it writes again."""
     rude.script.calls = [hang_up, reply(obj=POD)]
 
     with pytest.raises(Unreachable):
@@ -60,7 +60,7 @@ def test_a_write_on_a_connection_that_broke_is_not_repeated(rude):
 
 
 def test_a_write_that_a_busy_server_turned_away_is_repeated_when_it_says(rude):
-    """429 says that nothing was done."""
+    """The code 429 means that the server did nothing."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0.3"), reply(obj=POD)]
     started = time.monotonic()
 
@@ -82,7 +82,7 @@ def test_a_busy_server_that_asks_for_more_time_than_there_is_gets_it_from_the_qu
 
 
 def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
-    """`Retry-After: 0` is legal; a client that takes it at its word sends thousands of requests a second."""
+    """`Retry-After: 0` is legal, but to obey it would mean thousands of requests a second."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
 
     with pytest.raises(TooManyRequests):
@@ -92,7 +92,7 @@ def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
 
 
 def test_an_eviction_that_a_disruption_budget_refuses_is_not_waited_for(rude):
-    """A budget may refuse for days; thirty such pods would hold a worker for minutes at each look."""
+    """A budget may refuse for days, and thirty such pods would block a worker for minutes at each check."""
     rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
 
     with pytest.raises(TooManyRequests):
@@ -110,7 +110,7 @@ def test_nobody_who_listens_is_unreachable(tmp_path):
 
 
 def test_a_list_is_read_page_by_page(rude):
-    """Each page says how to go on."""
+    """Each page contains where the next one begins."""
     names = ["a", "b", "c"]
     rude.script.calls = [
         reply(
@@ -131,7 +131,7 @@ def test_a_list_is_read_page_by_page(rude):
 
 
 def test_a_list_whose_next_page_is_forgotten_starts_again(rude):
-    """Half of an old list and half of a new one would be a lie."""
+    """Half of an old list with half of a new one would be wrong."""
     first = reply(obj={"metadata": {"continue": "b"}, "items": [{"metadata": {"name": "old"}}]})
     whole = reply(obj={"metadata": {}, "items": [{"metadata": {"name": "new"}}]})
     rude.script.calls = [first, refusal(410, "Expired"), whole]
@@ -140,7 +140,7 @@ def test_a_list_whose_next_page_is_forgotten_starts_again(rude):
 
 
 def test_a_list_that_is_forgotten_again_and_again_is_an_error(rude):
-    """Three times; then the caller waits."""
+    """After three attempts the caller waits."""
     rude.script.calls = [refusal(410, "Expired")]
 
     with pytest.raises(Gone):
@@ -150,7 +150,7 @@ def test_a_list_that_is_forgotten_again_and_again_is_an_error(rude):
 
 
 def test_every_request_is_counted_with_its_verb_and_its_end(rude):
-    """The metrics see what failed too."""
+    """The metrics include the requests that failed."""
     seen = []
     rude.api.on_request = lambda verb, plural, code, seconds: seen.append((verb, plural, code, seconds >= 0))
     rude.script.calls = [reply(obj=POD), refusal(409, "Conflict"), hang_up]
@@ -164,7 +164,7 @@ def test_every_request_is_counted_with_its_verb_and_its_end(rude):
 
 
 def test_a_watch_is_counted_when_it_ends_and_when_it_is_refused(rude):
-    """Once each."""
+    """It is counted once in each case."""
     seen = []
     rude.api.on_request = lambda *request: seen.append(request[:3])
     rude.script.watches = [stream(), refusal(410, "Expired")]
@@ -177,7 +177,7 @@ def test_a_watch_is_counted_when_it_ends_and_when_it_is_refused(rude):
 
 @pytest.mark.parametrize("ends", ["properly", "broken"])
 def test_a_watch_that_ends_in_the_middle_of_an_event_did_not_end(rude, ends):
-    """A proxy may close an answer as if it were whole."""
+    """A proxy may close a response as if it were complete."""
     rude.script.watches = [stream(b'{"type": "ADDED", "obj', ends=ends)]
 
     with pytest.raises(Unreachable):
@@ -185,7 +185,7 @@ def test_a_watch_that_ends_in_the_middle_of_an_event_did_not_end(rude, ends):
 
 
 def test_an_error_event_is_raised_as_what_it_is(rude):
-    """Nobody takes a Status for an object."""
+    """Otherwise a Status would be taken for an object."""
     status = {"kind": "Status", "code": 500, "reason": "InternalError", "message": "etcd is gone"}
     rude.script.watches = [stream({"type": "ERROR", "object": status})]
 
@@ -194,7 +194,7 @@ def test_an_error_event_is_raised_as_what_it_is(rude):
 
 
 def test_contents_stay_with_the_server_where_only_metadata_are_asked_for(rude):
-    """Nobody caches Secrets by accident."""
+    """The contents of Secrets never get into a cache by accident."""
     rude.script.calls = [reply(obj={"metadata": {"name": "c"}})]
 
     rude.api.get(CONFIG_MAPS.only_metadata(), "n", "c")

@@ -1,4 +1,7 @@
-"""Logs and commands in containers: whole, or an error; a kubelet is played by a server that we script."""
+"""Logs and commands in containers are complete, or an error is raised.
+
+A scripted server plays the kubelet.
+"""
 
 import json
 import time
@@ -26,19 +29,19 @@ NOT_STARTED = (
 
 
 def run(api, within_s=5.0):
-    """Return all that a command writes to standard output."""
+    """Return the complete standard output of a command."""
     return b"".join(api.execute("lab", "pod", "trainer", ["cat", "a b"], within_s=within_s))
 
 
 def test_output_arrives_byte_for_byte_without_what_was_said(rude):
-    """A tar is no text, and warnings are no part of it."""
+    """A tar file is not text, and warnings do not belong to it."""
     rude.script.calls = [command(b"\x01\x00\xff\r\n", b"\x02warning", b"\x01\x01", SUCCESS)]
 
     assert run(rude.api) == b"\x00\xff\r\n\x01"
 
 
 def test_a_command_is_asked_for_as_this_identity(rude):
-    """The right is `create pods/exec`."""
+    """The permission is `create pods/exec`."""
     rude.script.calls = [command(SUCCESS)]
 
     run(rude.api)
@@ -51,7 +54,7 @@ def test_a_command_is_asked_for_as_this_identity(rude):
 
 
 def test_an_exit_code_comes_with_what_the_command_said(rude):
-    """What it wrote to standard error names the cause."""
+    """The standard error of the command names the cause."""
     rude.script.calls = [command(b"\x01half", b"\x02No such file", FAILURE)]
 
     with pytest.raises(CommandFailed, match="exit code 7: No such file") as failed:
@@ -60,7 +63,7 @@ def test_an_exit_code_comes_with_what_the_command_said(rude):
 
 
 def test_a_missing_program_raises_an_error_with_the_runtimes_words(rude):
-    """It has no exit code."""
+    """A missing program has no exit code."""
     rude.script.calls = [command(NOT_STARTED)]
 
     with pytest.raises(OSError, match="no such program"):
@@ -69,7 +72,7 @@ def test_a_missing_program_raises_an_error_with_the_runtimes_words(rude):
 
 @pytest.mark.parametrize("ends", ["properly", "broken"])
 def test_output_without_the_word_about_success_is_not_whole(rude, ends):
-    """A node that dies closes connections properly, too."""
+    """A node that fails also closes its connections properly."""
     rude.script.calls = [command(b"\x01half", ends=ends)]
 
     with pytest.raises(Unreachable, match="broke off"):
@@ -77,7 +80,7 @@ def test_output_without_the_word_about_success_is_not_whole(rude, ends):
 
 
 def test_a_command_that_says_nothing_ends_at_its_deadline(rude):
-    """No connection is waited on for ever."""
+    """No connection is waited for without end."""
     rude.script.calls = [command(b"\x01half", ends="silent")]
     began = time.monotonic()
 
@@ -87,7 +90,7 @@ def test_a_command_that_says_nothing_ends_at_its_deadline(rude):
 
 
 def test_a_command_that_is_not_allowed_is_forbidden(rude):
-    """In the API server's words, though a websocket was asked for."""
+    """The error has the API server's words, although the request was for a websocket."""
     rude.script.calls = [refusal(403, "Forbidden")]
 
     with pytest.raises(Forbidden):
@@ -95,7 +98,7 @@ def test_a_command_that_is_not_allowed_is_forbidden(rude):
 
 
 def test_a_server_that_is_not_there_is_unreachable(rude):
-    """The command's text, which may be long, is left out of the line."""
+    """The error leaves out the text of the command, which may be long."""
     rude.script.calls = [raw(b"", code=502)]
 
     with pytest.raises(OSError, match="502"):
@@ -103,7 +106,7 @@ def test_a_server_that_is_not_there_is_unreachable(rude):
 
 
 def test_lines_of_a_log_come_one_by_one(rude):
-    """Also where a line comes in two pieces, and the last one has no end."""
+    """This also holds for a line in two pieces, and for a last line without a newline."""
     rude.script.calls = [stream(b"one\ntw", b"o\nthr\xffee")]
 
     lines = list(rude.api.logs("lab", "pod", "trainer", tail=3, within_s=5))
@@ -115,7 +118,7 @@ def test_lines_of_a_log_come_one_by_one(rude):
 
 
 def test_a_log_that_is_followed_ends_at_its_deadline(rude):
-    """What came before is not lost."""
+    """The lines before the deadline are not lost."""
     rude.script.calls = [stream(b"one\n", ends="silent")]
     lines = rude.api.logs("lab", "pod", "trainer", follow=True, within_s=0.5)
 

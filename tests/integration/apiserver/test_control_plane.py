@@ -1,4 +1,4 @@
-"""The control plane of the tests itself: it comes in seconds, and nothing of it is left behind."""
+"""The control plane of the tests: it starts in seconds and leaves nothing behind."""
 
 import re
 import shutil
@@ -27,7 +27,7 @@ def children(pid):
         try:
             lines = dict(line.split(":\t", 1) for line in status.read_text().splitlines())
             program = status.with_name("exe").readlink().name
-        except OSError:  # it has ended meanwhile
+        except OSError:  # it has ended in the meantime
             continue
         if lines["PPid"] == str(pid):
             found[int(status.parent.name)] = program
@@ -35,7 +35,7 @@ def children(pid):
 
 
 def gone(pid):
-    """Whether no process of this id runs any more."""
+    """Return whether no process with this id runs any more."""
     try:
         return "State:\tZ" in Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -43,7 +43,7 @@ def gone(pid):
 
 
 def owner(*arguments):
-    """Start `python -m tests.control_plane`, or another module of it, where the programs are built."""
+    """Start `python -m tests.control_plane` or another module of it, if the programs are built."""
     programs()
     module = ".".join(("tests.control_plane", *arguments[:1]))
     command = [sys.executable, "-m", module, *arguments[1:]]
@@ -51,7 +51,10 @@ def owner(*arguments):
 
 
 def all_gone(pids):
-    """Whether all of these processes end within ten seconds; nothing tells a foreign process of their end."""
+    """Return whether all of these processes end within ten seconds.
+
+    It polls, because a process gets no notice of the end of processes that it did not start.
+    """
     ends = time.monotonic() + 10
     while not all(map(gone, pids)) and time.monotonic() < ends:
         time.sleep(0.05)
@@ -60,13 +63,13 @@ def all_gone(pids):
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT], ids=lambda end: end.name)
 def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
-    """`python -m tests.control_plane`, which a person ends with Ctrl-C."""
+    """A user ends `python -m tests.control_plane` with Ctrl-C."""
     with owner() as process:
         kubeconfig = process.stdout.readline().strip().partition("=")[2]
         connected = connect(kubeconfig)
         assert connected.version()
         connected.close()
-        # Each begins as another program, which sees to it that it ends with its owner.
+        # Each process starts as another program, which ends it together with its owner.
         started = eventually(lambda: set((found := children(process.pid)).values()) == PROGRAMS and found)
         process.send_signal(end)
         process.wait(30)
@@ -76,7 +79,7 @@ def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
 
 
 def test_no_process_of_it_outlives_a_killed_owner():
-    """At any moment: here the API server is about to start."""
+    """This holds at any moment; here the API server is about to start."""
     with owner() as process:
         started = eventually(lambda: set((found := children(process.pid)).values()) >= FIRST and found)
         etcd = next(pid for pid, program in started.items() if program == "etcd")
@@ -88,7 +91,7 @@ def test_no_process_of_it_outlives_a_killed_owner():
 
 
 def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path):
-    """Pytest's own process may be killed; another process, which no worker waits for, runs the plane."""
+    """Pytest's process may be killed. No worker waits for the process that runs the plane."""
     folder = tmp_path / "plane"
     folder.mkdir()
     with ExitStack() as stack:

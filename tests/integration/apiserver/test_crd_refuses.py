@@ -1,6 +1,6 @@
-"""What the API server itself refuses: no wrong TrainingJob gets as far as the operator.
+"""The refusals by the API server itself: no wrong TrainingJob reaches the operator.
 
-Every message names the field; where a rule of ours refuses, it is our sentence, with the remedy.
+Every message names the field. If one of our rules refuses, the message is our sentence, with the remedy.
 """
 
 import copy
@@ -22,13 +22,13 @@ numbers = itertools.count(1)
 
 @pytest.fixture(scope="session")
 def defined(control_plane, installed):  # noqa: ARG001 - is there by then
-    """The control plane, once it knows TrainingJobs."""
+    """Return the control plane once it knows TrainingJobs."""
     return control_plane
 
 
 @pytest.fixture(scope="session")
 def create(defined):
-    """Send one TrainingJob as it stands, past the checks of kubectl; returns exit code and what was said."""
+    """Send one TrainingJob unchanged, without kubectl's checks, and return exit code and output."""
 
     def created(job):
         done = defined.kubectl("create", "--raw", STRICT, "-f", "-", sent=json.dumps(job))
@@ -39,7 +39,7 @@ def create(defined):
 
 @pytest.fixture(scope="session")
 def apply(defined):
-    """Apply objects as a person does, with kubectl; returns the exit code and what it said."""
+    """Apply objects with kubectl, as a user does, and return exit code and output."""
 
     def applied(*objects):
         sent = json.dumps({"apiVersion": "v1", "kind": "List", "items": list(objects)})
@@ -61,7 +61,7 @@ def changed(obj, path, value):
 
 
 def make_job(**changes):
-    """Return the smallest TrainingJob, with a name of its own and changes by path (`__` for a dot)."""
+    """Return the smallest TrainingJob, with a new name and changes by path (`__` for a dot)."""
     job = changed(MINIMAL, "metadata.name", f"job-{next(numbers)}")
     for path, value in changes.items():
         job = changed(job, path.replace("__", "."), value)
@@ -176,7 +176,7 @@ WRONG = [
     ("path", "value", "message"), WRONG, ids=[f"{path}={value}" for path, value, _ in WRONG]
 )
 def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, value, message):
-    """By the API server alone: no operator runs here."""
+    """The API server refuses it alone, because no operator runs here."""
     code, said = create(changed(make_job(), path, value))
 
     assert code == 1
@@ -184,7 +184,7 @@ def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, va
 
 
 def test_suspending_a_queued_job_by_hand_is_refused(create):
-    """Two fields that exclude each other: Kueue owns suspension."""
+    """The two fields exclude each other, because Kueue decides about suspension."""
     code, said = create(make_job(spec__suspend=True, spec__scheduling__queueName="team"))
 
     assert code == 1
@@ -192,7 +192,7 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
 
 
 def test_a_driver_that_is_a_command_needs_one(create):
-    """Named beside the image, which it needs too."""
+    """The command stands next to the image, which the driver needs too."""
     code, said = create(make_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1"))
 
     assert code == 1
@@ -200,7 +200,7 @@ def test_a_driver_that_is_a_command_needs_one(create):
 
 
 def groups_with_worlds(*lengths):
-    """Return groups of simulators with inline worlds of so many characters."""
+    """Return groups of simulators with inline worlds of this many characters."""
     return [
         {"name": f"g{place}", "role": "Collect", "world": {"inline": "x" * length}}
         for place, length in enumerate(lengths)
@@ -208,7 +208,7 @@ def groups_with_worlds(*lengths):
 
 
 def test_inline_worlds_are_bounded_together(create):
-    """One by one they are within their bounds; a few such jobs would fill a cache."""
+    """Each world is within its bounds, but a few such jobs would fill a cache."""
     fits, too_much = (180_000,) * 5, (180_000,) * 4 + (180_001,)
     evaluation = {"spec__trainer__evaluation": {"everySteps": 0}}
     accepted, _ = create(make_job(spec__simulators=groups_with_worlds(*fits), **evaluation))
@@ -221,14 +221,14 @@ def test_inline_worlds_are_bounded_together(create):
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_accepted(apply, example):
-    """What people copy works."""
+    """Users copy the examples, so they must work."""
     code, said = apply(*yaml.safe_load_all(example.read_text()))
 
     assert code == 0, said
 
 
 def test_an_empty_spec_is_accepted_and_completed(apply, defined):
-    """Defaults are the API server's, so that everybody sees them."""
+    """The API server sets the defaults, so that everybody sees them."""
     job = make_job(spec={})
     code, said = apply(job)
     stored = yaml.safe_load(defined.kubectl("get", "tj", job["metadata"]["name"], "-o", "yaml").stdout)
@@ -272,7 +272,7 @@ MAY_NOT_CHANGE = [
 
 @pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
 def test_what_may_change_changes(apply, path, value):
-    """The whole list of docs/reference/trainingjob.md."""
+    """This is the complete list in docs/reference/trainingjob.md."""
     job = make_job()
     apply(job)
 
@@ -286,7 +286,7 @@ def test_what_may_change_changes(apply, path, value):
     ("path", "value"), MAY_NOT_CHANGE, ids=[f"{path}={value}" for path, value in MAY_NOT_CHANGE]
 )
 def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
-    """A run that changed half-way could not be explained."""
+    """The result of a run that changed in the middle could not be explained."""
     job = make_job()
     apply(job)
 
@@ -309,7 +309,7 @@ def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
     ids=str,
 )
 def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, value):
-    """`spec.trainer: cannot be changed` left a person with a diff of forty fields."""
+    """With `spec.trainer: cannot be changed` a user had to compare forty fields."""
     job = make_job()
     apply(job)
 
@@ -320,7 +320,7 @@ def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, v
 
 
 def assert_says(said, message):
-    """Assert that the parts of a message, divided by `.*`, come in this order."""
+    """Assert that the parts of a message, separated by `.*`, occur in this order."""
     rest = said
     for part in message.split(".*"):
         assert part in rest, f"{part!r} is not in {said!r}"

@@ -1,4 +1,4 @@
-"""The definition of this release over jobs of an earlier one: an API server refuses no change of those."""
+"""The definition of this release with jobs of an earlier one: the API server accepts their changes."""
 
 import json
 
@@ -9,8 +9,8 @@ from palaestra.api.crd import crd
 from palaestra.api.model_walk import walk
 from tests.waiting import eventually
 
-# Of its own, because the other tests on this API server use the definition itself: `kubectl describe` lists a
-# short name in all groups.
+# The group is a separate one, because the other tests on this API server use the definition itself, and
+# `kubectl describe` lists a short name in all groups.
 GROUP = "earlier.example.com"
 NAMES = {
     "plural": "earlierjobs",
@@ -34,7 +34,7 @@ def definition():
 
 
 def without_guards(schema):
-    """Return a schema as a release without today's guards has it."""
+    """Return a schema as in a release without today's guards."""
     if isinstance(schema, list):
         return [without_guards(item) for item in schema]
     if not isinstance(schema, dict):
@@ -57,7 +57,7 @@ def job(name):
 
 @pytest.fixture
 def apply(control_plane):
-    """Apply an object as a person does; return the exit code and what kubectl said."""
+    """Apply an object as a user does, and return the exit code and kubectl's output."""
 
     def applied(obj):
         done = control_plane.kubectl("apply", "--server-side", "-f", "-", sent=json.dumps(obj))
@@ -68,7 +68,7 @@ def apply(control_plane):
 
 
 def test_a_job_with_a_password_can_still_be_changed_and_its_status_written(control_plane, apply):
-    """Validation ratchets: what is unchanged is not judged by a rule that came later."""
+    """Validation ratchets: a later rule does not apply to what is unchanged."""
     apply(without_guards(definition()))
     eventually(lambda: apply(job("earlier"))[0] == 0)
     apply(definition())

@@ -1,4 +1,4 @@
-"""An API server that knows the kinds which the chart and the examples use, and Helm to install with."""
+"""An API server that knows the kinds in the chart and the examples, and Helm to install with."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -11,9 +11,9 @@ from tests.chart.helm import NAMESPACE
 from tests.control_plane.plane import ControlPlane, running
 from tests.control_plane.programs import programs
 
-DEFINITION = "trainingjobs.palaestra.dev"  # left by tests that need no more of Palaestra
+DEFINITION = "trainingjobs.palaestra.dev"  # tests that need nothing more of Palaestra leave it behind
 NAMESPACES = (NAMESPACE, "robots", "drones")
-# Of dozens that these projects have, which are megabytes that an API server takes seconds to read.
+# These projects have dozens of kinds, which are megabytes that an API server takes seconds to read.
 KINDS = (
     (PROMETHEUS, "monitoring.coreos.com", ("podmonitors", "prometheusrules", "servicemonitors")),
     (KUEUE, "kueue.x-k8s.io", ("clusterqueues", "localqueues", "resourceflavors")),
@@ -23,14 +23,20 @@ Kubectl = Callable[..., str]
 
 @pytest.fixture(scope="package")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
-    """One that only this folder uses: definitions are deleted here, and every TrainingJob with them."""
+    """Yield a control plane for this folder only.
+
+    The tests delete definitions, and every TrainingJob with them.
+    """
     with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane
 
 
 @pytest.fixture(scope="package")
 def kubectl(control_plane: ControlPlane) -> Kubectl:
-    """Run kubectl as the administrator, and return all that it says; it must succeed."""
+    """Return a function that runs kubectl as the administrator and returns its output.
+
+    The command must succeed.
+    """
 
     def run(*arguments: str, sent: str = "") -> str:
         done = control_plane.kubectl(*arguments, sent=sent)
@@ -42,7 +48,7 @@ def kubectl(control_plane: ControlPlane) -> Kubectl:
 
 @pytest.fixture(scope="package")
 def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
-    """The control plane with those of Prometheus' and Kueue's kinds that the chart and the examples use."""
+    """Return the control plane with the kinds of Prometheus and Kueue in the chart and the examples."""
     files = [
         f"--filename={definitions(*module)}/{group}_{kind}.yaml"
         for module, group, kinds in KINDS
@@ -56,7 +62,10 @@ def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
 
 @pytest.fixture
 def places(cluster: ControlPlane, kubectl: Kubectl) -> None:  # noqa: ARG001 - is up by then
-    """The namespaces of the modes, which refuse pods that are not restricted and warn of what makes them."""
+    """Make the namespaces of the modes.
+
+    They refuse pods that are not restricted, and warn about the objects that create such pods.
+    """
     labels = {f"pod-security.kubernetes.io/{each}": "restricted" for each in ("enforce", "warn")}
     for name in NAMESPACES:
         place = {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": name, "labels": labels}}
@@ -65,7 +74,7 @@ def places(cluster: ControlPlane, kubectl: Kubectl) -> None:  # noqa: ARG001 - i
 
 @pytest.fixture(scope="package")
 def api(cluster: ControlPlane) -> Iterator[Api]:
-    """An administrator's client."""
+    """Return a client of an administrator."""
     reached = connect(str(cluster.kubeconfig))
     yield reached
     reached.close()

@@ -1,4 +1,4 @@
-"""docs/howto/install.md can be typed as it stands, from top to bottom."""
+"""All commands of docs/howto/install.md work as written, from top to bottom."""
 
 import json
 import re
@@ -16,7 +16,8 @@ from tests.terminal import Terminal
 PAGE = (ROOT / "docs/howto/install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
 REGISTRY = blocks(PAGE, "sh with-a-registry")
-# Without nodes no job ends: `palaestra try` is tested with the operator, and `helm test` by `make e2e`.
+# No job ends without nodes. The tests with the operator cover `palaestra try`, and `make e2e` covers `helm
+# test`.
 NO_NODES = 'helm() { [[ $1 == test ]] || command helm "$@"; }\n'
 AWAY = f"""
 helm uninstall palaestra --namespace {NAMESPACE} --ignore-not-found
@@ -29,7 +30,7 @@ TYPED_S = 120
 
 @pytest.fixture
 def typed(cluster, kubectl, tmp_path):
-    """Type some commands in a checkout, and return what they say."""
+    """Return a function that types commands in a checkout and returns their output."""
     kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
     for name in (NAMESPACE, "lab", "robots", "drones"):
         kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
@@ -46,13 +47,13 @@ def typed(cluster, kubectl, tmp_path):
 
 
 def test_no_command_for_everybody_names_a_registry_that_is_a_placeholder():
-    """The upgrades after it keep its values: no image of somebody who typed them all could be pulled."""
+    """Later upgrades keep the values of these commands, so no image could be pulled after them."""
     assert [block for block in BLOCKS if "registry.example.com" in block] == []
     assert len(REGISTRY) == 1
 
 
 def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, kubectl):
-    """The others are typed without them."""
+    """The other commands are tested without these."""
     for block in (BLOCKS[0], *REGISTRY):
         typed(block)
 
@@ -61,7 +62,10 @@ def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, 
 
 
 def test_tensorboard_has_a_claim_that_jobs_may_name(typed, kubectl):
-    """No page made one: TensorBoard's pod waited for it, and a claim without the label holds each job."""
+    """The page must create the claim.
+
+    Once it did not: TensorBoard's pod waited for it. A claim without the label blocks each job.
+    """
     chapter = PAGE[PAGE.index("## TensorBoard and notebooks") : PAGE.index("## Upgrade")]
     [job] = [yaml.safe_load(block) for block in blocks(chapter, "yaml")]
 
@@ -77,7 +81,7 @@ def test_tensorboard_has_a_claim_that_jobs_may_name(typed, kubectl):
 
 
 def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubectl):
-    """Lease, Secrets, namespace and roles stayed, and the page did not name them."""
+    """Lease, Secrets, namespace and roles stayed, and the page did not mention them."""
     typed(BLOCKS[0])
     kubectl("create", "secret", "generic", "notebooks", f"--namespace={NAMESPACE}")
     kubectl("create", "namespace", "robots")
@@ -93,7 +97,10 @@ def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubec
 
 
 def test_the_roles_can_be_typed_after_the_installation_alone(typed, kubectl):
-    """Their binding is in a namespace that only other chapters made, and those could not be typed twice."""
+    """Their binding is in a namespace that only other chapters created.
+
+    Once, the commands of those chapters failed when they were typed twice.
+    """
     people = PAGE[PAGE.index("## For the people who train") : PAGE.index("## Without Helm")]
     [roles] = blocks(people, "sh")
     [some] = blocks(PAGE[PAGE.index("## In some namespaces only") : PAGE.index("## For the people")], "sh")
@@ -108,7 +115,10 @@ def test_the_roles_can_be_typed_after_the_installation_alone(typed, kubectl):
 
 @pytest.mark.timeout(600)
 def test_the_page_can_be_typed_from_top_to_bottom(typed):
-    """Each command works after those above it, without a warning; the end is an installation without Helm."""
+    """Each command works after those above it, without a warning.
+
+    At the end, Palaestra is installed without Helm.
+    """
     kinds = "Warning:|WARNING"
 
     said = "".join(typed(block) for block in BLOCKS)

@@ -1,4 +1,4 @@
-"""A release from its installation to its end, on a real API server."""
+"""A release on a real API server, from its installation to its end."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -20,7 +20,10 @@ from tests.waiting import eventually
 
 @pytest.fixture
 def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
-    """Run Helm on the cluster, which has no release; everything that it installed is gone at the end."""
+    """Return a function that runs Helm on a cluster without a release.
+
+    Everything is uninstalled at the end.
+    """
     kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
 
     def run(verb, name, *options, chart=CHART, namespace=NAMESPACE, values=None):
@@ -38,7 +41,7 @@ def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
 
 @pytest.fixture
 def older(tmp_path):
-    """The chart as an earlier release had it: another definition, and another image."""
+    """Return the chart of an earlier release, with another definition and another image."""
     chart = tmp_path / "palaestra"
     shutil.copytree(CHART, chart)
     for name, change in {
@@ -57,7 +60,7 @@ def short_names(api):
 
 
 def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older, api):
-    """Helm never upgrades what lies in crds/, so the definition is a template."""
+    """Helm never upgrades the files in crds/, so the definition is a template."""
     release("install", "palaestra", chart=older)
     eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", training_job("runs")))
@@ -78,7 +81,7 @@ def test_the_end_of_a_release_leaves_the_jobs(release, api):
     release("uninstall", "palaestra")
 
     assert api.get(TRAINING_JOBS, "robots", "stays")
-    release("install", "palaestra")  # and it finds its definition again
+    release("install", "palaestra")  # the release adopts its definition again
 
 
 @pytest.mark.parametrize("values", [{}, {"watchNamespaces": ["robots"]}], ids=["cluster", "namespaced"])
@@ -93,7 +96,7 @@ def test_a_second_release_for_the_same_jobs_is_refused(release, values):
 def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
     release, cluster, api, tmp_path
 ):
-    """With the rights of such an installation, which hold for two namespaces."""
+    """It has the permissions of such an installation, which are valid in two namespaces."""
     release("install", "palaestra", values={**MODES["namespaced"], "crds": {"install": True}})
     eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-operator"
@@ -112,13 +115,13 @@ def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
 
         assert api.get(TRAINING_JOBS, "default", "trains")["status"]["observedGeneration"] == 0
         assert operator.said("watch broken") == []
-        eventually(lambda: pending(operator.ask("/metrics")) == 2)  # once it has seen what it wrote
+        eventually(lambda: pending(operator.ask("/metrics")) == 2)  # once it has seen its own writes
     finally:
         operator.kill()
 
 
 def pending(metrics):
-    """Return how many TrainingJobs an operator counts that have no pod yet."""
+    """Return the number of TrainingJobs without a pod that an operator counts."""
     lines = [line for line in metrics.splitlines() if line.startswith("palaestra_jobs{")]
     return sum(float(line.split()[-1]) for line in lines if 'phase="Pending"' in line)
 
@@ -128,7 +131,7 @@ def _in(namespace, job):
 
 
 def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(release, cluster, api):
-    """`helm test` where no operator runs: it ends in time, tells what to look at, and leaves nothing."""
+    """`helm test` without an operator ends in time, names what to check, and leaves nothing."""
     release("install", "palaestra")
     eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-trial"
@@ -143,8 +146,7 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
 
 
 def test_a_test_of_a_release_is_reported_once(release, kubectl, api):
-    """Without nodes the pod ends by hand; a failed test of an earlier release left its account."""
-    kubectl("create", "serviceaccount", "palaestra-test", f"--namespace={NAMESPACE}")
+    """Without nodes the pod ends by hand."""
     release("install", "palaestra")
 
     with ThreadPoolExecutor() as threads:
@@ -163,7 +165,7 @@ def named(obj):
 
 
 def test_helm_takes_over_what_kubectl_has_installed(release, kubectl, api):
-    """Objects that kubectl made are kept, down to the definition and its jobs."""
+    """Helm keeps the objects that kubectl created, even the definition and its jobs."""
     kubectl("apply", "-f", str(installation.PATH))
     eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", training_job("before")))

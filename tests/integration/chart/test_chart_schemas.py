@@ -1,4 +1,4 @@
-"""A real API server takes every object of the chart and of the platform's examples, as it is."""
+"""A real API server accepts every object of the chart and of the platform's examples unchanged."""
 
 import json
 
@@ -15,7 +15,10 @@ DRY = ("apply", "--server-side", "--force-conflicts", "--dry-run=server", "--val
 
 @pytest.fixture
 def accounts(places, kubectl):  # noqa: ARG001 - are there
-    """The account of `helm test` in each namespace: its pod is refused without, and a dry run makes none."""
+    """Create the account of `helm test` in each namespace.
+
+    Its pod is refused without the account, and a dry run creates none.
+    """
     for name in NAMESPACES:
         account = {"name": "palaestra-trial", "namespace": name}
         sent = {"apiVersion": "v1", "kind": "ServiceAccount", "metadata": account}
@@ -24,7 +27,7 @@ def accounts(places, kubectl):  # noqa: ARG001 - are there
 
 @pytest.mark.parametrize("mode", MODES)
 def test_an_api_server_takes_every_mode(mode, accounts, kubectl):  # noqa: ARG001 - are there
-    """Unknown fields are mistakes, and so is whatever it warns of: pods that are not restricted, for one."""
+    """Unknown fields count as mistakes, and so do warnings, as those about pods that are not restricted."""
     said = kubectl(*DRY, sent=rendered(MODES[mode]))
 
     assert said.count("serverside-applied (server dry run)") >= 9
@@ -33,7 +36,7 @@ def test_an_api_server_takes_every_mode(mode, accounts, kubectl):  # noqa: ARG00
 
 @pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
 def test_an_api_server_takes_an_example_for_the_platform(path, places, kubectl):  # noqa: ARG001 - as above
-    """They are copied, changed a little, and applied."""
+    """Users copy the examples, change them a little, and apply them."""
     said = kubectl(*DRY, sent=path.read_text())
 
     assert "Warning" not in said
@@ -41,13 +44,16 @@ def test_an_api_server_takes_an_example_for_the_platform(path, places, kubectl):
 
 @pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
 def test_an_example_says_what_each_object_is_for(path):
-    """Otherwise nobody dares to change one."""
+    """Otherwise nobody would dare to change an object."""
     for document in path.read_text().split("---\n"):
         assert document.lstrip().startswith("# ")
 
 
 def test_authors_train_and_readers_look_on(cluster, places, kubectl):  # noqa: ARG001 - as above
-    """By the roles that every cluster has, and by the author's alone without a right to pods."""
+    """The roles that every cluster has allow this.
+
+    The author's own role allows it alone, without permissions for pods.
+    """
     (roles,) = (path for path in PLATFORM if path.stem == "roles")
     kubectl("apply", "-f", str(roles), "-f", str(ROOT / "manifests" / "crd.yaml"))
     for role, user in (("edit", "editor"), ("view", "viewer")):

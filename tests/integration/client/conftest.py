@@ -1,4 +1,4 @@
-"""A client of the namespace of a test, commands that are typed there, and the operator's word."""
+"""A client of a test's namespace, a function that types commands there, and one that writes statuses."""
 
 from collections.abc import Callable, Iterator
 
@@ -13,7 +13,7 @@ from tests.integration.operator.cluster import Place
 
 @pytest.fixture
 def client(control_plane: ControlPlane, place: Place) -> Iterator[Client]:
-    """A client of that namespace."""
+    """Return a client of that namespace."""
     with Client(namespace=place.name, kubeconfig=str(control_plane.kubeconfig)) as made:
         yield made
 
@@ -22,7 +22,7 @@ def client(control_plane: ControlPlane, place: Place) -> Iterator[Client]:
 def typed(
     control_plane: ControlPlane, place: Place, capsys: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, list[str], list[str]]]:
-    """Type a command; return its exit code and its lines on both outputs."""
+    """Return a function that types a command and returns its exit code and the lines of both outputs."""
 
     def run(*arguments: str) -> tuple[int, list[str], list[str]]:
         where = [f"--kubeconfig={control_plane.kubeconfig}", f"--namespace={place.name}"]
@@ -35,7 +35,10 @@ def typed(
 
 @pytest.fixture
 def tell(place: Place) -> Callable[..., None]:
-    """Write the status of a job, as the operator does; keywords are fields of it."""
+    """Return a function that writes the status of a job, as the operator does.
+
+    Keywords are fields of the status.
+    """
 
     def write(name: str, phase: str, generation: int = 1, **fields: object) -> None:
         condition = {

@@ -1,4 +1,4 @@
-"""What commands make of answers that a real API server gives seldom; a scripted one gives them here."""
+"""How commands treat responses that a real API server seldom gives; a scripted server gives them here."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -38,7 +38,7 @@ NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, request
 
 @pytest.fixture
 def server(tmp_path):
-    """The script of the server, and a kubeconfig whose context is in the namespace `robots`."""
+    """Yield the script of the server, and a kubeconfig whose context has the namespace `robots`."""
     with serving() as (address, script):
         context = {"cluster": "c", "user": "u", "namespace": "robots"}
         content = {
@@ -54,7 +54,10 @@ def server(tmp_path):
 
 @pytest.fixture
 def tried(server, tmp_path):
-    """Try a job that comes to a phase, or is gone, and whose deletion is answered so; return the code."""
+    """Return a function that tries a job and returns the exit code.
+
+    The job reaches a phase, or does not exist. The response to its deletion is given.
+    """
     script, kubeconfig = server
     file = tmp_path / "job.yaml"
     file.write_text(JOB)
@@ -75,7 +78,10 @@ def tried(server, tmp_path):
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1), ("", 1)])
 def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, phase, code):
-    """Its time to live may be over, or somebody has deleted it; it was in the namespace of the context."""
+    """The job may have passed its time to live, or a user has deleted it.
+
+    It was in the namespace of the context.
+    """
     assert tried(phase, refusal(404, "NotFound")) == code
 
     made, *_, deleted = server[0].of(watches=False)
@@ -85,7 +91,10 @@ def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, 
 
 @pytest.fixture
 def waited(server):
-    """Wait for a job that waits for its image and succeeds then; `report` is the caller's."""
+    """Return a function that waits for a job, which waits for its image and then succeeds.
+
+    The caller gives `report`.
+    """
     script, kubeconfig = server
     job = yaml.safe_load(JOB) | {"metadata": NAMED | {"generation": 1, "resourceVersion": "1"}}
     waits = {"phase": "Pending", "observedGeneration": 1, "replicas": [WAITS]}
@@ -102,7 +111,7 @@ def waited(server):
 
 
 def test_a_wait_reports_phases_and_why_replicas_wait(waited):
-    """Somebody looks at the notebook meanwhile."""
+    """The user sees them in the notebook during the wait."""
     lines = []
 
     assert waited(report=lines.append).status.phase == "Succeeded"
@@ -110,14 +119,14 @@ def test_a_wait_reports_phases_and_why_replicas_wait(waited):
 
 
 def test_a_wait_prints_nothing_of_its_own(waited, capsys):
-    """A library writes only where its caller asks for it."""
+    """A library prints only where its caller requests it."""
     waited()
 
     assert capsys.readouterr() == ("", "")
 
 
 def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, capsys):
-    """`helm test` with a typo in an image was silent until its deadline."""
+    """Once, `helm test` with a wrong image printed nothing until its deadline."""
     monkeypatch.setattr("palaestra.smoke_test.PERIOD_S", 0.0)
     script, kubeconfig = server
     (tmp_path / "job.yaml").write_text(JOB)
@@ -143,14 +152,14 @@ def test_a_trial_that_cannot_be_deleted_for_now_is_reported_beside_its_verdict(t
 
 
 def test_a_trial_that_may_not_be_deleted_fails(tried, capsys):
-    """A right is missing, so every trial would leave a job."""
+    """A permission is missing, so every trial would leave a job behind."""
     assert tried("Succeeded", refusal(403, "Forbidden")) == 1
 
     assert capsys.readouterr().err == "Forbidden (403): no\n"
 
 
 def test_a_trial_that_failed_tells_why_although_it_may_not_be_deleted(tried, capsys):
-    """The first thing that is wrong is the one to be mended first."""
+    """The user must fix the first error first."""
     assert tried("Failed", refusal(403, "Forbidden")) == 1
 
     said = capsys.readouterr()
@@ -160,7 +169,7 @@ def test_a_trial_that_failed_tells_why_although_it_may_not_be_deleted(tried, cap
 
 @pytest.mark.parametrize(("message", "hint"), [(NO_RIGHT, True), (NO_ROOM, False)])
 def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, message, hint):
-    """It knows nothing of quotas and policies."""
+    """The doctor knows nothing about quotas and policies."""
     script, kubeconfig = server
     answer = {"kind": "Status", "code": 403, "reason": "Forbidden", "message": message}
     script.calls = [reply(403, answer)]
@@ -181,7 +190,7 @@ def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, mess
     ids=["there", "not there"],
 )
 def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
-    """The table that the API server makes is all that is shown."""
+    """Only the table that the API server makes is printed."""
     script, kubeconfig = server
     script.calls = [answer]
 
@@ -201,7 +210,7 @@ def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
 def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
     server, tmp_path, capsys, command
 ):
-    """The API server's own answer is `404 page not found`, and no job's name is to blame."""
+    """The API server's own response is `404 page not found`, and the job's name is not the cause."""
     script, kubeconfig = server
     file = tmp_path / "job.yaml"
     file.write_text(JOB)
@@ -215,7 +224,7 @@ def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
 
 
 def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, capsys):
-    """The API server names the wrong one only, and `describe` has no list of them."""
+    """The API server names only the wrong one, and `describe` does not list the containers."""
     script, kubeconfig = server
     pod = {"name": "trial-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     status = {"replicas": [{"index": 0, "phase": "Running", "pod": pod}]}
@@ -241,7 +250,7 @@ def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, caps
     ],
 )
 def test_an_event_knows_the_container_that_it_is_about(server, path, container):
-    """Kubelets write `Container created` for each of a pod, and no name into the message."""
+    """Kubelets write `Container created` for each container, and no name into the message."""
     script, kubeconfig = server
     event = {
         "metadata": {"name": "a", "creationTimestamp": "2026-01-31T12:00:00Z"},
@@ -259,7 +268,7 @@ def test_an_event_knows_the_container_that_it_is_about(server, path, container):
 
 
 def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
-    """Waiting and applying have no name to miss, and ended with an error of the transport."""
+    """Once, waiting and applying ended with an error of the transport, because no job's name was missing."""
     script, kubeconfig = server
     script.calls = [raw(b"404 page not found\n", 404)]
 
@@ -274,7 +283,7 @@ def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
 
 
 def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
-    """A GitOps controller creates it again at once; the deleted one is gone all the same."""
+    """A GitOps controller creates it again at once, but the first job is deleted."""
     script, kubeconfig = server
     anew = {"metadata": NAMED | {"uid": "another", "resourceVersion": "2"}}
     script.calls = [
@@ -291,7 +300,7 @@ def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
 
 @pytest.fixture
 def trial():
-    """The first trial of the sweep `s`."""
+    """Return the first trial of the sweep `s`."""
     job = {**yaml.safe_load(JOB), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
     return Trial(number=0, changes={}, job=validate(job))
 
@@ -315,7 +324,7 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
 
 
 def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
-    """Otherwise the command looks as if it hung; a moment without an answer is no news."""
+    """Otherwise the command seems to hang. A short time without a response is not reported."""
     script, kubeconfig = server
     none = reply(obj={"metadata": {}, "items": []})
     away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)
@@ -372,7 +381,7 @@ def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, tri
 
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
 def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
-    """A person and the sweep may both find that it is not worth going on."""
+    """A user and the sweep may both decide that the trial is not worth continuing."""
     script, kubeconfig = server
     script.calls = [*answers, refusal(404, "NotFound")]
 
@@ -383,7 +392,7 @@ def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers
 
 
 def test_a_lease_that_is_given_back_has_no_leader(server):
-    """The next change, by who takes it, is what shows that somebody leads."""
+    """Only the next change, by the new holder, shows that an operator leads."""
     script, kubeconfig = server
 
     def lease(version, holder):

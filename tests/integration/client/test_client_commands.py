@@ -1,4 +1,4 @@
-"""The commands as they are typed, against a real API server."""
+"""The commands as a user types them, against a real API server."""
 
 import json
 import os
@@ -30,7 +30,7 @@ REPLICA = {
 
 
 def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
-    """The same as `kubectl get tj`."""
+    """The output is the same as that of `kubectl get tj`."""
     place.train("a")
     place.train("b")
     tell("b", "Running", step=12000)
@@ -47,7 +47,7 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
 
 
 def test_describe_and_watch_take_a_job_whose_name_the_api_server_made(typed, place, tell):
-    """`kubectl create` of a file with generateName leaves the field in the object."""
+    """`kubectl create` leaves the field generateName in the object."""
     made = place.create(TRAINING_JOBS, {**yaml.safe_load(TRIAL), "metadata": {"generateName": "try-"}})
     name = made["metadata"]["name"]
     tell(name, "Succeeded")
@@ -59,7 +59,7 @@ def test_describe_and_watch_take_a_job_whose_name_the_api_server_made(typed, pla
 
 
 def test_get_of_all_namespaces_names_them(typed, place):
-    """As kubectl does."""
+    """This is what kubectl does."""
     place.train("a")
 
     _, [headings, *rows], _ = typed("get", "-A")
@@ -69,7 +69,7 @@ def test_get_of_all_namespaces_names_them(typed, place):
 
 
 def test_get_without_jobs_says_so_instead_of_headings_alone(typed, place):
-    """To standard error, as kubectl does, so that a script that counts lines counts none."""
+    """The message goes to standard error, as kubectl does, so a script that counts lines counts none."""
     assert typed("get") == (0, [], [f"no TrainingJobs in namespace {place.name}"])
     assert typed("get", "-l", "a=b") == (
         0,
@@ -80,7 +80,7 @@ def test_get_without_jobs_says_so_instead_of_headings_alone(typed, place):
 
 @pytest.mark.parametrize("form", [(), ("-o", "json")])
 def test_get_in_a_namespace_that_does_not_exist_says_so(control_plane, capsys, form):
-    """A misspelled namespace looked like one without jobs."""
+    """Once, a misspelled namespace looked like one without jobs."""
     code = main(["get", *form, f"--kubeconfig={control_plane.kubeconfig}", "--namespace=nosuch"])
 
     out, err = capsys.readouterr()
@@ -90,7 +90,7 @@ def test_get_in_a_namespace_that_does_not_exist_says_so(control_plane, capsys, f
 
 @pytest.mark.parametrize("name", [(), ("a",)])
 def test_get_for_programs_is_what_the_api_server_has(typed, place, name):
-    """One object where one was asked for, so that it can be applied elsewhere."""
+    """The output for one job is one object, so that it can be applied elsewhere."""
     place.train("a", seed=7)
 
     names = typed("get", *name, "-o", "name")[1]
@@ -106,7 +106,7 @@ def test_get_for_programs_is_what_the_api_server_has(typed, place, name):
     "command", ["get", "describe", "events", "logs", "watch", "suspend", "delete", "fetch"]
 )
 def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
-    """For people and for scripts."""
+    """One line is good for users, and the exit code for scripts."""
     code, out, [line] = typed(command, "none")
 
     assert code == 1
@@ -115,7 +115,7 @@ def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
 
 
 def test_options_that_exclude_each_other_are_2(typed):
-    """Nothing is asked."""
+    """Nothing is sent to the cluster."""
     code, _, [line] = typed("get", "a", "-A")
 
     assert code == 2
@@ -123,7 +123,7 @@ def test_options_that_exclude_each_other_are_2(typed):
 
 
 def test_describe_tells_status_and_events(typed, place, tell):
-    """One command for the whole story."""
+    """One command shows everything about a job."""
     place.train("a")
     tell("a", "Running", replicas=[REPLICA])
     place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
@@ -137,7 +137,7 @@ def test_describe_tells_status_and_events(typed, place, tell):
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
 def test_watch_ends_with_the_job_and_says_how(typed, place, tell, phase, code):
-    """A script may go by its exit code."""
+    """A script can use the exit code."""
     place.train("a")
     tell("a", phase, replicas=[REPLICA | {"phase": phase}])
 
@@ -149,13 +149,13 @@ def test_watch_ends_with_the_job_and_says_how(typed, place, tell, phase, code):
 
 @pytest.mark.parametrize("phase", [None, "Running"])
 def test_watch_of_a_job_that_is_deleted_says_so_and_ends_with_1(control_plane, place, tell, phase):
-    """How it would have ended nobody knows, and a script must not take it for a success."""
+    """The result of such a job is unknown, and a script must not treat it as a success."""
     place.train("a")
     if phase:
         tell("a", phase, replicas=[REPLICA])
 
     with started(control_plane, place, "watch", "a", "--timeout=30") as process:
-        process.stdout.readline()  # it has seen the job
+        process.stdout.readline()  # the command has seen the job
         place.api.delete(TRAINING_JOBS, place.name, "a")
         out, _ = process.communicate(timeout=30)
 
@@ -164,7 +164,7 @@ def test_watch_of_a_job_that_is_deleted_says_so_and_ends_with_1(control_plane, p
 
 
 def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
-    """Kubelets and helm end a pod with SIGTERM; it comes to the namespace that was named."""
+    """Kubelets and helm end a pod with SIGTERM. The trial runs in the given namespace."""
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL)
 
@@ -180,7 +180,7 @@ def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
 
 
 def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
-    """2, as for every mistake in what is typed."""
+    """The exit code is 2, as for every mistake in a command."""
     file = tmp_path / "job.yaml"
     file.write_text(TRIAL + "  seed: -1\n")
 
@@ -192,7 +192,7 @@ def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
 
 
 def started(control_plane, place, *arguments):
-    """Start a command in a process of its own, whose output is read as it comes."""
+    """Start a command in a separate process whose output can be read while it runs."""
     return subprocess.Popen(
         [
             *(sys.executable, "-c", "import sys; from palaestra.cli import main; sys.exit(main())"),
@@ -204,7 +204,7 @@ def started(control_plane, place, *arguments):
 
 
 def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
-    """And leaves the last picture, with the line that says how it ended."""
+    """The last picture stays, with the line about the end of the job."""
     place.train("a")
     tell("a", "Succeeded", replicas=[REPLICA | {"successRate": 0.5}])
     ours, theirs = os.openpty()
@@ -234,7 +234,7 @@ def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
 
 
 def test_suspend_and_resume_change_the_spec(typed, place):
-    """Several jobs at once, as kubectl does."""
+    """The commands accept several jobs, as kubectl does."""
     for name in ("a", "b"):
         place.train(name)
 
@@ -248,7 +248,7 @@ def test_suspend_and_resume_change_the_spec(typed, place):
 
 @pytest.mark.parametrize("command", ["suspend", "resume"])
 def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_it(typed, place, command):
-    """`Invalid (422)` looked like a mistake in the job, and `resume` promised what only Kueue does."""
+    """The error `Invalid (422)` looked like a mistake in the job, and `resume` cannot do what Kueue does."""
     place.train("a", scheduling={"queueName": "robots"})
 
     code, out, [line] = typed(command, "a")
@@ -272,7 +272,7 @@ def test_a_job_that_has_ended_is_neither_suspended_nor_resumed(typed, place, tel
 
 
 def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
-    """Else the word would wait for a later loss, and the run would begin again without one."""
+    """The request would stay until a later loss, and the run would then begin again without a new request."""
     place.train("a")
     tell("a", "Running", replicas=[REPLICA])
 
@@ -284,7 +284,7 @@ def test_restart_refuses_a_job_that_has_lost_nothing(typed, place, tell):
 
 
 def test_delete_says_what_stays(typed, place):
-    """A run may be worth more than the job."""
+    """A run may be worth more than its job."""
     uid = place.train("a")["metadata"]["uid"]
     place.train("b", storage={"ephemeral": True})
 
@@ -297,7 +297,7 @@ def test_delete_says_what_stays(typed, place):
 
 
 def test_kubectl_finds_the_plugin_and_hands_it_its_options(control_plane, place, tmp_path):
-    """`kubectl palaestra get` is `palaestra get`."""
+    """`kubectl palaestra get` is the same as `palaestra get`."""
     place.train("a")
     plugin = tmp_path / "kubectl-palaestra"
     program = tmp_path / "program.py"

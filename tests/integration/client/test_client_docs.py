@@ -1,4 +1,4 @@
-"""What docs/howto/python.md and docs/reference/commands.md show can be typed."""
+"""The script in docs/howto/python.md and the commands in docs/reference/commands.md work as written."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +17,10 @@ PAGE = (ROOT / "docs/howto/python.md").read_text()
 
 
 def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
-    """From apply to delete, in the namespace of the context; the operator's word is the test's."""
+    """The script goes from apply to delete, in the context's namespace.
+
+    The test writes the statuses of the operator.
+    """
     [script] = blocks(PAGE, "python with-a-cluster")
     kubeconfig = yaml.safe_load(control_plane.kubeconfig.read_text())
     kubeconfig["contexts"][0]["context"]["namespace"] = place.name
@@ -37,5 +40,5 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
 
 
 def test_every_command_of_the_page_exists_and_every_command_is_on_it():
-    """Each has a row."""
+    """Each command has a row in the table."""
     assert set(re.findall(r"^\| `palaestra (\w+)", COMMANDS_PAGE, re.MULTILINE)) == set(COMMANDS)

@@ -1,4 +1,4 @@
-"""The doctor at a real API server: it reports each problem with its remedy."""
+"""The doctor with a real API server: it reports each problem with its remedy."""
 
 from importlib.metadata import version
 
@@ -32,8 +32,8 @@ ACCOUNTS = Resource(api_version="v1", kind="ServiceAccount", plural="serviceacco
 
 @pytest.fixture
 def found(place):
-    """Return what the doctor finds of each thing; the operator's namespace is the test's."""
-    eventually(lambda: place.get(ACCOUNTS, "default"))  # a pod is refused before it is there
+    """Return the doctor's findings by name; the operator's namespace is that of the test."""
+    eventually(lambda: place.get(ACCOUNTS, "default"))  # a pod without this account is refused
 
     def look(api=None):
         site = Site(api=api or place.api, namespace=place.name, operator_namespace=place.name)
@@ -43,12 +43,12 @@ def found(place):
 
 
 def verdicts(findings):
-    """Return how each thing is."""
+    """Return the verdict of each finding."""
     return {what: each.verdict.value for what, each in findings.items()}
 
 
 def test_missing_nodes_storage_and_operator_are_reported(found):
-    """Each with its remedy; what is right there is right."""
+    """Each finding has its remedy, and the findings without a problem are right."""
     findings = found()
 
     assert verdicts(findings) == {
@@ -72,7 +72,7 @@ def test_missing_nodes_storage_and_operator_are_reported(found):
 
 
 def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
-    """For scripts; each remedy on a line of its own."""
+    """The exit code is for scripts; each remedy has a separate line."""
     code, out, _ = typed("doctor", f"--operator-namespace={place.name}")
 
     assert code == 1
@@ -81,7 +81,7 @@ def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
 
 
 def test_an_api_server_that_does_not_answer_is_the_only_finding(tmp_path, capsys):
-    """Everything else would be the same line again."""
+    """All other findings would repeat the same line."""
     kubeconfig = tmp_path / "kubeconfig"
     kubeconfig.write_text(
         "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
@@ -95,7 +95,7 @@ def test_an_api_server_that_does_not_answer_is_the_only_finding(tmp_path, capsys
 
 
 def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
-    """A leader is one that is seen to renew its Lease."""
+    """A leader counts only if it renews its Lease."""
     node = {"metadata": {"name": f"node-{place.name}"}, "apiVersion": "v1", "kind": "Node"}
     place.api.create(NODES, node)
     place.api.merge(
@@ -130,7 +130,7 @@ def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
 
 
 def install(place, *, replicas=1, **container):
-    """Make the operator's Deployment, which nothing carries out."""
+    """Create the operator's Deployment, which no controller carries out."""
     container = {"name": "operator", "image": "palaestra-operator:0.0.0"} | container
     labels = {"a": "b"}
     template = {
@@ -149,7 +149,7 @@ def install(place, *, replicas=1, **container):
 
 
 def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, place):
-    """Its log says why."""
+    """The log of the operator shows the cause."""
     install(place)
 
     findings = found()
@@ -161,7 +161,7 @@ def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, 
 
 
 def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales_it(found, place):
-    """It has no pod whose log would explain the problem, and no leader."""
+    """Such an operator has no leader, and no pod whose log would explain the problem."""
     install(place, replicas=0)
 
     findings = found()
@@ -173,7 +173,7 @@ def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales
 
 
 def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(place):
-    """RBAC would grant rights in it all the same, and a dry run there only says that it is not found."""
+    """RBAC allows requests in it all the same, and a dry run there says only that it is not found."""
     site = Site(api=place.api, namespace="nosuch", operator_namespace=place.name)
 
     findings = {each.what: each for each in examine(site)}
@@ -186,7 +186,7 @@ def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(p
 
 
 def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):
-    """Where only a registry of one's own is allowed, another image would be refused, and no job's."""
+    """Where only a private registry is allowed, another image would be refused although no job would."""
     site = Site(api=place.api, namespace=place.name, operator_namespace=place.name)
     before = trainer_image(site)
 
@@ -197,7 +197,7 @@ def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):
 
 
 def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(found, control_plane, place):
-    """RBAC itself is asked, so that roles, groups and other authorizers all count."""
+    """The doctor queries RBAC itself, so that roles, groups and other authorizers all count."""
     nobody = connect(str(control_plane.kubeconfig_of("nobody")))
 
     findings = found(nobody)
@@ -206,7 +206,7 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
     assert findings["to look at jobs"].verdict is CheckStatus.WRONG
     assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to look at jobs"].fact
     assert findings["to author jobs"].verdict is CheckStatus.WRONG
-    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not everybody has to
+    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not everybody needs this
     assert findings["to fetch runs"].verdict is CheckStatus.UNKNOWN
     assert "create pods/exec" in findings["to fetch runs"].fact
     assert findings["storage class"].verdict is CheckStatus.UNKNOWN
@@ -215,7 +215,7 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
 
 
 def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(found, place):
-    """The pod that is tried says what it needs, as a quota on requests and limits demands of every pod."""
+    """The pod of the dry run has requests and limits, because a quota on them demands them of every pod."""
     quota = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
     room = {"requests.cpu": "1", "requests.memory": "1Gi", "limits.memory": "1Gi", "pods": "1"}
     place.create(QUOTAS, quota | {"spec": {"hard": room}})
@@ -232,7 +232,7 @@ def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(fo
 
 
 def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place):
-    """An old mutating webhook knows pods without the field; a policy stands for it here."""
+    """An old mutating webhook does not know the field in pods; here a policy plays the webhook."""
     expression = 'JSONPatch{op: "remove", path: "/spec/initContainers/0/restartPolicy"}'
     rule = {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
     only_here = {"matchLabels": {"kubernetes.io/metadata.name": place.name}}

@@ -1,4 +1,7 @@
-"""Fetching a run: whole or not at all, and no pod is left behind; a scripted server plays the cluster."""
+"""Fetching a run copies all of it or nothing, and leaves no pod behind.
+
+A scripted server plays the cluster.
+"""
 
 import io
 import json
@@ -28,7 +31,7 @@ WAITING = {"reason": "ErrImagePull", "message": "no such image"}
 
 
 def tar(files):
-    """Return the messages with which a tar of these files comes."""
+    """Return the messages in which a tar of these files arrives."""
     file = io.BytesIO()
     with tarfile.open(fileobj=file, mode="w") as archive:
         for name, content in files.items():
@@ -43,12 +46,12 @@ class Scene:
     """A job with one replica in a scripted cluster.
 
     Attributes:
-        phase: of the run's pod; None: it is gone.
+        phase: of the run's pod; None if it does not exist.
         trainer: state of the trainer's container in it.
         replica: fields of the replica's status.
-        reader: status of the pod that is made to read the volume.
-        execution: how a command in a container goes.
-        deletion: how deleting the pod is answered.
+        reader: status of the pod that is created to read the volume.
+        execution: how a command in a container proceeds.
+        deletion: the response to the deletion of the pod.
     """
 
     def __init__(self, address, script, tmp_path):
@@ -80,7 +83,7 @@ class Scene:
         return self.client.fetch("job", into=self.into, deadline_s=deadline_s)
 
     def left(self):
-        """Return the files that lie below the target."""
+        """Return the files below the target."""
         return {
             str(each.relative_to(self.into)): each.read_bytes()
             for each in self.into.rglob("*")
@@ -88,7 +91,7 @@ class Scene:
         }
 
     def asked(self, method, end):
-        """Return the requests of a method whose path ends so."""
+        """Return the requests of a method whose path has this end."""
         return [
             each
             for each in self._script.of(watches=False)
@@ -137,7 +140,7 @@ class Scene:
 
 @pytest.fixture
 def scene(tmp_path):
-    """The scene."""
+    """Yield a job in a scripted cluster."""
     with serving() as (address, script):
         made = Scene(address, script, tmp_path)
         yield made
@@ -145,7 +148,7 @@ def scene(tmp_path):
 
 
 def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
-    """Its volume can be mounted by one node only, and the pod is there."""
+    """Only one node can mount its volume, and the run's pod is on that node."""
     scene.phase, scene.replica = "Running", {"phase": "Running"}
 
     folder = scene.fetch()
@@ -160,7 +163,7 @@ def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
     ("phase", "replica"),
     [
         ("Succeeded", "Succeeded"),
-        ("Succeeded", "Running"),  # what the operator is about to see
+        ("Succeeded", "Running"),  # the operator is about to see the end
         ("Failed", "Failed"),
         ("Failed", "Suspended"),
         (None, "Succeeded"),
@@ -168,7 +171,7 @@ def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
     ],
 )
 def test_a_run_that_has_ended_is_read_with_a_pod_that_is_deleted_again(scene, phase, replica):
-    """This very pod, and no other of its name."""
+    """Exactly this pod is deleted, and no other one with its name."""
     scene.phase, scene.replica = phase, {"phase": replica}
 
     scene.fetch()
@@ -193,7 +196,7 @@ def test_a_run_that_has_ended_is_read_with_a_pod_that_is_deleted_again(scene, ph
     ids=["it fails", "its end is not told", "it breaks off", "nothing is there", "it is not allowed"],
 )
 def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, execution, error):
-    """Half a policy would look like a policy."""
+    """Half a policy would look like a complete policy."""
     scene.execution = execution
 
     with pytest.raises(error):
@@ -205,7 +208,7 @@ def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, executio
 
 
 def test_a_copy_that_takes_too_long_says_so(scene):
-    """The connection is as it should be, so the remedy is another."""
+    """The connection works, so the remedy is another one."""
     scene.execution = command(tar(FILES)[0], ends="silent")
 
     with pytest.raises(TookTooLong, match="was not copied in time; allow more time with --timeout"):
@@ -215,14 +218,14 @@ def test_a_copy_that_takes_too_long_says_so(scene):
 
 @pytest.mark.parametrize("code", [403, 503])
 def test_a_pod_that_cannot_be_deleted_spoils_no_copy(scene, code):
-    """It ends by itself, and the same command would be refused: the folder is there."""
+    """The pod ends by itself, and a repeated command would be refused because the folder exists."""
     scene.deletion = refusal(code, "Refused")
 
     assert scene.fetch() == scene.into / "job" / "0"
 
 
 def test_a_folder_that_is_there_is_left_as_it_is(scene):
-    """Nothing is asked of the cluster's pods for it."""
+    """No pod is created for it."""
     there = scene.into / "job" / "0"
     there.mkdir(parents=True)
 
@@ -232,7 +235,7 @@ def test_a_folder_that_is_there_is_left_as_it_is(scene):
 
 
 def test_a_pod_that_is_about_to_start_is_not_robbed_of_its_volume(scene):
-    """A claim that another node holds would keep it from starting."""
+    """A claim that another node holds would prevent its start."""
     scene.phase = "Pending"
 
     with pytest.raises(NotFetched, match=f"pod {RUN_POD}: is about to start"):
@@ -241,7 +244,7 @@ def test_a_pod_that_is_about_to_start_is_not_robbed_of_its_volume(scene):
 
 
 def test_a_pod_whose_trainer_has_just_ended_is_not_entered(scene):
-    """It is said to run until its simulators are stopped, and what runs in it then goes with it."""
+    """The pod runs until its simulators are stopped, and a command in it would end with them."""
     scene.phase, scene.trainer = "Running", {"terminated": {"exitCode": 0}}
 
     with pytest.raises(NotFetched, match=f"pod {RUN_POD}: its trainer has just ended; .* in a minute"):
@@ -253,7 +256,7 @@ def test_a_pod_whose_trainer_has_just_ended_is_not_entered(scene):
 @pytest.mark.parametrize("replica", ["Pending", "Running"])
 @pytest.mark.parametrize("phase", ["Failed", None])
 def test_a_pod_that_will_come_again_is_not_robbed_of_its_volume(scene, phase, replica):
-    """Its Job waits before it makes the next one."""
+    """The Job waits before it creates the next pod."""
     scene.phase, scene.replica = phase, {"phase": replica}
 
     with pytest.raises(NotFetched, match="job job: replica 0 is about to be started again"):
@@ -262,7 +265,7 @@ def test_a_pod_that_will_come_again_is_not_robbed_of_its_volume(scene, phase, re
 
 
 def test_the_first_pod_is_not_robbed_of_its_volume_either(scene):
-    """Its Job is there before it."""
+    """The Job exists before its first pod."""
     scene.replica = {"phase": "Pending", "pod": None}
 
     with pytest.raises(NotFetched, match="job job: replica 0 is about to be started, "):
@@ -279,7 +282,7 @@ def test_the_error_for_a_run_that_went_with_its_pod_names_the_field(scene):
 
 
 def test_a_pod_that_does_not_start_is_deleted_and_the_error_has_the_reason(scene):
-    """The words are the kubelet's."""
+    """The words are those of the kubelet."""
     scene.reader = {"phase": "Pending", "containerStatuses": [{"state": {"waiting": WAITING}}]}
 
     with pytest.raises(TookTooLong, match="ErrImagePull: no such image"):

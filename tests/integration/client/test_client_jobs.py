@@ -1,4 +1,4 @@
-"""The client against a real API server; the operator's word is the test's."""
+"""The client with a real API server; the tests write the statuses of the operator."""
 
 import json
 import time
@@ -20,13 +20,13 @@ SOON_S = 30.0
 
 @pytest.fixture
 def later():
-    """Call something in a thread; return its future."""
+    """Return a function that calls another one in a thread and returns its future."""
     with ThreadPoolExecutor(2) as pool:
         yield pool.submit
 
 
 def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
-    """As plain data, as kubectl would."""
+    """It is stored as plain data, as by kubectl."""
     stored = client.apply(training_job("a", seed=7))
 
     assert stored.spec.seed == 7
@@ -34,7 +34,7 @@ def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
 
 
 def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
-    """What they leave out is left to the cluster, so that the same job applied twice changes nothing."""
+    """The cluster fills in what they omit, so the same job applied twice changes nothing."""
     file = tmp_path / "job.yaml"
     file.write_text("apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: a}\nspec: {}\n")
     from_file = client.apply(file)
@@ -46,7 +46,10 @@ def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
 
 
 def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, place, tell):
-    """`kubectl create` of a file with generateName: one such job hid all others of its namespace."""
+    """`kubectl create` makes such names from generateName.
+
+    One such job once hid all others of its namespace.
+    """
     place.train("a")
     made = place.create(TRAINING_JOBS, {**training_job(), "metadata": {"generateName": "try-"}})
     name = made["metadata"]["name"]
@@ -60,7 +63,7 @@ def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, pla
 def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
     client, control_plane, place, tmp_path
 ):
-    """A plain `kubectl apply` copies the file into an annotation, which is too long then."""
+    """A plain `kubectl apply` copies the file into an annotation, which would be too long."""
     world = builtin("arena").decode() + "# a comment\n" * 12_000
     groups = [
         {"name": name, "role": role, "world": {"inline": world}}
@@ -80,7 +83,7 @@ def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
 
 
 def test_a_wrong_job_is_refused_before_anything_is_sent(client):
-    """With every mistake, as `palaestra run` tells them."""
+    """The error lists every mistake, as with `palaestra run`."""
     with pytest.raises(SpecErrors) as refused:
         client.apply(training_job("a", seed=-1, replica=2))
 
@@ -89,7 +92,7 @@ def test_a_wrong_job_is_refused_before_anything_is_sent(client):
 
 
 def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
-    """The API server's word, which names the field."""
+    """The message of the API server names the field."""
     client.apply(training_job("a", seed=1))
 
     with pytest.raises(Invalid, match="seed"):
@@ -108,7 +111,7 @@ def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
 
 
 def test_a_wait_ends_with_the_job(client, tell, later):
-    """Whatever becomes of it: `ended` is both."""
+    """The test waits with `until="ended"`, which both results satisfy."""
     client.apply(training_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
@@ -119,7 +122,7 @@ def test_a_wait_ends_with_the_job(client, tell, later):
 
 
 def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
-    """The error contains the reason: the next command would ask for it."""
+    """The error contains the reason, because the user would ask for it next."""
     client.apply(training_job("a"))
     tell("a", "Failed")
 
@@ -128,7 +131,7 @@ def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
 
 
 def test_a_wait_has_a_deadline(client):
-    """Nobody looks after this job."""
+    """No operator works on this job."""
     client.apply(training_job("a"))
     began = time.monotonic()
 
@@ -138,7 +141,7 @@ def test_a_wait_has_a_deadline(client):
 
 
 def test_a_job_that_is_deleted_is_not_waited_for(client, later):
-    """It will not come back."""
+    """The job will not come back."""
     client.apply(training_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
@@ -164,7 +167,7 @@ def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
 
 
 def test_statuses_come_until_the_end(client, tell, later):
-    """The last one is how it ended; the iterator ends by itself."""
+    """The last status is the final one, and the iterator ends by itself."""
     client.apply(training_job("a"))
     seen = []
 
@@ -181,7 +184,10 @@ def test_statuses_come_until_the_end(client, tell, later):
 
 
 def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_what_stops_it(client):
-    """Its queue decides; the API server's own words are those of a wrong spec, which it is not."""
+    """The queue decides.
+
+    The API server's own message would speak of a wrong spec, which is not the problem.
+    """
     client.apply(training_job("a", scheduling={"queueName": "robots"}))
 
     for call in (client.suspend, client.resume):
@@ -190,7 +196,7 @@ def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_w
 
 
 def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
-    """A job of the same name can be made right afterwards."""
+    """A job with the same name can be created right afterwards."""
     job = client.apply(training_job("a"))
     owner = {
         "apiVersion": job.api_version,
@@ -209,7 +215,7 @@ def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
 
 
 def test_events_of_pods_are_the_jobs(client, place):
-    """What a kubelet warns of is why a job stands still."""
+    """A kubelet's warning explains why a job makes no progress."""
     client.apply(training_job("a"))
     place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
     place.complain({"metadata": {"name": "other-0-x7k2p", "uid": "v"}}, "BackOff", "another's")
@@ -220,7 +226,7 @@ def test_events_of_pods_are_the_jobs(client, place):
 
 
 def test_a_replica_without_a_pod_has_no_log(client):
-    """And the remedy is another command."""
+    """The error names another command as remedy."""
     client.apply(training_job("a"))
 
     with pytest.raises(NoPod, match=r"replica 0 has no pod; .*palaestra describe a"):
@@ -228,7 +234,7 @@ def test_a_replica_without_a_pod_has_no_log(client):
 
 
 def test_reading_a_log_that_went_with_its_pod_is_an_error(client, tell):
-    """Its last lines are kept in the status."""
+    """The status keeps its last lines."""
     client.apply(training_job("a"))
     pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     tell("a", "Running", replicas=[{"index": 0, "phase": "Running", "pod": pod}])

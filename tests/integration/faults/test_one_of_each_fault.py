@@ -1,7 +1,7 @@
-"""One fault of each kind between operator and API server: every run comes to the same as an undisturbed one.
+"""One fault of each kind between operator and API server: each run ends as it does without a fault.
 
-`python -m tests.soak faults` does so at every write. Workloads in which the Job controller pauses between
-two pods, for 10 s and more, are left to it.
+`python -m tests.soak faults` does the same at every write. It also has the workloads in which the Job
+controller pauses between two pods for 10 s or more.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +11,7 @@ import pytest
 from tests.faults.plans import TRAINERS, Fault, Kind, Plan
 from tests.faults.rig import Rig
 
-# The first test waits for the undisturbed runs, too.
+# The first test also waits for the runs without faults.
 pytestmark = [pytest.mark.minutes(2), pytest.mark.timeout(600)]
 
 AT_ONCE = 3  # a run waits most of its time
@@ -33,7 +33,7 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def runs(control_plane, installed):
-    """What comes of each plan, once it has run; several run at a time."""
+    """Yield the result of each plan as a future; several plans run at the same time."""
     rig = Rig(control_plane, installed)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         undisturbed = [pool.submit(rig.undisturbed, each) for each in sorted(set(FAULTS.values()))]
@@ -46,7 +46,7 @@ def runs(control_plane, installed):
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.words)
 def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
-    """End state and counters, one pod a replica, no orphans, and silence at last."""
+    """The test compares states and counters; each replica has one pod, no orphan stays, and requests stop."""
     run = runs[fault].result()
 
     assert run.met, "the fault never came"
@@ -54,5 +54,5 @@ def test_a_disturbed_operator_brings_every_job_to_the_same_end(fault, runs):
 
 
 def test_each_kind_of_fault_is_tried():
-    """But for those of trainers, which take a minute each: the soak has them."""
+    """Faults of trainers take a minute each, so only the soak has them."""
     assert {fault.kind for fault in FAULTS} == set(Kind) - TRAINERS

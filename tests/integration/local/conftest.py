@@ -1,4 +1,4 @@
-"""Small pods of small programs, and what can be seen of them from outside."""
+"""Small pods of small programs, and functions that observe them from outside."""
 
 import asyncio
 import os
@@ -18,11 +18,11 @@ from palaestra.local.output import Log
 from palaestra.local.pod import Kubelet, RunningPod
 from palaestra.local.pod_spec import Container, Pod
 
-PATIENCE_S = 20.0  # for what takes milliseconds on a machine that does nothing else
+PATIENCE_S = 20.0  # for what takes milliseconds on an idle machine
 
 
 def alive(pod_uid: str) -> list[int]:
-    """Return the processes that carry the marker of a pod."""
+    """Return the processes that have the marker of a pod."""
     wanted = f"{MARKER}={pod_uid}/".encode()
     found = []
     for entry in os.scandir("/proc"):
@@ -44,13 +44,13 @@ def _eventually(claim: Callable[[], object]) -> None:
 
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], object]], None]:
-    """Wait until a claim holds; fail when it does not within the patience."""
+    """Return a function that waits until a condition holds, and fails after `PATIENCE_S`."""
     return _eventually
 
 
 @dataclass
 class Stage:
-    """A place where a pod is played: its folder, its events, its containers."""
+    """A place in which a pod runs: its folder, its events, its containers."""
 
     folder: Path
     opened: ExitStack
@@ -62,7 +62,7 @@ class Stage:
 
     @property
     def events(self) -> list[str]:
-        """Return what the containers have written with `event`, in order."""
+        """Return the lines that the containers wrote with `event`, in order."""
         file = self.folder / "events"
         return file.read_text().splitlines() if file.exists() else []
 
@@ -74,7 +74,7 @@ class Stage:
         return Container(name=name, command=("bash", "-c", helper + script), **fields)  # type: ignore[arg-type]
 
     def sidecar(self, name: str, **options: object) -> Container:
-        """Return a sidecar that tells its start and its end, and ends on SIGTERM."""
+        """Return a sidecar that writes its start and its end as events, and ends on SIGTERM."""
         script = "trap 'event stop; exit 0' TERM; event start; while :; do sleep 0.02; done"
         return self.container(name, script, **options)
 
@@ -130,7 +130,7 @@ class Stage:
 
 @pytest.fixture
 def stage(tmp_path: Path) -> Iterator[Stage]:
-    """A place where a pod is played; afterwards nothing of it may be left."""
+    """Yield a place in which a pod runs; at the end no process of the pod may exist."""
     with ExitStack() as opened:
         yield (stage := Stage(folder=tmp_path, opened=opened))
         assert alive(stage.uid) == []

@@ -1,6 +1,6 @@
 """Run a planned Job as `palaestra run` does: `python play_job.py JOB.json DIRECTORY [DEADLINE_S]`.
 
-A program of its own, because the tests kill it.
+It is a separate program, because the tests kill it.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""A pod on this machine behaves as a kubelet's pod does: order, probes, restarts, shutdown."""
+"""A pod on this machine behaves like a kubelet's pod: order, probes, restarts, shutdown."""
 
 import asyncio
 import errno
@@ -18,7 +18,7 @@ from tests.failing import failing
 
 
 def ready(stage, file="ready"):
-    """Return a startup probe that passes once a file is there."""
+    """Return a startup probe that passes once a file exists."""
     return Probe(
         command=("test", "-e", str(stage.folder / file)),
         period_s=0.02,
@@ -39,7 +39,7 @@ def test_containers_start_in_order_and_sidecars_stop_in_reverse(stage):
 
 
 def test_a_sidecar_with_a_startup_probe_holds_back_its_successors(stage):
-    """Without it a simulator would look for a ROS master that does not listen yet."""
+    """Without the probe a simulator would look for a ROS master that does not listen yet."""
     script = f"event start; sleep 0.3; event ready; touch {stage.folder}/ready; sleep 60"
     slow = stage.container("slow", script, startup=ready(stage))
 
@@ -51,7 +51,7 @@ def test_a_sidecar_with_a_startup_probe_holds_back_its_successors(stage):
 
 
 def test_a_sidecar_that_ends_is_started_again_while_the_pod_lives(stage):
-    """A crash of a sidecar is not the end of a training."""
+    """A crash of a sidecar does not end a training."""
     crash = f"event start; [ $(wc -l < {stage.folder}/events) -ge 3 ] && sleep 60; exit 3"
     until = f"until [ $(wc -l < {stage.folder}/events) -ge 3 ]; do sleep 0.01; done; exit 7"
 
@@ -72,7 +72,7 @@ def test_a_sidecar_that_never_gets_ready_ends_the_pod_with_its_last_words(stage)
 
 
 def test_a_sidecar_that_hangs_before_it_is_ready_is_given_up_at_the_deadline(stage):
-    """A start that takes for ever is a failure too."""
+    """A start that never ends is also a failure."""
     stage.start_deadline_s = 0.3
     silent = stage.container("silent", "sleep 60", startup=ready(stage))
 
@@ -83,7 +83,7 @@ def test_a_sidecar_that_hangs_before_it_is_ready_is_given_up_at_the_deadline(sta
 
 
 def test_a_container_that_does_not_come_up_for_long_is_named_with_since_when(stage):
-    """A terminal on which nothing moves says neither what is awaited nor where to look."""
+    """A terminal without new lines shows neither the awaited container nor its log."""
     stage.long_s, stage.start_deadline_s = 0.05, 0.3
     silent = stage.container("silent", "sleep 60", startup=ready(stage))
 
@@ -96,12 +96,12 @@ def test_a_container_that_does_not_come_up_for_long_is_named_with_since_when(sta
 
 @pytest.mark.parametrize(
     ("first", "long_s", "lines"),
-    # A shell needs up to seconds for its first line where all processors are busy.
+    # On a busy machine a shell needs up to seconds for its first line.
     [("", 0.3, 1), ("echo up; ", 3, 0)],
     ids=["silent", "up"],
 )
 def test_a_trainer_is_waited_for_until_its_first_line(stage, first, long_s, lines):
-    """From then on it reports itself what it waits for."""
+    """After its first line the trainer itself reports what it waits for."""
     stage.long_s = long_s
 
     stage.run(main=f"{first}sleep {1.2 * long_s}")
@@ -110,7 +110,7 @@ def test_a_trainer_is_waited_for_until_its_first_line(stage, first, long_s, line
 
 
 def test_a_failed_startup_probe_restarts_the_sidecar(stage):
-    """The kubelet's rule: a program that started but does not answer gets another try."""
+    """The kubelet also restarts a program that started but does not respond."""
     file = stage.folder / "ready"
     probe = Probe(command=("test", "-e", str(file)), period_s=0.05, timeout_s=10, failure_threshold=40)
     script = f"event start; [ $(wc -l < {stage.folder}/events) = 2 ] && touch {file}; sleep 60"
@@ -131,7 +131,7 @@ def test_a_failed_liveness_probe_restarts_the_sidecar(stage):
 
 
 def test_an_init_container_that_is_no_sidecar_runs_to_its_end_first(stage):
-    """Copying a program into a volume has to be over before anybody runs it."""
+    """A program must be copied into a volume before another container runs it."""
     copy = stage.container("copy", "sleep 0.1; event done", sidecar=False)
 
     stage.run(copy, stage.sidecar("a"), main="event run")
@@ -140,7 +140,7 @@ def test_an_init_container_that_is_no_sidecar_runs_to_its_end_first(stage):
 
 
 def test_an_init_container_that_fails_ends_the_pod(stage):
-    """Its successors could not work."""
+    """The containers after it could not work."""
     copy = stage.container("copy", "echo no space; exit 4", sidecar=False)
 
     with pytest.raises(StartFailed, match=r"copy ended with exit code 4: .*no space"):
@@ -161,7 +161,7 @@ def test_stopping_asks_the_trainer_first_and_waits_for_its_checkpoint(stage):
 
 
 def test_a_trainer_that_does_not_end_is_killed_when_the_grace_period_is_over(stage):
-    """And the sidecars share that period: it is over for them too."""
+    """The sidecars share that period, so it is over for them too."""
     stubborn = "trap '' TERM; event run; while :; do sleep 0.02; done"
 
     code = stage.interrupt("main run", stage.container("a", stubborn), main=stubborn, grace_s=0.3)
@@ -170,7 +170,7 @@ def test_a_trainer_that_does_not_end_is_killed_when_the_grace_period_is_over(sta
 
 
 def test_a_pod_that_is_stopped_during_its_start_never_starts_the_trainer(stage):
-    """Ctrl-C counts from the first moment."""
+    """A Ctrl-C counts from the first moment."""
     slow = stage.container("slow", "event start; sleep 60", startup=ready(stage))
 
     code = stage.interrupt("slow start", slow, main="event run", grace_s=0.2)
@@ -180,7 +180,7 @@ def test_a_pod_that_is_stopped_during_its_start_never_starts_the_trainer(stage):
 
 
 def test_killing_ends_everything_at_once(stage):
-    """The second Ctrl-C does not wait for anybody."""
+    """After the second Ctrl-C nothing is waited for."""
     stubborn = "trap '' TERM; event run; while :; do sleep 0.02; done"
 
     code = stage.interrupt("main run", stage.container("a", stubborn), main=stubborn, grace_s=1000, kill=True)
@@ -189,7 +189,7 @@ def test_killing_ends_everything_at_once(stage):
 
 
 def test_what_a_container_left_behind_ends_with_the_pod(stage):
-    """A double fork into another session is out of reach for process groups."""
+    """Process groups do not include a process that forked twice into another session."""
     leave = "setsid bash -c 'trap \"\" TERM HUP; sleep 300' & disown; event run"
 
     code = stage.run(main=leave)
@@ -199,7 +199,7 @@ def test_what_a_container_left_behind_ends_with_the_pod(stage):
 
 @pytest.mark.parametrize("lack", [None, errno.ENOSYS, errno.EPERM])
 def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypatch):
-    """Old kernels (ENOSYS), seccomp filters (EPERM), and a Python that was built for an old kernel."""
+    """This covers old kernels (ENOSYS), seccomp filters (EPERM), and a Python built for an old kernel."""
     if lack is None:
         monkeypatch.delattr(os, "pidfd_open")
     else:
@@ -213,7 +213,7 @@ def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypa
 
 
 def test_a_pod_runs_on_a_system_without_pidfd(stage, monkeypatch):
-    """The ends of its processes are seen without it."""
+    """The pod detects the ends of its processes without it."""
     monkeypatch.setattr(os, "pidfd_open", failing(errno.EPERM))
 
     until = f"until grep -q start {stage.folder}/events; do sleep 0.01; done; exit 7"
@@ -225,7 +225,7 @@ def test_a_pod_runs_on_a_system_without_pidfd(stage, monkeypatch):
 
 
 def test_a_program_that_does_not_exist_ends_as_in_a_shell(stage):
-    """Exit code 127 is what people know for it."""
+    """Users know exit code 127 for this."""
     pod = stage.pod(main="exec /no/such/program")
 
     code = asyncio.run(pod.run())
@@ -234,7 +234,7 @@ def test_a_program_that_does_not_exist_ends_as_in_a_shell(stage):
 
 
 def test_output_goes_to_a_file_for_each_container(stage):
-    """Also what a crashed life of a container has said."""
+    """This includes the output of a container's life that crashed."""
     said = f"until grep -q hello {stage.folder}/logs/chatty.log; do sleep 0.01; done"
 
     stage.run(
@@ -248,7 +248,10 @@ def test_output_goes_to_a_file_for_each_container(stage):
 
 
 def test_a_log_of_a_program_that_prints_without_end_has_a_limit(stage):
-    """It would fill the disk and so end the run; both ends stay, and the exit code is the program's own."""
+    """It would fill the disk and end the run.
+
+    The log keeps its beginning and its end, and the exit code stays that of the program.
+    """
     code = stage.run(main='echo first; yes "$(printf %020000d 1)" | head -n 1500; echo last; exit 3')
 
     log = (stage.folder / "logs" / "main.log").read_text()

@@ -1,4 +1,4 @@
-"""`palaestra run` with the real ROS master and the real sidecars, and small programs as trainers."""
+"""`palaestra run` with the real ROS master and sidecars, and with small programs as trainers."""
 
 import fcntl
 import importlib.util
@@ -61,7 +61,7 @@ for simulator in config["simulators"]:
     sidecar.start()
 """
 TRAIN = START + WAIT
-# What `palaestra` does, by an interpreter that does not look where Debian puts rospy.
+# This is the program `palaestra`, run by an interpreter that does not look where Debian installs rospy.
 WITHOUT = """\
 import sys
 sys.path.remove(sys.argv.pop(1))
@@ -71,7 +71,7 @@ sys.exit(main())
 
 
 class Desk:
-    """A folder with a job file, at which a person types `palaestra run`."""
+    """A folder with a job file, in which a user types `palaestra run`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -98,13 +98,17 @@ class Desk:
         return self._started[-1]
 
     def clear(self) -> None:
-        """Kill the runs that a failed test has left, with all that is theirs."""
+        """Kill the runs that a failed test left, with all their processes."""
         for process in (each for each in self._started if each.poll() is None):
             process.kill()
             process.communicate()
 
     def training(self, eventually, program: str) -> tuple[subprocess.Popen, list[int]]:
-        """Start a run whose trainer starts its simulators; return it and its processes once all are there."""
+        """Start a run whose trainer starts its simulators.
+
+        Returns:
+            The run's process, and the process ids of all its processes once they exist.
+        """
         self.write(program)
         process = self.start()
         eventually((self.run_directory / "begun").exists)
@@ -112,7 +116,7 @@ class Desk:
         return process, [pid for pid, _ in below(process.pid)]
 
     def run(self, *options: str) -> tuple[int, str]:
-        """Return exit code and output of `palaestra run`."""
+        """Run `palaestra run`, and return its exit code and output."""
         process = self.start(*options)
         out, _ = process.communicate(timeout=PATIENCE_S)
         return process.returncode, out
@@ -120,7 +124,7 @@ class Desk:
 
 @pytest.fixture
 def desk(tmp_path):
-    """A person's desk."""
+    """Yield a folder for a user's commands."""
     desk = Desk(tmp_path)
     yield desk
     desk.clear()
@@ -141,7 +145,7 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 
 
 def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
-    """The policy is that of a run's directory, which a person types relative to the folder."""
+    """The policy is in another run's directory, which a user types relative to the folder."""
     other = desk.folder / "other"
     other.mkdir()
     with zipfile.ZipFile(other / "model.zip", "w") as archive:
@@ -162,7 +166,7 @@ def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_
 
 
 def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
-    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training goes on."""
+    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training continues."""
     desk.write(ASK)
 
     process = desk.start()
@@ -173,7 +177,7 @@ def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
 
 
 def test_the_run_directory_holds_what_was_run(desk):
-    """The source worlds, the configuration, the job, and a log for each container."""
+    """It contains the source worlds, the configuration, the job, and a log of each container."""
     desk.write(ASK)
 
     desk.run()
@@ -184,7 +188,7 @@ def test_the_run_directory_holds_what_was_run(desk):
 
 
 def test_fresh_begins_anew_and_keeps_the_old_run(desk):
-    """A second training beside the first."""
+    """The second training has its directory beside the first."""
     desk.write(ASK)
     desk.run()
 
@@ -196,7 +200,7 @@ def test_fresh_begins_anew_and_keeps_the_old_run(desk):
 
 
 def test_a_wrong_job_is_corrected_without_fresh(desk):
-    """Nothing was trained. What the trainer wrote is set aside, with its logs."""
+    """Nothing was trained, so the trainer's files are set aside together with its logs."""
     desk.write(REFUSE)
     refused, _ = desk.run()
     desk.write(ASK, seed=7)
@@ -210,7 +214,7 @@ def test_a_wrong_job_is_corrected_without_fresh(desk):
 
 
 def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
-    """And the first one does not notice."""
+    """The first run does not notice the second."""
     desk.write(WAIT)
     first = desk.start()
     eventually((desk.run_directory / "begun").exists)
@@ -225,7 +229,7 @@ def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
 
 
 def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, eventually):
-    """The same command resumes, on a machine as it was before."""
+    """The same command resumes the run, and no process of the first one is left on the machine."""
     process, pids = desk.training(eventually, TRAIN)
 
     process.send_signal(signal.SIGINT)
@@ -238,7 +242,7 @@ def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, event
 
 
 def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(desk, eventually):
-    """A second Ctrl-C means that there is no time for a checkpoint; the simulators must end all the same."""
+    """After a second Ctrl-C there is no time for a checkpoint, but the simulators must end all the same."""
     process, pids = desk.training(eventually, TRAIN.replace("sys.exit(75)", "(run / 'asked').touch()"))
     process.send_signal(signal.SIGINT)
     eventually((desk.run_directory / "asked").exists)
@@ -253,7 +257,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(des
 
 
 def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(desk, eventually):
-    """Its checkpoint was not written, and the person has asked for an end."""
+    """The trainer did not write its checkpoint, and the user wants to end."""
     desk.write(WAIT.replace("sys.exit(75)", "sys.exit('no room to save')"), replicas=2)
     process = desk.start()
     eventually((desk.run_directory / "begun").exists)
@@ -268,7 +272,7 @@ def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(d
 
 
 def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
-    """The deadline is the user's and may be raised: the run itself is intact."""
+    """The user sets the deadline and may increase it, because the run itself is intact."""
     desk.write(WAIT, activeDeadlineSeconds=1)
 
     code, out = desk.run()
@@ -280,7 +284,7 @@ def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
 
 
 def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
-    """The master, the sidecars and their simulators die with the runner, and the run can go on."""
+    """The master, the sidecars and their simulators end with the runner, and the run can continue."""
     process, pids = desk.training(eventually, TRAIN)
 
     process.kill()
@@ -293,7 +297,7 @@ def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
 
 
 def _processes_that_name(folder: Path) -> list[str]:
-    """Return the processes whose environment names the folder."""
+    """Return the processes whose environment contains the folder."""
     found = []
     for entry in os.scandir("/proc"):
         try:
@@ -306,7 +310,7 @@ def _processes_that_name(folder: Path) -> list[str]:
 
 
 def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
-    """And without it the screen is the trainer's."""
+    """Without the option only the trainer's output is on the screen."""
     desk.write("print('hello from the trainer')")
 
     _, out = desk.run("-v")
@@ -315,7 +319,7 @@ def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
 
 
 def test_a_failure_prints_its_last_lines_and_the_path_of_its_log(desk):
-    """A user sees why a run failed without looking for the log."""
+    """A user sees why a run failed without a search for the log."""
     desk.write("raise SystemExit('no such reward')")
 
     code, out = desk.run()
@@ -327,7 +331,7 @@ def test_a_failure_prints_its_last_lines_and_the_path_of_its_log(desk):
 
 
 def test_a_changed_job_is_refused_and_nothing_is_touched(desk):
-    """Its checkpoints belong to another training."""
+    """The checkpoints belong to a training with another job."""
     desk.write("raise SystemExit(1)", seed=1)
     desk.run()
     before = (desk.run_directory / "job.yaml").read_text()
@@ -341,7 +345,7 @@ def test_a_changed_job_is_refused_and_nothing_is_touched(desk):
 
 
 def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
-    """The person chose it, so the person chooses another."""
+    """The user chose the port, so the user must choose another one."""
     desk.write(ASK)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -355,7 +359,7 @@ def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
 
 
 def test_a_missing_rospy_is_one_line_and_nothing_is_written(desk):
-    """A ROS master alone is not enough: who would notice is the trainer, a minute later."""
+    """A ROS master alone is not enough: without the check the trainer would fail a minute later."""
     desk.write(ASK)
     before = sorted(desk.folder.rglob("*"))
     where = str(Path(importlib.util.find_spec("rospy").origin).parents[1])
@@ -375,7 +379,7 @@ def test_a_missing_rospy_is_one_line_and_nothing_is_written(desk):
 
 
 def test_replicas_run_one_after_another(desk):
-    """Each with its own seed and its own directory."""
+    """Each replica has its own seed and its own directory."""
     desk.write(ASK, replicas=2)
 
     code, out = desk.run()
@@ -390,7 +394,7 @@ def test_replicas_run_one_after_another(desk):
 
 
 def test_on_a_terminal_the_trainer_draws_and_the_log_stays_readable(desk):
-    """A progress bar that is redrawn is one line of the log."""
+    """A progress bar that is drawn several times is one line of the log."""
     bar = (
         "import sys; assert sys.stderr.isatty(); "
         "sys.stderr.write('\\r10%\\r\\x1b[2K20%\\x1b[0m\\n'); sys.stderr.flush()"
@@ -409,7 +413,7 @@ def test_on_a_terminal_the_trainer_draws_and_the_log_stays_readable(desk):
 
 
 def _read_to_the_end(terminal: int) -> bytes:
-    """Return what is written to a terminal until nobody writes any more."""
+    """Return the output on a terminal until all writers have closed it."""
     drawn = b""
     while True:
         try:
@@ -420,7 +424,7 @@ def _read_to_the_end(terminal: int) -> bytes:
 
 
 def test_a_differential_robot_drives_by_its_own_program(desk):
-    """No name and no --synchronize in the world, wheels of its own names, PROTOs from the network."""
+    """Its world has no name and no --synchronize, its wheels have other names, and its PROTOs are URLs."""
     desk.write(
         DRIVE,
         simulators=[rover()],

@@ -75,7 +75,7 @@ time.sleep(1000)
 
 @pytest.fixture
 def job(tmp_path):
-    """Return a builder of jobs as plain data, whose trainer is a small Python program."""
+    """Return a function that makes jobs as plain data, whose trainer is a small Python program."""
 
     def make(program, name="desk", **spec):
         file = tmp_path.with_name(f"{tmp_path.name}-{hash(program)}.py")
@@ -91,12 +91,12 @@ def job(tmp_path):
 
 
 def begun(run):
-    """Wait until the trainer of a run waits for its end."""
+    """Wait until the trainer of a run waits to be ended."""
     eventually(lambda: (run.directory / "begun").exists() or run.ended, PATIENCE_S)
 
 
 def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
-    """A notebook is run again from the top."""
+    """Users run a notebook again from its first cell."""
     with palaestra.run(job(END), runs=tmp_path) as run:
         readable, _, _ = select.select([run], [], [], PATIENCE_S)
         assert readable == [run]
@@ -111,7 +111,7 @@ def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
 
 
 def test_the_log_of_a_run_has_a_limit(job, tmp_path):
-    """It has the trainer's lines too, and an environment may print at every step."""
+    """The log also has the trainer's lines, and an environment may print at every step."""
     with palaestra.run(job(PRINT + END), runs=tmp_path) as run:
         result = run.result(PATIENCE_S)
 
@@ -139,7 +139,10 @@ def test_a_result_is_not_that_of_an_earlier_run(job, tmp_path):
 
 
 def test_two_runs_at_the_same_time_are_stopped_with_a_checkpoint(job, tmp_path):
-    """Each has its own ports, directory and end; a deadline that passes ends neither."""
+    """Each run has its own ports, directory and end.
+
+    A deadline that passes during a call ends neither.
+    """
     with (
         palaestra.run(job(WAIT), runs=tmp_path) as one,
         palaestra.run(job(WAIT, "b"), runs=tmp_path) as other,
@@ -157,7 +160,7 @@ def test_two_runs_at_the_same_time_are_stopped_with_a_checkpoint(job, tmp_path):
 
 
 def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
-    """Until it answers, the run is starting."""
+    """Before the trainer responds, the phase is `starting`."""
     with palaestra.run(job(ANSWER), runs=tmp_path) as run:
         first = run.progress
         progress = eventually(lambda: run.progress if run.progress.step else None, PATIENCE_S)
@@ -170,7 +173,7 @@ def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
 
 
 def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
-    """The call raises it; the log is not the only place."""
+    """The call raises the error, so that it is not only in the log."""
     with palaestra.run(job(WAIT), runs=tmp_path) as run:
         with pytest.raises(RunRefused, match="is at work there"):
             palaestra.run(job(WAIT), runs=tmp_path)
@@ -181,7 +184,7 @@ def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
 
 
 def test_mistakes_are_raised_before_anything_is_started(job, tmp_path):
-    """As exceptions of the call that made them."""
+    """The call with the mistake raises the exception."""
     with pytest.raises(SpecErrors, match=r"spec.seed: -1 is less than 0"):
         palaestra.run(job(END, seed=-1), runs=tmp_path)
     with pytest.raises(RunRefused, match="choose one with replica="):
@@ -196,7 +199,10 @@ def test_mistakes_are_raised_before_anything_is_started(job, tmp_path):
 
 @pytest.mark.parametrize("fork", ["", "os.fork() or time.sleep(1000)"], ids=["alone", "with-a-fork"])
 def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork):
-    """With a checkpoint; a forked child that still has the pipe changes nothing."""
+    """A checkpoint is saved.
+
+    This also holds if a forked child still has the pipe.
+    """
     (tmp_path / "job.yaml").write_text(json.dumps(job(WAIT)))
     script = NOTEBOOK.format(fork=fork)
     program = subprocess.Popen(
@@ -223,6 +229,6 @@ def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork)
 
 
 def outcome_of(directory: Path):
-    """Return the outcome of a run, None before its end."""
+    """Return the outcome of a run, or None before its end."""
     path = directory / "outcome.json"
     return json.loads(path.read_text()) if path.exists() else None

@@ -58,7 +58,7 @@ finish(1.0)
 
 @pytest.fixture
 def desk(tmp_path):
-    """Return a function that writes a sweep of a job with a program, and returns its file."""
+    """Return a function that writes a sweep of a job with a program and returns its file."""
 
     def write(program, **spec):
         (tmp_path / "program.py").write_text(COMMON + program)
@@ -89,7 +89,7 @@ def states(folder):
 
 
 def test_a_sweep_ends_with_a_table_a_picture_and_a_run_directory_a_seed(desk, tmp_path, capsys):
-    """A second time it prints the result and trains nothing."""
+    """The same command prints the result again without any training."""
     typed = ["sweep", str(desk(LEARN, matrix={RATE: [0.1, 0.2]}, seeds=2)), "--dir", str(tmp_path / "runs")]
 
     assert main(typed) == 0
@@ -108,7 +108,7 @@ def test_a_sweep_ends_with_a_table_a_picture_and_a_run_directory_a_seed(desk, tm
 
 
 def test_ctrl_c_ends_all_runs_with_a_checkpoint_and_the_same_command_resumes_them(desk, tmp_path):
-    """Two run, one waits for its turn."""
+    """Two trials run while the third one waits."""
     file = desk(WAIT_ONCE, matrix={RATE: [0.1, 0.2, 0.3]})
     command = [PALAESTRA, "sweep", file, "--dir", tmp_path / "runs", "--at-once", "2"]
     folder = tmp_path / "runs" / "s"
@@ -132,7 +132,7 @@ def test_ctrl_c_ends_all_runs_with_a_checkpoint_and_the_same_command_resumes_the
 
 
 def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
-    """It keeps its checkpoint, and the sweep goes on."""
+    """The trial keeps its checkpoint, and the sweep continues."""
     space = {RATE: {"low": 0.1, "high": 0.2}}
     file = desk(FIRST_IS_BEST, random=space, trials=3, optuna={"startupTrials": 1})
 
@@ -144,7 +144,7 @@ def test_a_trial_that_optuna_prunes_is_stopped(desk, tmp_path, capsys):
 
 
 def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
-    """Not after a night, when the last one comes."""
+    """Otherwise the mistake would appear only after a night, with the last trial."""
     file = desk(LEARN, matrix={"trainer.steps": [10, 0]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2
@@ -154,7 +154,7 @@ def test_every_trial_is_checked_before_the_first_begins(desk, tmp_path, capsys):
 
 
 def test_a_failed_trial_is_named_and_the_others_go_on(desk, tmp_path, capsys):
-    """The exit code is for scripts, the table for people."""
+    """The exit code is for scripts, and the table for users."""
     file = desk("finish(1.0)\nsys.exit(81 if rate > 0.1 else 0)\n", matrix={RATE: [0.2, 0.1]})
 
     assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 1
@@ -164,6 +164,9 @@ def test_a_failed_trial_is_named_and_the_others_go_on(desk, tmp_path, capsys):
 
 
 def test_a_run_keeps_as_many_processors_busy_as_it_has_collecting_simulators():
-    """They step at the same time; the trainer waits meanwhile, and the evaluating ones rest."""
+    """These simulators step at the same time.
+
+    The trainer waits in that time, and the evaluating simulators are idle.
+    """
     assert busy(job_of(EXAMPLES / "minimal.yaml")) == 1
     assert busy(job_of(EXAMPLES / "two-collectors.yaml")) == 2

@@ -1,4 +1,4 @@
-"""Operators to start, as for the operator's own tests."""
+"""The fixtures that start operators, shared with the operator's tests."""
 
 from tests.integration.operator.conftest import start
 

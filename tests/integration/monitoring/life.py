@@ -1,4 +1,4 @@
-"""What happens in the cluster that is scraped."""
+"""Events in the cluster that Prometheus scrapes."""
 
 from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import Place
@@ -7,17 +7,17 @@ from tests.waiting import eventually
 
 
 def address(operator: RunningOperator) -> str:
-    """Return where an operator serves its metrics, once it does."""
+    """Return the address at which an operator serves its metrics, once it does."""
     [line] = eventually(lambda: operator.said("started"))
     return str(line["address"])
 
 
 def diverge(place: Place, job: str = "unlucky") -> None:
-    """Let a job's replica be tried again once, and then diverge."""
+    """Make a job's replica fail once, start again and then diverge."""
     place.train(job)
     [first] = place.pods(job)
     place.run(first)
-    place.until("Running", job)  # else an operator that is slow sees it for the first time when it has ended
+    place.until("Running", job)  # otherwise a slow operator sees the pod for the first time after its end
     place.end(first, 1)
     [second] = place.pods(job)
     place.run(second)

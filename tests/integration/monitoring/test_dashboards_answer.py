@@ -1,4 +1,4 @@
-"""A real Prometheus scrapes a real run and a real operator: every panel and alert has something to go by."""
+"""A real Prometheus scrapes a real run and operator: the queries of every panel and alert return data."""
 
 import math
 from contextlib import suppress
@@ -10,9 +10,9 @@ from tests.monitoring.prometheus import NotAnswered, scraping
 from tests.monitoring.questions import looked_at, questions
 from tests.soak.jobs import LITTLE_DQN, make_job
 
-OVER, SHOWN = "30s", "10m"  # rates are taken over; the time range at the top of a dashboard
+OVER, SHOWN = "30s", "10m"  # range of the rates; the time range at the top of a dashboard
 ANSWERED_S = 150
-# A panel about faults has nothing to show without one.
+# Without a fault, a panel about faults would have no data.
 FAULTY = {
     "faults": "crash:step=60 lost:topic=ir1/value,every=25",
     "algorithm": LITTLE_DQN,
@@ -23,7 +23,7 @@ FAULTY = {
 
 
 def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(tmp_path, place, start):
-    """An empty panel, or an alert on something that nobody tells, is believed to say that all is well."""
+    """Users take an empty panel, or an alert without data, as a sign that all is well."""
     operator = start(elect=True)
     folder = tmp_path / "prometheus"
     folder.mkdir()
@@ -31,7 +31,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
 
     with LocalRun(tmp_path, make_job(**FAULTY)) as run:
         scraped = [*targets.of_run(run, place.name), targets.of_operator(address(operator))]
-        with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # told below, by its name
+        with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # reported below, by its name
             prometheus.until(lambda: prometheus.query("palaestra_operator_leader == 1"), ANSWERED_S)
             diverge(place)
             place.train("waiting")
@@ -42,7 +42,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
 
 
 def _drop_answered(asked, prometheus):
-    """Return what is left of the queries once those that give a number now are taken out."""
+    """Remove the queries that now return a number, and return the others."""
     asked[:] = [it for it in asked if not any(map(_is_number, prometheus.query(it.expr)))]
     return asked
 

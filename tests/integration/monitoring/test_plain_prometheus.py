@@ -1,8 +1,9 @@
 """The scrape configuration of docs/reference/metrics.md, in a real Prometheus.
 
-Debian's Prometheus is built without discovery in Kubernetes, so the discovered pods are played: each port of
-the recorded plan's pod and of the chart's, with the labels that Prometheus documents for the role `pod`.
-Source: https://prometheus.io/docs/prometheus/latest/configuration/configuration/#pod
+Debian's Prometheus is built without discovery in Kubernetes, so the tests play the discovered pods: each port
+of the recorded plan's pod and of the chart's. Each target has the labels for the role `pod` from https:
+
+prometheus.io/docs/prometheus/latest/configuration/configuration/#pod.
 """
 
 import re
@@ -23,7 +24,7 @@ PLAN = ROOT / "tests/golden/minimal.cluster.yaml"
 
 @pytest.fixture
 def written():
-    """The configuration of one scrape, as somebody copies it."""
+    """Write the configuration of one scrape, as a user copies it."""
     pages = blocks((ROOT / "docs/reference/metrics.md").read_text(), "yaml")
     [text] = [each for each in pages if "scrape_configs" in each]
     [scrape] = yaml.safe_load(text)["scrape_configs"]
@@ -32,7 +33,7 @@ def written():
 
 @pytest.fixture
 def played(written):
-    """Return the scrape with pods in the place of the discovery."""
+    """Return the scrape with static pods instead of the discovery."""
     assert written.pop("kubernetes_sd_configs") == [{"role": "pod"}]
 
     def discovering(*pods):
@@ -44,7 +45,7 @@ def played(written):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Where Prometheus keeps its things."""
+    """Return Prometheus's folder."""
     made = tmp_path / "prometheus"
     made.mkdir()
     return made
@@ -63,14 +64,14 @@ def operator():
 
 
 def stranger():
-    """Return a pod that has nothing to do with Palaestra, with a port of the same name."""
+    """Return a pod of another project which has a port with the same name."""
     container = {"name": "main", "ports": [{"name": "metrics", "containerPort": 9999}]}
     template = {"metadata": {"labels": {"app": "theirs"}}, "spec": {"containers": [container]}}
     return {"name": "theirs", "phase": "Running", "template": template}
 
 
 def discovered(name, phase, template):
-    """Yield a static target for each port of a pod, with the labels that the discovery gives it."""
+    """Yield a static target for each port of a pod, with the labels from the discovery."""
     labels = {"namespace": "lab", "pod_name": name, "pod_phase": phase}
     for key, value in template["metadata"]["labels"].items():
         safe = re.sub(r"[^a-zA-Z0-9_]", "_", key)
@@ -84,13 +85,16 @@ def discovered(name, phase, template):
 
 
 def found(prometheus, count):
-    """Return the labels of the targets once there are `count`; nothing answers, so `up` is 0."""
+    """Return the labels of the targets once there are `count`.
+
+    No program listens at them, so `up` is 0.
+    """
     up = [series["metric"] for series in prometheus.query("up")]
     return {tuple(map(each.get, LABELS)) for each in up} if len(up) >= count else None
 
 
 def test_promtool_finds_nothing_wrong_with_the_scrape_configuration(played, tmp_path):
-    """It is copied into a file whose other mistakes nobody wants to look for."""
+    """Users copy it into a file, and it must not add mistakes there."""
     file = tmp_path / "prometheus.yaml"
     file.write_text(yaml.safe_dump({"scrape_configs": [played()]}))
     command = [programs(PROGRAMS) / "promtool", "check", "config", file]

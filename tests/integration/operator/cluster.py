@@ -1,4 +1,4 @@
-"""A namespace of a control plane without nodes, and someone who plays its kubelet."""
+"""A namespace of a control plane without nodes, and methods that play its kubelet."""
 
 import itertools
 import json
@@ -29,7 +29,7 @@ numbers = itertools.count(1)
 
 
 def served(api: Api) -> bool:
-    """Return whether TrainingJobs can be made; discovery may still tell of a definition that is gone."""
+    """Return whether TrainingJobs can be created; discovery may still show a definition that was deleted."""
     try:
         api.list(TRAINING_JOBS)
     except NotFound:
@@ -57,7 +57,7 @@ def world_of(config_map: str) -> Object:
 
 
 def world_map() -> Object:
-    """Return a ConfigMap with a world, open to jobs."""
+    """Return a ConfigMap with a world, with the label that allows jobs to use it."""
     return {
         "apiVersion": "v1",
         "kind": "ConfigMap",
@@ -67,16 +67,16 @@ def world_map() -> Object:
 
 
 def local_queues() -> Object:
-    """Return the kind by which a cluster has heard of Kueue; the test plays it."""
+    """Return the kind whose existence shows that a cluster has Kueue; the test plays Kueue."""
     return kind_of_kueue("LocalQueue", "v1beta1")
 
 
 def kind_of_kueue(kind: str, version: str) -> Object:
-    """Return a kind of Kueue's that takes any fields."""
+    """Return a kind of Kueue that accepts any fields."""
     singular = kind.lower()
     names = {"kind": kind, "listKind": f"{kind}List", "plural": f"{singular}s", "singular": singular}
     schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
-    # A name of a group that belongs to Kubernetes' own projects needs their approval.
+    # Kinds in a group of Kubernetes' own projects need the approval of these projects.
     approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
     return {
         "apiVersion": "apiextensions.k8s.io/v1",
@@ -92,7 +92,7 @@ def kind_of_kueue(kind: str, version: str) -> Object:
 
 
 def stranger(name: str) -> Object:
-    """Return a Job that has nothing to do with Palaestra."""
+    """Return a Job that does not belong to Palaestra."""
     container = {"name": "main", "image": "theirs", "command": ["true"]}
     template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
     return {
@@ -104,7 +104,7 @@ def stranger(name: str) -> Object:
 
 
 class Place:
-    """A namespace, with what people and kubelets do there; `api` is an administrator's."""
+    """A namespace, with the actions of users and kubelets in it; `api` is an administrator's client."""
 
     def __init__(self, api: Api, prefix: str = "place") -> None:
         self.api = api
@@ -116,7 +116,7 @@ class Place:
         return self.api.create(resource, {**obj, "metadata": {**obj["metadata"], "namespace": self.name}})
 
     def get(self, resource: Resource, name: str) -> Object | None:
-        """Return an object, None if there is none."""
+        """Return an object, or None if it does not exist."""
         try:
             return self.api.get(resource, self.name, name)
         except NotFound:
@@ -132,16 +132,16 @@ class Place:
         return self.create(TRAINING_JOBS, training_job(name, **spec))
 
     def status(self, name: str = "job") -> Object:
-        """Return the status of a TrainingJob, empty where there is none."""
+        """Return the status of a TrainingJob, or an empty one."""
         return (self.get(TRAINING_JOBS, name) or {}).get("status") or {}
 
     def condition(self, kind: str, name: str = "job") -> Object:
-        """Return a condition of a TrainingJob, empty where it has none."""
+        """Return a condition of a TrainingJob, or an empty one."""
         conditions = self.status(name).get("conditions", [])
         return next((each for each in conditions if each["type"] == kind), {})
 
     def children(self, name: str = "job") -> dict[str, str]:
-        """Return kind and name of everything that was made for a TrainingJob, each with its uid."""
+        """Return kind and name of every object made for a TrainingJob, each with its uid."""
         return {
             f"{resource.kind}/{each['metadata']['name']}": each["metadata"]["uid"]
             for resource in KINDS
@@ -166,7 +166,7 @@ class Place:
         return self.status(name)
 
     def pods(self, name: str = "job", count: int = 1, deadline_s: float = DEADLINE_S) -> list[Object]:
-        """Return the pods of a TrainingJob once there are so many that have not ended."""
+        """Return the pods of a TrainingJob that have not ended, once there are this many."""
 
         def seen() -> list[Object]:
             alive = [
@@ -180,19 +180,19 @@ class Place:
         return list(eventually(seen, deadline_s))
 
     def run(self, pod: Object, address: str = "127.0.0.1") -> None:
-        """Let a pod run, as a kubelet tells it."""
+        """Set the status of a pod that runs, as a kubelet does."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         running = {"state": {"running": {"startedAt": now}}, "ready": True, "started": True}
         self._report(pod, "Running", running, podIP=address, podIPs=[{"ip": address}], startTime=now)
 
     def hold_up(self, pod: Object, reason: str, message: str) -> None:
-        """Let a kubelet wait before it starts the trainer of a pod."""
+        """Set the status of a pod whose trainer the kubelet does not start yet."""
         waiting = {"state": {"waiting": {"reason": reason, "message": message}}, "ready": False}
         trainer = {"name": "trainer", "image": "i", "imageID": "", "restartCount": 0, **waiting}
         self._patch(pod, {"phase": "Pending", "containerStatuses": [trainer]})
 
     def end(self, pod: Object, code: int = 0, word: Termination | None = None) -> None:
-        """Let a pod's trainer end with an exit code and a last word."""
+        """Set the status of a pod whose trainer has ended, with an exit code and a termination message."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         reason = "Error" if code else "Completed"
         ended = {"exitCode": code, "startedAt": now, "finishedAt": now, "reason": reason}
@@ -202,15 +202,15 @@ class Place:
         self._report(pod, "Failed" if code else "Succeeded", done)
 
     def take(self, pod: Object, reason: str, message: str, **status: Any) -> None:
-        """Say that the cluster takes a pod; keywords are more of its status."""
-        # Kubernetes takes back a disruption that it holds for older than two minutes.
+        """Set the condition of a pod that the cluster removes; keywords are other fields of its status."""
+        # Kubernetes removes a disruption condition that is older than two minutes.
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         taken = {"type": "DisruptionTarget", "status": "True", "lastTransitionTime": now}
         taken |= {"reason": reason, "message": message}
         self._patch(pod, {"conditions": [taken], **status})
 
     def kill(self, pod: Object, container: str) -> None:
-        """Let the kernel kill a sidecar of a running pod for its memory; it runs again at once."""
+        """Set the status of a running pod whose sidecar was killed for its memory and runs again at once."""
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         ended = {"exitCode": 137, "reason": "OOMKilled", "startedAt": now, "finishedAt": now}
         status = (self.get(PODS, pod["metadata"]["name"]) or pod)["status"]
@@ -220,7 +220,7 @@ class Place:
         self._patch(pod, {"initContainerStatuses": status["initContainerStatuses"]})
 
     def bind(self, pod: Object, node: str = "node-1") -> None:
-        """Let a scheduler give a pod to a node."""
+        """Bind a pod to a node, as a scheduler does."""
         name = pod["metadata"]["name"]
         target = {"apiVersion": "v1", "kind": "Node", "name": node}
         self.create(
@@ -228,7 +228,7 @@ class Place:
         )
 
     def complain(self, pod: Object, reason: str, message: str) -> None:
-        """Let a kubelet warn about a pod."""
+        """Write a kubelet's warning about a pod."""
         metadata = {"name": f"{pod['metadata']['name']}.1", "namespace": self.name}
         about = {
             "apiVersion": "v1",

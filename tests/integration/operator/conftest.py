@@ -1,4 +1,4 @@
-"""Operators to start, in the namespace of a test."""
+"""A fixture that starts operators in the namespace of a test."""
 
 import fcntl
 from collections.abc import Callable, Iterator
@@ -21,9 +21,10 @@ Start = Callable[..., RunningOperator]
 
 @pytest.fixture
 def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: Path) -> Iterator[Start]:
-    """A function that starts operators with the rights of an installation, for this namespace only.
+    """Yield a function that starts operators for this namespace, with the permissions of an installation.
 
-    Without election, unless a test asks for it: the tests share one Lease, so they elect one after another.
+    There is no election unless a test requires it. The tests share one Lease, so only one test at a time has
+    an election.
     """
     kubeconfig = control_plane.kubeconfig_of(USER, "system:serviceaccounts")
     started: list[RunningOperator] = []
@@ -33,7 +34,7 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
         election = "--leader-elect" if elect else "--no-leader-elect"
         if elect and not started:
             fcntl.flock(turn, fcntl.LOCK_EX)
-            with suppress(NotFound):  # what an earlier test left of the Lease would have to run out
+            with suppress(NotFound):  # otherwise the Lease of an earlier test would first have to expire
                 installed.delete(LEASES, NAMESPACE, NAME)
         log = tmp_path / f"operator-{len(started)}.log"
         common = (f"--namespace={place.name}", election, *options)

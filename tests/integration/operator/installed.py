@@ -1,4 +1,4 @@
-"""An operator as a process, with the rights of an installed one, and what it asked of the API server."""
+"""An operator as a process with the permissions of an installation, and its requests to the API server."""
 
 import os
 import re
@@ -38,7 +38,7 @@ class Asked:
 
     @property
     def counts(self) -> bool:
-        """Whether it is anything but a watch and the Lease."""
+        """Return whether it is neither a watch nor a request for the Lease."""
         return self.verb != "watch" and self.resource != "leases"
 
 
@@ -51,12 +51,15 @@ class Installed:
     port: int
 
     def rss_bytes(self) -> int:
-        """Return its resident memory now."""
+        """Return the process's present resident memory."""
         lines = Path(f"/proc/{self.process.pid}/status").read_text().splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmRSS:"))
 
     def requests(self) -> Counter[tuple[str, str]]:
-        """Return how often it asked, by verb and resource, from its own metrics; no watch, no Lease."""
+        """Return the numbers of requests by verb and resource, from the operator's own metrics.
+
+        Watches and requests for the Lease are left out.
+        """
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/metrics", timeout=10) as answer:
             families = list(text_string_to_metric_families(answer.read().decode()))
         return Counter(
@@ -71,7 +74,7 @@ class Installed:
         )
 
     def end(self) -> float:
-        """End it with SIGTERM and return the seconds that it took."""
+        """End the operator with SIGTERM and return the seconds that it took."""
         started = time.monotonic()
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(END_S)
@@ -79,7 +82,7 @@ class Installed:
 
 
 def asked(plane: ControlPlane) -> list[Asked]:
-    """Return all that any operator ever asked, watches and the Lease included, in order."""
+    """Return all requests of all operators in order, including watches and those for the Lease."""
     found = []
     for entry in plane.audit(USER):
         if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
@@ -99,7 +102,7 @@ def asked(plane: ControlPlane) -> list[Asked]:
 def operator(plane: ControlPlane, log: Path, *, in_a_pod: bool = False) -> Iterator[Installed]:
     """Run an operator until the block ends; its log goes to a file.
 
-    It has a kubeconfig, or in a pod the files of its account and the environment that its image sets.
+    It has a kubeconfig. In a pod it has the files of its account and the environment from its image instead.
     """
     with HeldPorts() as ports:
         port = ports.any()
@@ -126,7 +129,7 @@ def _kubeconfig(plane: ControlPlane) -> tuple[str, str]:
 
 
 def _in_a_pod(plane: ControlPlane) -> tuple[str, ...]:
-    """Return the command line of an operator with the files that a kubelet gives to its pod."""
+    """Return the command line of an operator that has the files of a pod's account."""
     account = plane.folder / "account"
     account.mkdir(exist_ok=True)
     *_, namespace, name = USER.split(":")
@@ -138,7 +141,10 @@ def _in_a_pod(plane: ControlPlane) -> tuple[str, ...]:
 
 
 def _environment(plane: ControlPlane) -> dict[str, str]:
-    """Return what the image sets, and what a kubelet does; no kubeconfig of the person is found."""
+    """Return the variables that the image and a kubelet set.
+
+    The operator finds no kubeconfig of the user.
+    """
     lines = re.findall(r"^ENV (.+)$", (ROOT / "operator" / "Dockerfile").read_text(), re.MULTILINE)
     of_image = dict(word.split("=", 1) for line in lines for word in line.split())
     there = {"KUBERNETES_SERVICE_HOST": LOOPBACK, "KUBERNETES_SERVICE_PORT": str(plane.port)}
@@ -146,11 +152,11 @@ def _environment(plane: ControlPlane) -> dict[str, str]:
 
 
 def wait_for(claim: Callable[[], bool], deadline_s: float, told: Callable[[], object]) -> None:
-    """Wait until a claim holds; at the deadline fail with what `told` returns."""
+    """Wait until a condition holds; after the deadline fail with the result of `told`."""
     ends = time.monotonic() + deadline_s
     while not claim():
         assert time.monotonic() < ends, f"not within {deadline_s} s: {told()}"
-        time.sleep(0.5)  # an API server that is polled must have time for its work
+        time.sleep(0.5)  # leave the API server time for its work
 
 
 def _ready(port: int) -> bool:

@@ -1,6 +1,6 @@
-"""An operator that dies: `mortal.py N operator …` kills itself once N writes were answered; 0: never.
+"""An operator that kills itself after the responses to N writes: `mortal.py N operator …`; 0 means never.
 
-Death comes after the API server has done the write and before the operator can do anything about it.
+It ends after the API server has done the write and before the operator can react to it.
 """
 
 import os
@@ -15,7 +15,7 @@ WRITES = {"create", "patch", "apply", "delete"}
 
 
 def die_after(writes: int) -> None:
-    """Let every operator of this process die after so many writes; the Lease's do not count."""
+    """Kill every operator of this process after this many writes, without those of the Lease."""
     count, lock = 0, threading.Lock()
     told = Metrics.request
 

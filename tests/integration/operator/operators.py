@@ -1,4 +1,4 @@
-"""Operators as processes: started with the rights of an installation, killed in any way."""
+"""Operators as processes with the permissions of an installation, which tests end in any way."""
 
 import signal
 import subprocess
@@ -18,10 +18,10 @@ class RunningOperator:
     """One operator; its log lines are in a file.
 
     Args:
-        kubeconfig: with whose rights it runs.
-        log: where its lines go.
-        options: more of the command line.
-        dies_after: it kills itself, with SIGKILL, as soon as so many writes were answered.
+        kubeconfig: contains the user with whose permissions it runs.
+        log: the file for its log lines.
+        options: further options of the command line.
+        dies_after: it kills itself with SIGKILL after the responses to this many writes.
     """
 
     def __init__(self, kubeconfig: Path, log: Path, *options: str, dies_after: int | None = None) -> None:
@@ -42,15 +42,15 @@ class RunningOperator:
             )
 
     def lines(self) -> list[dict[str, Any]]:
-        """Return its log lines, but for one that is being written."""
+        """Return its complete log lines, without one that is still being written."""
         return whole_lines(self._log)
 
     def said(self, event: str) -> list[dict[str, Any]]:
-        """Return its log lines with a message."""
+        """Return its log lines with the given message."""
         return [line for line in self.lines() if line["event"] == event]
 
     def ask(self, path: str) -> str:
-        """Return what it answers on its own port."""
+        """Return its response on its own port."""
         [started] = eventually(lambda: self.said("started"))
         with urllib.request.urlopen(f"http://{started['address']}{path}", timeout=END_S) as answer:
             return answer.read().decode()

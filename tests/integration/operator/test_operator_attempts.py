@@ -1,4 +1,4 @@
-"""The record of an attempt whose pod is gone, at a real API server, with a simulated kubelet."""
+"""The record of an attempt whose pod no longer exists, with a real API server and a simulated kubelet."""
 
 import pytest
 
@@ -25,12 +25,12 @@ SAVED = Termination(step=20, reason="Interrupted: SIGTERM received", log=("check
 
 
 def replica(place):
-    """Return what the status says of the replica."""
+    """Return the replica's part of the status."""
     return next(iter(place.status().get("replicas", ())), {})
 
 
 def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, control_plane):
-    """A pod's logs die with it; `kubectl describe` shows what is kept."""
+    """A pod's logs are deleted with it. `kubectl describe` shows what is kept."""
     start()
     place.train()
     [pod] = place.pods()
@@ -52,7 +52,7 @@ def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, contr
 
 
 def test_suspensions_are_counted_however_fast_they_follow(place, start):
-    """Times of the control plane are whole seconds; these are over sooner."""
+    """The control plane counts time in whole seconds, and these suspensions are shorter."""
     start()
     place.train()
     for _ in range(PAUSES):
@@ -70,20 +70,20 @@ def test_suspensions_are_counted_however_fast_they_follow(place, start):
 
 
 def evict(place, pod):
-    """Let the cluster take a pod, whose trainer saves and stops."""
+    """Evict a pod, whose trainer saves and stops."""
     place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
     place.end(pod, 75, SAVED)
 
 
 def lose(place, pod):
-    """Let a pod go with its node, as the garbage collector does once the Node object is gone."""
+    """Delete a pod with its node, as the garbage collector does once the Node object is deleted."""
     place.take(pod, "DeletionByPodGC", "node not found", phase="Failed")
     place.api.delete(PODS, place.name, pod["metadata"]["name"])
 
 
 @pytest.mark.parametrize("take", [evict, lose])
 def test_a_disruption_is_counted_and_reported_and_is_no_failure(take, place, start):
-    """With a backoffLimit of 0 the next pod is made all the same."""
+    """Even with a backoffLimit of 0 the next pod is created."""
     start()
     place.train(backoffLimit=0)
     [first] = place.pods()
@@ -104,7 +104,7 @@ def test_a_disruption_is_counted_and_reported_and_is_no_failure(take, place, sta
 
 
 def others(place, pod):
-    """Return the pods that have not ended, but for one."""
+    """Return the pods that have not ended, without the given one."""
     return [each for each in place.pods() if each["metadata"]["uid"] != pod["metadata"]["uid"]]
 
 
@@ -126,7 +126,7 @@ def test_a_simulator_that_was_killed_for_its_memory_is_reported_with_its_limit(p
 
 
 def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
-    """Only an event on the pod reports it; by its status the pod only starts."""
+    """Only an event on the pod reports this; the pod's status only shows that it starts."""
     start()
     place.train()
     [pod] = place.pods()
@@ -139,13 +139,16 @@ def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
 
 
 def marked(place, pod):
-    """Leave the mark of an operator that was killed between it and the eviction."""
+    """Set the mark of an operator that was killed before it could evict the pod."""
     mark = f"1 {pod['metadata']['uid']} TrainerNotStarted: the node forgot it"
     place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
 
 
 def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
-    """By a new operator too, which finds the mark at a pod that lives; the Job counts no failure."""
+    """This also holds for a new operator, which finds the mark while the pod lives.
+
+    The Job counts no failure.
+    """
     operator = start()
     place.train(backoffLimit=0)
     [first] = place.pods()

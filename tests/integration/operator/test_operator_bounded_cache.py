@@ -1,4 +1,4 @@
-"""What the operator keeps of large jobs, and that it plans from what the API server has."""
+"""The operator caches little of large jobs, and plans from the data of the API server."""
 
 import re
 from pathlib import Path
@@ -22,7 +22,7 @@ def with_worlds(*texts):
 
 
 def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, start):
-    """The cache holds digests; pods get what the author wrote."""
+    """The cache has digests; pods get the author's text."""
     world = builtin("arena").decode() + "# " + "x" * 1000 + "\n"
     start()
 
@@ -34,7 +34,7 @@ def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, star
 
 
 def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(place, start):
-    """Free fields are judged by the operator alone, and are not cached when they are large."""
+    """Only the operator checks free fields, and large ones are not cached."""
     start()
 
     place.train(trainer={"algorithm": {"hyperparameters": {"x": [0] * 30_000}}})
@@ -44,13 +44,16 @@ def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(p
 
 
 def all_have_failed(place):
-    """Return whether every TrainingJob here is refused; as a table, which holds no worlds."""
+    """Return whether every TrainingJob here is refused.
+
+    The request is for a table, which contains no worlds.
+    """
     rows = place.api.table(TRAINING_JOBS, place.name)["rows"]
     return [row["cells"][1] for row in rows] == ["Failed"] * LARGE
 
 
 def test_large_jobs_that_are_refused_leave_the_operator_small(place, start):
-    """They are there before it starts, so it reads them all at once."""
+    """The jobs exist before the operator starts, so it reads them all at once."""
     worlds = with_worlds(*(["x" * 180_000] * 5))
     for number in range(LARGE):
         place.create(TRAINING_JOBS, training_job(f"job-{number}", **worlds))

@@ -1,4 +1,4 @@
-"""What `kubectl get` shows of TrainingJobs, and what it can select, at a real API server."""
+"""The columns of TrainingJobs in `kubectl get` and the fields for selection, with a real API server."""
 
 import itertools
 
@@ -13,7 +13,7 @@ SAVED = CheckpointStatus(step=20, time="2026-01-31T12:00:00Z")
 
 @pytest.fixture
 def kubectl(control_plane, place):
-    """Return the lines that kubectl prints about this namespace."""
+    """Return a function that returns kubectl's lines about this namespace."""
 
     def typed(*words):
         done = control_plane.kubectl("get", "--namespace", place.name, *words)
@@ -24,7 +24,7 @@ def kubectl(control_plane, place):
 
 
 def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start, kubectl):
-    """A world that is missing and an image that is wrong both read `Pending 0/1`."""
+    """Otherwise a missing world and a wrong image would both read `Pending 0/1`."""
     start()
     place.train("no-world", **world_of("nowhere"))
     place.train("no-image", trainer={"steps": 7000})
@@ -34,14 +34,14 @@ def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start
     def rows():
         headings, *jobs = (line.split() for line in kubectl("tj"))
         assert headings == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET", "SUCCESS", "AGE"]
-        return [job[:5] for job in jobs]  # no step yet, so the target is the fifth word
+        return [job[:5] for job in jobs]  # without a step, the target is the fifth word
 
     image, world = ["Pending", "ImagePull", "0/1", "7000"], ["Pending", "WorldMissing", "0/1", "50000"]
     eventually(lambda: rows() == [["no-image", *image], ["no-world", *world]])
 
 
 def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubectl):
-    """Whether a replica starts again and again, where, and what a failure now would cost."""
+    """They show the restarts of a replica, its node, and what a failure now would cost."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):
@@ -62,7 +62,7 @@ def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubec
 
 
 def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, control_plane):
-    """A heading with nothing below it looks like something that is missing."""
+    """A heading with nothing below it looks as if something were missing."""
     start()
     place.train()
     [pod] = place.pods()
@@ -78,7 +78,7 @@ def test_kubectl_describe_shows_no_empty_field_of_the_status(place, start, contr
 
 
 def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):
-    """A namespace with hundreds of jobs is asked for those that run, without a download of all."""
+    """In a namespace with hundreds of jobs, kubectl can request only those that run."""
     start()
     place.train("waits", scheduling={"queueName": "trainings"})
     place.train("runs")
@@ -96,7 +96,7 @@ def test_kubectl_selects_jobs_by_phase_and_by_queue(place, start, kubectl):
 
 @pytest.mark.parametrize("category", ["all", "palaestra"])
 def test_kubectl_get_all_lists_training_jobs_too(place, kubectl, category):
-    """`kubectl get all` is what people type into a namespace that they do not know."""
+    """Users type `kubectl get all` in a namespace that they do not know."""
     place.train()
 
     assert "trainingjob.palaestra.dev/job" in kubectl(category, "-o", "name")

@@ -1,4 +1,4 @@
-"""An operator in a cluster whose definition of TrainingJobs is of another release."""
+"""An operator in a cluster with the TrainingJob definition of another release."""
 
 import json
 from contextlib import suppress
@@ -24,7 +24,7 @@ BEFORE = ["Accepted", "Running", "Suspended", "Succeeded", "Failed"]
 
 @pytest.fixture
 def older(tmp_path):
-    """A control plane whose definition lacks a field of a status, and two types of conditions."""
+    """Yield a control plane whose definition lacks a field of the status and two types of conditions."""
     definition = json.loads(json.dumps(crd()))
     [version] = definition["spec"]["versions"]
     status = version["schema"]["openAPIV3Schema"]["properties"]["status"]["properties"]
@@ -43,14 +43,17 @@ def older(tmp_path):
 
 
 def published(api):
-    """Return the schema that the API server publishes of TrainingJobs, None while it has none."""
+    """Return the published schema of TrainingJobs, or None if it is not published yet."""
     with suppress(NotFound):
         return api.schema(API_VERSION, KIND)
     return None
 
 
 def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
-    """`crds.install: false`, and an administrator who did not apply the new one: new fields are dropped."""
+    """The API server drops new fields.
+
+    This happens with `crds.install: false`, if the administrator did not apply the new definition.
+    """
     kubeconfig = older.kubeconfig_of(USER, "system:serviceaccounts")
     operator = RunningOperator(kubeconfig, tmp_path / "operator.log", "--no-leader-elect")
     try:
@@ -64,7 +67,7 @@ def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
 
 
 def test_the_definition_of_this_release_is_asked_for_once(place, start, installed):
-    """The rights of an installation are enough to read it; then nothing is asked any more."""
+    """The permissions of an installation are enough to read it, and no second request follows."""
     eventually(lambda: published(installed))
     operator = start()
     place.train()

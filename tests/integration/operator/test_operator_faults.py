@@ -1,4 +1,4 @@
-"""An operator may be killed at any write, be there twice, or be replaced: the end is the same."""
+"""An operator may be killed at any write, run twice, or be replaced: the end is the same."""
 
 import threading
 import time
@@ -18,7 +18,7 @@ LEASE_S = 15.0
 
 
 def creations(control_plane, namespace):
-    """Return how many objects of each kind were created in a namespace, by any client."""
+    """Return the number of objects of each kind that all clients created in a namespace."""
     counts = {}
     for event in control_plane.audit(namespace):
         target = event.get("objectRef", {})
@@ -30,7 +30,7 @@ def creations(control_plane, namespace):
 
 @pytest.mark.parametrize("write", range(1, WRITES + 1))
 def test_killed_after_any_write_it_ends_the_same(write, place, start, control_plane):
-    """Compared are what was created, by the API server's own record, and the end."""
+    """The end is the same, and by the API server's audit log the created objects are the same too."""
     mortal = start(dies_after=write)
     successor = threading.Thread(target=lambda: (mortal.wait(60), start()))
     successor.start()
@@ -59,7 +59,7 @@ def test_killed_after_any_write_it_ends_the_same(write, place, start, control_pl
 
 
 def test_two_operators_at_once_make_no_second_pod(place, start, control_plane):
-    """Safety comes from names, not from locks: both believe that they lead."""
+    """Names protect the objects, not locks, because here both operators believe that they lead."""
     start()
     start()
     for i in range(3):
@@ -76,7 +76,7 @@ def test_two_operators_at_once_make_no_second_pod(place, start, control_plane):
 
 
 def test_a_dead_leader_is_followed(place, start):
-    """Nobody gives the Lease back: it runs out."""
+    """The killed leader does not release the Lease, which therefore expires."""
     first = start(elect=True)
     eventually(lambda: first.said("leads"))
     second = start(elect=True)
@@ -90,7 +90,7 @@ def test_a_dead_leader_is_followed(place, start):
 
 
 def test_it_ends_within_two_seconds_of_sigterm_and_gives_the_lease_back(place, start):
-    """A node that is drained does not wait for the operator, nor does its successor."""
+    """Neither the drain of a node nor the next leader waits for the operator."""
     operator = start(elect=True)
     place.train()
     place.pods()
@@ -104,7 +104,7 @@ def test_it_ends_within_two_seconds_of_sigterm_and_gives_the_lease_back(place, s
 
 
 def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
-    """Images are fixed when a job is accepted; a new release is for new jobs."""
+    """A job keeps the images of its acceptance, so a new release is only for new jobs."""
     old = start("--trainer-image=trainer:1")
     place.train()
     [pod] = place.pods()
@@ -125,7 +125,7 @@ def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
 
 
 def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, start):
-    """`kubectl delete job` of a running replica is a restart, not an upgrade."""
+    """`kubectl delete job` of a running replica restarts it without an upgrade."""
     start("--trainer-image=trainer:1")
     place.train()
     place.pods()
@@ -142,7 +142,7 @@ def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, sta
 
 
 def test_a_job_that_cannot_be_read_delays_no_other(place, start):
-    """The status reports a mistake that the API server let through; the other job still starts."""
+    """The status reports a mistake that the API server accepted; the other job still starts."""
     start("--workers=1")
     place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
     place.train("right")

@@ -1,4 +1,4 @@
-"""What GitOps tools conclude from a job, with kstatus' own rules: Helm 4 waits by them, as Flux does.
+"""GitOps tools judge a job by the rules of kstatus: Helm 4 waits by them, as Flux does.
 
 The commands are those of docs/howto/gitops.md.
 """
@@ -24,7 +24,10 @@ TYPED_S = 60
 
 @pytest.fixture
 def type_in(control_plane, place, tmp_path):
-    """Type commands where the namespace of the test is the current one; return the code and all output."""
+    """Return a function that types commands and returns the exit code and all output.
+
+    The namespace of the test is the current one.
+    """
     where = {"KUBECONFIG": str(control_plane.kubeconfig), "HELM_NAMESPACE": place.name}
     terminal = Terminal(tmp_path, path=programs(("helm",)), **where)
     return lambda text: terminal.try_(text, TYPED_S)
@@ -32,7 +35,7 @@ def type_in(control_plane, place, tmp_path):
 
 @pytest.fixture
 def values(tmp_path, type_in):
-    """`values(spec, suspend=True)`: write the chart of the page, with other values."""
+    """Return `values(spec, suspend=True)`, which writes the chart of the page with other values."""
     type_in(TYPED.rpartition("helm upgrade")[0])
 
     def write(spec, **changeable):
@@ -43,13 +46,13 @@ def values(tmp_path, type_in):
 
 
 def only_job(place):
-    """Return the name of the only TrainingJob of a namespace, once there is one."""
+    """Return the name of the only TrainingJob in a namespace, once it exists."""
     [job] = eventually(lambda: place.all(TRAINING_JOBS))
     return job["metadata"]["name"]
 
 
 def test_helm_waits_until_the_job_trains(place, start, type_in):
-    """The commands of the page work as they stand, while a kubelet starts the pod."""
+    """The commands of the page work as written, while a kubelet starts the pod."""
     start()
     with ThreadPoolExecutor(1) as threads:
         typed = threads.submit(type_in, TYPED)
@@ -66,7 +69,7 @@ def test_helm_waits_until_the_job_trains(place, start, type_in):
 
 
 def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in, values):
-    """It ended in a tenth of a second, and the release was deployed."""
+    """Once, Helm ended within a tenth of a second and called the release deployed."""
     start()
     values(world_of("nowhere"))
 
@@ -84,7 +87,7 @@ def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in
 
 
 def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
-    """An operator that is away would make every release a success."""
+    """Otherwise every release would succeed while the operator is absent."""
     values({"trainer": {"steps": 100}})
 
     code, output = type_in(UPGRADE.replace("15m", "3s"))
@@ -97,7 +100,10 @@ def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
 
 
 def test_helm_replaces_a_job_whose_spec_changed_and_keeps_one_that_is_resumed(place, start, type_in, values):
-    """A spec cannot be changed, so the name has a hash of it, but not of what can be changed."""
+    """A spec cannot be changed, so the job's name has a hash of it.
+
+    The hash leaves out the fields that can be changed.
+    """
     start()
     values({"trainer": {"steps": 100}}, suspend=True)
     assert type_in(UPGRADE)[0] == 0

@@ -1,4 +1,4 @@
-"""A TrainingJob from apply to its end, at a real API server, with a kubelet that is played."""
+"""A TrainingJob from apply to its end, with a real API server and a simulated kubelet."""
 
 import pytest
 
@@ -13,7 +13,7 @@ DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 
 
 def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
-    """What `kubectl apply` and `kubectl get tj -w` show."""
+    """These are the steps that `kubectl apply` and `kubectl get tj -w` show."""
     start()
     place.train(replicas=2)
 
@@ -30,12 +30,12 @@ def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
     assert place.condition("Succeeded")["status"] == "True"
     assert status["successRate"] == 0.9
     assert status["step"] == 20
-    assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # told once the status is written
+    assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # emitted after the status
 
 
 @pytest.mark.parametrize("prefix", ["1team"])
 def test_a_job_in_a_namespace_that_begins_with_a_digit_runs(place, start):
-    """RFC 1123 allows it; every job in it failed."""
+    """RFC 1123 allows such names, but once every job in them failed."""
     start()
     place.train()
     [pod] = place.pods()
@@ -46,7 +46,7 @@ def test_a_job_in_a_namespace_that_begins_with_a_digit_runs(place, start):
 
 
 def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(place, start):
-    """`kubectl delete job` of something finished tidies up; it does not start hours of work."""
+    """`kubectl delete job` of a finished Job only removes it and does not start hours of work."""
     start()
     place.train()
     [pod] = place.pods()
@@ -71,7 +71,7 @@ def bound(place):
 
 
 def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
-    """The run outlives the job; owner references take the rest, no finalizer of ours is needed."""
+    """The run outlives the job. Owner references delete the rest, so we need no finalizer."""
     start()
     made = place.train()
     place.pods()
@@ -85,7 +85,7 @@ def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
 
 
 def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
-    """It holds no run, and claims of jobs that never began filled the quota of the namespace."""
+    """It contains no run. Once, claims of jobs that never began filled the quota of the namespace."""
     start()
     place.train("idle", suspend=True, replicas=2)
     place.train()
@@ -98,7 +98,7 @@ def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
 
 
 def test_a_claim_that_was_never_bound_goes_although_its_job_is_made_again(place, start):
-    """Its name has the uid of the job before, so nothing would ever use it."""
+    """Its name has the uid of the earlier job, so no job would ever use it."""
     place.train(suspend=True)
     first = start()
     eventually(lambda: place.all(CLAIMS))
@@ -121,7 +121,7 @@ def claim_or_other(name):
 
 
 def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
-    """`kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
+    """A user suspends with `kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
     start()
     place.train()
     place.pods()
@@ -137,7 +137,11 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 
 
 def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(place, start):
-    """`kubectl wait` for Suspended returned before the checkpoint, for Running on the pod that saved it."""
+    """`kubectl wait` would return too early otherwise.
+
+    Once it returned for Suspended before the checkpoint, and for Running while the old pod saved that
+    checkpoint.
+    """
     start()
     place.train()
     [pod] = place.pods()
@@ -160,14 +164,14 @@ def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(plac
 
 
 def claim(name):
-    """Return a claim that is open to jobs."""
+    """Return a claim with the label that allows jobs to use it."""
     spec = {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "1Gi"}}}
     metadata = {"name": name, "labels": FOR_JOBS}
     return {"apiVersion": "v1", "kind": "PersistentVolumeClaim", "metadata": metadata, "spec": spec}
 
 
 def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
-    """Pods that run go on; one that would start again is a new one."""
+    """Running pods continue, but a pod that would start again is a new one."""
     start()
     place.create(CLAIMS, claim("runs"))
     place.train(storage={"existingClaim": "runs"})
@@ -185,7 +189,7 @@ def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
 
 
 def test_a_job_of_another_controller_is_left_alone(place, start):
-    """`managedBy` says whose it is."""
+    """The field `managedBy` names the controller."""
     start()
     place.train("theirs", managedBy="example.com/other")
     place.train("ours")
@@ -196,7 +200,7 @@ def test_a_job_of_another_controller_is_left_alone(place, start):
 
 
 def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, start):
-    """Order of `kubectl apply` does not matter."""
+    """The order of `kubectl apply` does not matter."""
     start()
     place.train(**world_of("world"))
     eventually(lambda: place.condition("Accepted").get("reason") == "WorldMissing")
@@ -208,7 +212,7 @@ def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, 
 
 
 def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
-    """Writing a TrainingJob must not open what its author could not open before."""
+    """A TrainingJob must not give its author access to other objects."""
     start()
     world = world_map()
     del world["metadata"]["labels"]
@@ -235,7 +239,7 @@ def test_a_taken_name_is_reported_and_the_job_starts_when_it_is_free(place, star
 
 
 def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
-    """`ttlSecondsAfterFinished` is about the object; the claim is somebody's result."""
+    """`ttlSecondsAfterFinished` is about the object; a user still needs the result in the claim."""
     start()
     place.train(ttlSecondsAfterFinished=1)
     [pod] = place.pods()
@@ -249,7 +253,7 @@ def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
 
 
 def test_a_trained_job_without_its_claim_waits_for_a_person(place, start, control_plane):
-    """A new claim is empty, and the training would begin at step 0 without a word."""
+    """A new claim is empty, so the training would begin at step 0 without a message."""
     start()
     place.train(backoffLimit=0)
     [pod] = place.pods()

@@ -1,4 +1,4 @@
-"""What others do to objects of ours: it is reported and left alone, as no two programs may fight."""
+"""Changes of our objects by others are reported and left alone, because no two programs may fight."""
 
 import pytest
 
@@ -17,7 +17,7 @@ from tests.integration.operator.installed import USER
 from tests.waiting import eventually
 
 SUSPEND_SET = "palaestra.dev/suspend-set"
-QUEUE = "kueue"  # the field manager, as an API server takes it from the User-Agent
+QUEUE = "kueue"  # the field manager, which an API server takes from the User-Agent
 
 
 def as_kueue(place, control_plane, *, suspend, name="job-0"):
@@ -29,7 +29,7 @@ def as_kueue(place, control_plane, *, suspend, name="job-0"):
 
 
 def patches(control_plane, place):
-    """Return how many patches of Jobs the operator has made in a namespace; a refused one changes nothing."""
+    """Return the number of the operator's patches of Jobs in a namespace, without the refused ones."""
     wanted = {"resource": "jobs", "namespace": place.name}
     return sum(
         each["verb"] == "patch" and each["user"].get("username") == USER
@@ -39,20 +39,20 @@ def patches(control_plane, place):
 
 
 def message(place, name="job"):
-    """Return what the status says of the first replica."""
+    """Return the message in the status of the first replica."""
     replicas = place.status(name).get("replicas") or [{}]
     return replicas[0].get("message", "")
 
 
 def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, control_plane):
-    """Kueue with manageJobsWithoutQueueName suspends it whenever it is resumed."""
+    """Kueue with manageJobsWithoutQueueName suspends the Job each time it is resumed."""
     start()
     place.train()
     place.pods()
 
     as_kueue(place, control_plane, suspend=True)
     eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, not by spec.suspend"))
-    place.train("later")  # the operator has looked at all there is, and gone on
+    place.train("later")  # after this job the operator has looked at everything before it
     place.pods("later")
 
     assert patches(control_plane, place) == 0
@@ -61,7 +61,10 @@ def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, cont
 
 
 def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place, start, control_plane):
-    """Created with it, and patched together with `spec.suspend`."""
+    """An annotation records it.
+
+    It is created with the Job and patched together with `spec.suspend`.
+    """
     start()
     place.train()
     place.pods()
@@ -78,8 +81,8 @@ def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place,
     assert patches(control_plane, place) == 2
 
 
-def test_a_job_of_an_earlier_release_that_is_suspended_is_taken_as_it_stands(place, start, control_plane):
-    """It has no annotation; the operator that follows neither resumes it nor adds one."""
+def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start, control_plane):
+    """The patch sets the annotation too; a suspension after it is left alone."""
     first = start()
     place.train()
     place.pods()
@@ -88,14 +91,16 @@ def test_a_job_of_an_earlier_release_that_is_suspended_is_taken_as_it_stands(pla
     as_kueue(place, control_plane, suspend=True)
 
     start()
+    eventually(lambda: place.get(JOBS, "job-0")["spec"]["suspend"] is False)
+    as_kueue(place, control_plane, suspend=True)
     eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, "))
 
-    assert patches(control_plane, place) == 0
-    assert SUSPEND_SET not in place.get(JOBS, "job-0")["metadata"].get("annotations", {})
+    assert patches(control_plane, place) == 1
+    assert place.get(JOBS, "job-0")["metadata"]["annotations"][SUSPEND_SET] == "false"
 
 
 def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
-    """Its claim is another, so that nothing has to wait for a kubelet that does not answer."""
+    """It has another claim, so that nothing has to wait for a kubelet that does not respond."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):
@@ -110,7 +115,7 @@ def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
 
 
 def test_a_replica_that_waits_for_an_old_pod_on_the_same_claim_says_so(place, start):
-    """Which pod, on which node; it starts when that is gone."""
+    """The status names the pod and its node. The replica starts once that pod is gone."""
     start()
     place.create(CLAIMS, shared_claim())
     place.train(storage={"existingClaim": "shared"})
@@ -124,13 +129,13 @@ def test_a_replica_that_waits_for_an_old_pod_on_the_same_claim_says_so(place, st
     assert old["metadata"]["name"] in message(place)
     assert "node-1" in message(place)
     assert place.get(JOBS, "job-0") is None
-    place.end(old, code=75)  # the machine is back, and its kubelet tells
+    place.end(old, code=75)  # the machine works again, and its kubelet reports
 
     assert place.pods()
 
 
 def shared_claim():
-    """Return a claim that is open to jobs."""
+    """Return a claim with the label that allows jobs to use it."""
     return {
         "apiVersion": "v1",
         "kind": "PersistentVolumeClaim",
@@ -140,7 +145,10 @@ def shared_claim():
 
 
 def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
-    """Preconditions hold at the API server: the time to live is removed, the Job resumed, in between."""
+    """The API server checks preconditions.
+
+    Between decision and action, the time to live is removed and the Job resumed.
+    """
     writer = FencedClient(installed, lambda: True)
     acting = Executor(installed, writer, ForeignJobs(installed), RejectedCreations())
     place.train()
@@ -170,9 +178,10 @@ def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
 
 @pytest.mark.parametrize("write", [0, 1, 3])
 def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, place, start, control_plane):
-    """A queue would admit it later and preempt others; an operator that is killed at any write is followed.
+    """A queue would admit it later and preempt others; another operator continues after a kill at any write.
 
-    The writes are its mark, the other's stop, the status and the deletion; 0: it lives.
+    The writes are the operator's mark, the stop of the other Job, the status and the deletion. With 0 no
+    operator is killed.
     """
     first = start()
     place.train(replicas=2, activeDeadlineSeconds=6)
@@ -198,12 +207,12 @@ def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, pl
         if made.items() <= each.get("objectRef", {}).items() and each["user"].get("username") == USER
     ]
     assert verbs.count("create") == 1
-    # The one that follows may still see a Job whose deletion was the last write of the one before.
+    # The next operator may still see a Job whose deletion was the last write of the one before.
     assert 1 <= verbs.count("delete") <= (2 if write else 1)
 
 
 def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):
-    """The edit may have had a reason, so it stays; the author of the job has to know of it."""
+    """The edit may have had a reason, so it stays, but the author of the job must know of it."""
     start()
     place.train()
     place.pods()
@@ -212,7 +221,7 @@ def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_pl
     place.api.merge(NETWORK_POLICIES, place.name, policy["metadata"]["name"], {"spec": {"ingress": None}})
     place.api.merge(JOBS, place.name, "job-0", {"spec": {"parallelism": 0}})
     eventually(lambda: len(edits(place)) == 2)
-    start()  # another operator sees the same
+    start()  # another operator sees the same edits
     place.train("later")
     place.pods("later")
 

@@ -1,4 +1,4 @@
-"""Why a job waits in a queue is in its status, at a real API server; the test plays Kueue."""
+"""The status contains the reason why a job waits in a queue, with a real API server; the test plays Kueue."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ SHORT = "couldn't assign flavors to pod set main: insufficient unused quota for 
 
 
 def playing(installed, version):
-    """Serve kinds of Kueue's for a while, Workloads in this version."""
+    """Serve kinds of Kueue for a time, with Workloads in the given version."""
     kinds = (local_queues(), kind_of_kueue("Workload", version))
     for each in kinds:
         installed.create(DEFINITIONS, each)
@@ -36,7 +36,7 @@ def playing(installed, version):
 
 
 def there(api, resource):
-    """Return whether objects of a kind can be made."""
+    """Return whether objects of a kind can be created."""
     try:
         api.list(resource)
     except NotFound:
@@ -46,19 +46,19 @@ def there(api, resource):
 
 @pytest.fixture
 def kueue(installed):
-    """A cluster that has heard of Kueue and its Workloads."""
+    """Provide a cluster that has Kueue and its Workloads."""
     yield from playing(installed, "v1beta2")
 
 
 @pytest.fixture
 def old_kueue(installed):
-    """A cluster with a Kueue of which Workloads are of an earlier version."""
+    """Provide a cluster with a Kueue whose Workloads have an earlier version."""
     yield from playing(installed, "v1beta1")
 
 
 @pytest.fixture
 def old_role(installed):
-    """The operator's role without Workloads, as earlier releases have it."""
+    """The operator's role without Workloads, as a role that was not updated may be."""
     rules = installed.get(ROLES, None, NAME)["rules"]
     others = [each for each in rules if each["apiGroups"] != [GROUP]]
     installed.merge(ROLES, None, NAME, {"rules": others})
@@ -69,7 +69,7 @@ def old_role(installed):
 
 
 def allowed(api):
-    """Return whether the operator may list Workloads, as the API server sees it by now."""
+    """Return whether the API server already allows the operator to list Workloads."""
     asked = {"group": GROUP, "resource": "workloads", "verb": "list", "namespace": "default"}
     review = {"apiVersion": RIGHTS.api_version, "kind": RIGHTS.kind, "metadata": {}}
     return api.create(RIGHTS, {**review, "spec": {"user": USER, "resourceAttributes": asked}})["status"][
@@ -84,7 +84,7 @@ def job_in_queue(place):
 
 
 def not_admitted(place, job, message):
-    """Let Kueue say why a Job is not admitted."""
+    """Write Kueue's reason why a Job is not admitted."""
     reserved = {"type": "QuotaReserved", "status": "False", "reason": "Pending", "message": message}
     metadata = {
         "name": "job-job-0-1a2b3",
@@ -96,12 +96,12 @@ def not_admitted(place, job, message):
 
 
 def message(place):
-    """Return what the status says of the first replica."""
+    """Return the message in the status of the first replica."""
     return (place.status().get("replicas") or [{}])[0].get("message", "")
 
 
 def lists(control_plane, place):
-    """Return the answers to the operator's requests for Workloads, as HTTP codes."""
+    """Return the HTTP codes of the responses to the operator's requests for Workloads."""
     wanted = {"resource": "workloads", "namespace": place.name}
     return [
         each["responseStatus"]["code"]
@@ -112,7 +112,7 @@ def lists(control_plane, place):
 
 @pytest.mark.usefixtures("kueue")
 def test_the_words_of_kueue_are_in_the_status(place, start):
-    """An author may read the TrainingJob, and need not be allowed to read Workloads."""
+    """The author can read the TrainingJob, and need not have permission to read Workloads."""
     start()
     not_admitted(place, job_in_queue(place), SHORT + "x" * LONGEST_FACT)
 
@@ -125,7 +125,7 @@ def test_the_words_of_kueue_are_in_the_status(place, start):
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start):
-    """The namespace lacks a label, for instance: nothing in the cluster says so."""
+    """For example the namespace lacks a label, and no object in the cluster says so."""
     start()
     job_in_queue(place)
 
@@ -134,7 +134,7 @@ def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start)
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_plane):
-    """With nothing in a queue, the operator at rest sends no request."""
+    """If no job waits in a queue, an idle operator sends no request."""
     start()
     job_in_queue(place)
     eventually(lambda: lists(control_plane, place), 60)
@@ -144,7 +144,7 @@ def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_pla
     place.until("Running")
     before = len(lists(control_plane, place))
 
-    place.train("later", suspend=True)  # a job without a queue, though suspended
+    place.train("later", suspend=True)  # a suspended job without a queue
     place.until("Suspended", "later")
 
     assert len(lists(control_plane, place)) == before
@@ -152,11 +152,11 @@ def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_pla
 
 @pytest.mark.usefixtures("old_kueue")
 def test_a_kueue_that_does_not_serve_this_version_disturbs_nothing(place, start, control_plane):
-    """Without the words the status is as it was before there were any."""
+    """Without the messages of Kueue, the status is the same as before this feature."""
     operator = start()
     job_in_queue(place)
     eventually(lambda: lists(control_plane, place), 60)
-    place.train("later", scheduling=QUEUE)  # the operator has gone on
+    place.train("later", scheduling=QUEUE)  # shows that the operator has continued
     place.until("Suspended", "later")
 
     assert set(lists(control_plane, place)) == {404}
@@ -166,7 +166,7 @@ def test_a_kueue_that_does_not_serve_this_version_disturbs_nothing(place, start,
 
 @pytest.mark.usefixtures("kueue", "old_role")
 def test_a_role_without_workloads_disturbs_nothing(place, start, control_plane):
-    """An operator of this release may run with the role of an earlier one."""
+    """An operator of this release may run with the role of an earlier release."""
     operator = start()
     not_admitted(place, job_in_queue(place), SHORT)
     eventually(lambda: lists(control_plane, place), 60)

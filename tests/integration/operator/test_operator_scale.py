@@ -1,9 +1,7 @@
-"""Many TrainingJobs on one operator: all planned, little memory, and then silence.
+"""Many TrainingJobs on one operator: it plans all of them with little memory, and then sends no requests.
 
-`make bench` has a thousand.
-
-The control plane has no nodes, so that only the operator is measured. It runs with the rights of
-manifests/install.yaml and nothing more.
+`make bench` has a thousand. The control plane has no nodes, so that only the operator is measured. It runs
+with exactly the permissions in manifests/install.yaml.
 """
 
 import os
@@ -50,7 +48,7 @@ LABEL = "palaestra.dev/job"
 
 @pytest.fixture(scope="module")
 def crowd(tmp_path_factory):
-    """A control plane of its own, with Palaestra installed and many TrainingJobs in it."""
+    """Yield a separate control plane with Palaestra and many TrainingJobs, and its client."""
     with running(tmp_path_factory.mktemp("crowd")) as plane:
         installed = plane.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
         assert installed.returncode == 0, installed.stderr
@@ -66,7 +64,7 @@ def crowd(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def settled(crowd, tmp_path_factory):
-    """An operator that has planned them all and found its rest."""
+    """Yield an operator that has planned all jobs and no longer sends requests."""
     plane, api = crowd
     with operator(plane, tmp_path_factory.mktemp("operator") / "log") as first:
         wait_for(
@@ -85,19 +83,19 @@ def create_job(api: Api, number: int) -> None:
 
 
 def count(api: Api, resource) -> int:
-    """Return how many objects of a kind were made for TrainingJobs."""
+    """Return the number of objects of a kind that were made for TrainingJobs."""
     return len(api.within(60).list(resource.only_metadata(), NAMESPACE, labels=LABEL))
 
 
 def quiet(plane, seconds):
-    """Whether nothing but watches and the Lease was asked for so long."""
+    """Return whether only watches and requests for the Lease came in this time."""
     before = len([each for each in asked(plane) if each.counts])
     time.sleep(seconds)  # no request may arrive in this time
     return len([each for each in asked(plane) if each.counts]) == before
 
 
 def test_every_job_gets_what_it_needs_exactly_once(crowd, settled):
-    """By the API server's own record: no name was asked for twice."""
+    """By the API server's audit log, no name was created twice."""
     plane, api = crowd
     created = Counter((each.resource, each.name) for each in asked(plane) if each.verb == "create")
     made = Counter(resource for resource, _ in created if resource != "events")
@@ -110,7 +108,7 @@ def test_every_job_gets_what_it_needs_exactly_once(crowd, settled):
 
 
 def test_every_job_says_that_it_was_accepted(crowd, settled):
-    """With the generation that was seen."""
+    """The status contains the generation that the operator saw."""
     _, api = crowd
     jobs = api.list(TRAINING_JOBS, NAMESPACE)
     accepted = [
@@ -126,7 +124,10 @@ def test_every_job_says_that_it_was_accepted(crowd, settled):
 
 
 def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
-    """Watches and the Lease aside; by its own metrics and by the API server's record."""
+    """This is without watches and the Lease.
+
+    The operator's metrics and the API server's audit log agree.
+    """
     plane, _ = crowd
     told, recorded = settled.requests(), [each for each in asked(plane) if each.counts]
     time.sleep(QUIET_S)  # no request may arrive in this time
@@ -136,14 +137,14 @@ def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
 
 
 def test_the_operator_stays_small(settled):
-    """Everything cached that there is: the TrainingJobs and nine objects made for each, pods included."""
+    """It caches all objects: the TrainingJobs and nine for each, pods included."""
     assert settled.rss_bytes() < MOST_BYTES
 
 
 def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
-    """All work is done, so the first operator ends within two seconds, and its successor writes nothing.
+    """All work is done, so the first operator ends within two seconds, and the next writes nothing.
 
-    The successor lists all objects at once, which takes more memory than to watch them appear.
+    The next operator lists all objects at once, which takes more memory than to watch them appear.
     """
     plane, api = crowd
     seconds = settled.end()
@@ -160,7 +161,10 @@ def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
 
 
 def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
-    """By the functions of `make bench`, on the control plane that stands; the numbers mean nothing here."""
+    """The functions of `make bench` run on the existing control plane.
+
+    Their numbers mean nothing here.
+    """
     plane, api = crowd
     figures = bench.figures_of_a_crowd(plane, api.within(60), tmp_path, count=2, quiet_s=1)
     with operator(plane, tmp_path / "log"):
@@ -175,6 +179,6 @@ def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
 
 
 def leader(api: Api) -> str:
-    """Return who holds the operator's Lease; "" for nobody."""
+    """Return the holder of the operator's Lease, or "" if nobody holds it."""
     leases = api.list(LEASES, "palaestra-system")
     return next((each["spec"].get("holderIdentity", "") for each in leases), "")

@@ -1,4 +1,4 @@
-"""What the operator tells: progress from the trainers, metrics, and how little it asks for."""
+"""The operator's reports: progress from the trainers, metrics, and logs; and its few requests."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -11,7 +11,7 @@ from tests.metrics import complaints, documented, served
 from tests.trainer_status import serving
 from tests.waiting import eventually
 
-WRITTEN_S = 60.0  # asked for every 10 s, written every 30 s
+WRITTEN_S = 60.0  # it requests every 10 s and writes every 30 s
 STATUS = TrainerStatus(
     step=1200,
     target=5000,
@@ -27,13 +27,13 @@ STATUS = TrainerStatus(
 
 @pytest.fixture
 def trainer():
-    """A trainer that answers /status at the address of a pod."""
+    """Yield the address of a trainer that serves /status as a pod would."""
     with serving(lambda: replace(STATUS, last_progress=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")) as address:
         yield address
 
 
 def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
-    """`kubectl get tj` shows Step and Success while it runs."""
+    """`kubectl get tj` shows Step and Success while the job runs."""
     start()
     place.train()
     [pod] = place.pods()
@@ -52,12 +52,13 @@ def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
 
 
 def test_the_metrics_count_jobs_by_phase(place, start):
-    """No job's name among the labels."""
+    """The name of a job is not among the labels."""
     operator = start()
     place.train()
     place.pods()
 
-    # Counted once the operator has seen its own status, and has its answer; the pods may be there sooner.
+    # The metrics count a job once the operator has seen its own status, and a request once it has the
+    # response; the pods may exist sooner.
     counted = {
         f'palaestra_jobs{{job_namespace="{place.name}",phase="Pending"}} 1.0',
         'palaestra_operator_requests_total{code="200",resource="jobs",verb="create"} 1.0',
@@ -68,7 +69,7 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
 
 def test_the_metrics_are_those_of_the_page(place, start):
-    """Every family of docs/reference/metrics.md with its type, and none besides; promtool finds nothing."""
+    """Each family in docs/reference/metrics.md has its type, there are no others, and promtool finds none."""
     operator = start()
     place.train()
     place.pods()
@@ -80,7 +81,7 @@ def test_the_metrics_are_those_of_the_page(place, start):
 
 
 def test_a_job_that_runs_and_ends_is_counted(place, start):
-    """How long it took to begin, and why it ended; from the moment that its status tells so."""
+    """The metrics count how long it took to begin and why it ended, once its status shows both."""
     operator = start()
     place.train()
     [pod] = place.pods()
@@ -97,18 +98,18 @@ def test_a_job_that_runs_and_ends_is_counted(place, start):
 
 
 def test_log_lines_are_constant_messages_with_fields(place, start):
-    """`grep applied`, and a log store can count by kind."""
+    """A user can search with `grep applied`, and a log store can count messages by kind."""
     operator = start()
     place.train()
     place.pods()
 
     kinds = ["NetworkPolicy", "ConfigMap", "PersistentVolumeClaim", "Job"]
-    eventually(lambda: [each["kind"] for each in operator.said("applied")] == kinds)  # pods may be sooner
+    eventually(lambda: [each["kind"] for each in operator.said("applied")] == kinds)  # pods may exist sooner
     assert operator.said("applied")[0]["job"] == [place.name, "job"]
 
 
 def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_plane):
-    """install.yaml's roles are enough; that they are no more is compared in the unit tests."""
+    """The roles in install.yaml are sufficient; the unit tests check that they are not too large."""
     operator = start()
     place.train()
     place.pods()
@@ -117,7 +118,7 @@ def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_p
     asked = [
         event
         for event in control_plane.audit(place.name)
-        if event["user"].get("username") == USER  # nobody's, without credentials
+        if event["user"].get("username") == USER  # none for a request without credentials
         and event.get("objectRef", {}).get("namespace") == place.name
     ]
     assert asked

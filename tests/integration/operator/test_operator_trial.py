@@ -1,4 +1,4 @@
-"""`palaestra try`: whether an installation works, found out with a job that is gone afterwards."""
+"""`palaestra try` shows whether an installation works, with a job that is deleted afterwards."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -21,7 +21,10 @@ spec: {{backoffLimit: 0}}
 
 @pytest.fixture
 def trial(place, control_plane, tmp_path):
-    """Return the command's exit code; what is given is done meanwhile, as signals are for this thread."""
+    """Return a function that runs the command and returns its exit code.
+
+    Its argument runs in another thread, because the command needs this thread for signals.
+    """
     file = tmp_path / "job.yaml"
     file.write_text(JOB.format(namespace=place.name))
 
@@ -39,7 +42,7 @@ def trial(place, control_plane, tmp_path):
 
 @pytest.fixture
 def pod(place, start):
-    """Wait until the trial's pod runs, and return it with the name of the job."""
+    """Return a function that waits until the trial's pod runs, and returns that pod."""
     start()
 
     def running():
@@ -54,7 +57,7 @@ def pod(place, start):
 
 
 def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, capsys):
-    """Exit code 0 is what `helm test` goes by."""
+    """`helm test` uses the exit code 0."""
     assert trial(lambda: place.end(pod(), word=DONE)) == 0
     phases = [line.rpartition(": ")[2] for line in capsys.readouterr().out.splitlines()]
     assert phases[-1] == "Succeeded"
@@ -62,7 +65,7 @@ def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, cap
 
 
 def test_a_trial_takes_its_claims_away_with_its_job(place, trial, pod):
-    """A pipeline that tries each release would fill its namespace's quota of storage."""
+    """Otherwise a pipeline that tries each release would fill its namespace's quota of storage."""
 
     def see_claim():
         found = pod()
@@ -74,14 +77,17 @@ def test_a_trial_takes_its_claims_away_with_its_job(place, trial, pod):
 
 
 def test_a_trial_that_fails_says_why_and_leaves_nothing(place, trial, pod, capsys):
-    """The reason outlives the job, as the last line of the log."""
+    """The reason stays as the last line of the log after the job is deleted."""
     assert trial(lambda: place.end(pod(), 2)) == 1
     assert "Failed; ConfigurationRefused: " in capsys.readouterr().err
     assert place.all(TRAINING_JOBS) == []
 
 
 def test_the_job_of_a_trial_that_is_killed_ends_and_goes_by_itself(place, trial, pod):
-    """SIGKILL leaves nobody who could delete it; what its author has set stays as it is."""
+    """After SIGKILL the command cannot delete it.
+
+    Fields that the author has set stay as they are.
+    """
     seen = []
 
     def look():

@@ -1,4 +1,4 @@
-"""Worlds that cost much to check: in a process with a budget, and never at the cost of other tenants."""
+"""Worlds whose check is costly: a process with a budget checks them, and other tenants do not wait."""
 
 import os
 import signal
@@ -30,12 +30,12 @@ WorldCheckProcess(mebibytes=4096).check([GivenWorld(field="f", source=costly(30_
 
 
 def given(size: int) -> GivenWorld:
-    """Return a world of a size whose check costs much."""
+    """Return a world of a given size whose check is costly."""
     return GivenWorld(field=FIELD, source=costly(size))
 
 
 def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
-    """The same as those of a check in the same process."""
+    """The verdicts are the same as those of a check in the same process."""
     wrong = GivenWorld(field=FIELD, source=b"#VRML_SIM R2023b utf8\n}")
 
     found = WorldCheckProcess().check([FINE, wrong])
@@ -52,7 +52,10 @@ def test_a_process_returns_the_verdicts_on_several_worlds() -> None:
     ],
 )
 def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, words: str) -> None:
-    """The message names the field, the budget and the remedy; worlds before it keep their verdicts."""
+    """The message names the field, the budget and the remedy.
+
+    The worlds before it keep their verdicts.
+    """
     large = given(size)
 
     found = WorldCheckProcess(**budget).check([FINE, large])
@@ -65,12 +68,12 @@ def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, w
 
 
 def test_a_deadline_is_no_verdict() -> None:
-    """A busy node passes it, whatever the world."""
+    """On a busy node a check may take too long for any world."""
     assert WorldCheckProcess(mebibytes=1024, deadline_s=0.01).check([given(900_000)]) == {}
 
 
 def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
-    """Even if the operator is killed, as a kubelet does."""
+    """This also holds if a kubelet kills the operator."""
     folder = {"PYTHONPATH": str(Path(__file__).parents[3])}
     with (tmp_path / "log").open("wb") as log:
         parent = subprocess.Popen([sys.executable, "-c", PARENT], env=os.environ | folder, stderr=log)
@@ -86,7 +89,10 @@ def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
 
 
 def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: Place, start: Start) -> None:
-    """Their author waits: their jobs say that the worlds are being checked, and are planned one by one."""
+    """Only the author of the costly worlds waits.
+
+    That author's jobs say that the worlds are being checked, and are planned one by one.
+    """
     other = Place(installed, "other")
     operator = start(f"--namespace={other.name}", "--workers=1")
     with ThreadPoolExecutor(4) as pool:
@@ -107,5 +113,5 @@ def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: P
 
 
 def reason(place: Place, number: int) -> str:
-    """Return the reason of a costly job's acceptance."""
+    """Return the reason in a costly job's condition Accepted."""
     return str(place.condition("Accepted", f"evil-{number}").get("reason", ""))

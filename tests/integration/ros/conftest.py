@@ -1,4 +1,4 @@
-"""A node of the stub's kind in a thread, beside a real ROS master."""
+"""A node of the stub's kind in a thread, with a real ROS master."""
 
 import threading
 
@@ -10,7 +10,7 @@ DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
 
 
 class Peer:
-    """A node whose services answer, fail, or never answer; it runs in a thread of its own."""
+    """A node whose services respond, fail, or never respond; it runs in a separate thread."""
 
     def __init__(self, name, master_uri):
         self.name = name
@@ -39,7 +39,7 @@ class Peer:
         assert done.wait(DEADLINE_S)
 
     def end(self, last=None):
-        """Stop the thread, after `last`, by default a close in good order."""
+        """End the thread after `last`, which by default closes the node properly."""
         if self.thread.is_alive():
             self.do(last or self.node.close)
             self.loop.post(self.loop.stop)
@@ -49,7 +49,7 @@ class Peer:
 
 @pytest.fixture
 def peer(master, request):
-    """A fresh node, named after the test."""
+    """Yield a new node with a name from the test's."""
     node = Peer(request.node.name[:50].rstrip("_"), master)
     yield node
     node.end()

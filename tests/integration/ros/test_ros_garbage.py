@@ -1,4 +1,4 @@
-"""Servers that answer XML-RPC with something else: a fault of that simulator, and nothing more."""
+"""Servers that send wrong XML-RPC responses cause a fault of one simulator only."""
 
 import queue
 import socketserver
@@ -18,7 +18,7 @@ WHOLE = xmlrpc.client.dumps(([1, "", "rosrpc://localhost:1"],), methodresponse=T
 
 
 def answered(value):
-    """An answer that is XML-RPC."""
+    """Return a correct XML-RPC response."""
     return HTTP + xmlrpc.client.dumps((value,), methodresponse=True).encode()
 
 
@@ -43,7 +43,7 @@ GARBAGE = {
 
 @pytest.fixture
 def server():
-    """`server(answer)`: the address of a server that sends these bytes to each client."""
+    """Yield `server(answer)`, which returns the address of a server that sends these bytes to each client."""
     servers = []
 
     def begin(answer):
@@ -67,7 +67,7 @@ def server():
 def test_a_master_that_answers_garbage_is_a_fault_of_the_simulator_that_was_asked_for(
     master, server, monkeypatch, answer
 ):
-    """The attempt goes on: the next question may be answered well."""
+    """The attempt continues, because the next response may be correct."""
     del master
     ensure_node()
     monkeypatch.setenv("ROS_MASTER_URI", server(answer))
@@ -82,7 +82,7 @@ def test_a_master_that_answers_garbage_is_a_fault_of_the_simulator_that_was_aske
 
 @pytest.mark.parametrize("answer", GARBAGE.values(), ids=GARBAGE.keys())
 def test_a_publisher_that_answers_garbage_is_a_fault_of_its_simulator(master, server, answer):
-    """It is that simulator's own node."""
+    """The publisher is the node of that simulator."""
     ensure_node()
     topic = f"/garbage/{threading.get_ident()}_{abs(hash(answer))}/value"
     with xmlrpc.client.ServerProxy(master) as ask_master:
@@ -95,7 +95,7 @@ def test_a_publisher_that_answers_garbage_is_a_fault_of_its_simulator(master, se
 
 
 def test_a_program_that_is_no_master_is_reported_as_a_lost_master(server, monkeypatch):
-    """A program outside a pod then starts a master of its own."""
+    """A program outside a pod then starts a ROS master itself."""
     monkeypatch.setenv("ROS_MASTER_URI", server(GARBAGE["another document"]))
 
     with pytest.raises(MasterLost, match="is another program there"):
@@ -104,7 +104,7 @@ def test_a_program_that_is_no_master_is_reported_as_a_lost_master(server, monkey
 
 @pytest.fixture
 def connected():
-    """`connected(deadline_s)`: a wire after its handshake, and the peer's socket."""
+    """Yield `connected(deadline_s)`, which returns a wire after its handshake, and the peer's socket."""
     peers = queue.Queue()
     wires = []
 
@@ -134,7 +134,7 @@ def connected():
 
 
 def test_the_memory_for_a_frame_grows_with_what_arrives_of_it(connected):
-    """Four bytes may claim 64 MiB."""
+    """Four bytes may announce 64 MiB."""
     wire, peer = connected(0.2)
     peer.sendall((64 << 20).to_bytes(4, "little") + bytes(1000))
 
@@ -150,7 +150,7 @@ def test_the_memory_for_a_frame_grows_with_what_arrives_of_it(connected):
 
 
 def test_the_memory_of_a_long_frame_is_given_back_once_it_is_read(connected):
-    """One long message must not cost its length for ever."""
+    """One long message must not use its length in memory for ever."""
     wire, peer = connected(DEADLINE_S)
     length = 16 << 20
     tracemalloc.start()

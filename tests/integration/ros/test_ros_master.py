@@ -1,4 +1,4 @@
-"""What a node of ours asks of a ROS master, and of masters that can do less than rosmaster."""
+"""The requests of our nodes to a ROS master, also to masters that support less than rosmaster."""
 
 import threading
 from contextlib import suppress
@@ -12,7 +12,7 @@ TAKEN = [("registerService", "/a"), ("registerPublisher", "/b"), ("registerServi
 
 
 class Recording(SimpleXMLRPCServer):
-    """A master that takes registrations and refuses every other call; `requests` counts what it was sent."""
+    """A master that accepts registrations and refuses every other call; `requests` counts the requests."""
 
     def __init__(self, *, multicall):
         super().__init__(("127.0.0.1", 0), logRequests=False)
@@ -35,7 +35,7 @@ class Recording(SimpleXMLRPCServer):
 
 @pytest.fixture(params=[True, False], ids=["multicall", "without multicall"])
 def recording(request):
-    """A master of each kind."""
+    """Yield a master of each kind."""
     with Recording(multicall=request.param) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
@@ -46,14 +46,14 @@ def recording(request):
 
 @pytest.fixture
 def master(recording):
-    """Our side of it."""
+    """Yield our client of that master."""
     made = Master(f"http://127.0.0.1:{recording.server_address[1]}", "/robot")
     yield made
     made.close()
 
 
 def test_registrations_of_a_block_are_sent_in_order_and_in_one_request_if_the_master_can(recording, master):
-    """Clients take the last service of a robot as the sign that all others are there."""
+    """When clients find the last service of a robot, they assume that all others exist."""
     with master.together():
         for method, name in TAKEN:
             master.tell(method, name)
@@ -64,7 +64,7 @@ def test_registrations_of_a_block_are_sent_in_order_and_in_one_request_if_the_ma
 
 
 def test_a_refusal_among_several_calls_is_an_error(master):
-    """As it is for one call alone."""
+    """A single call that is refused raises the same error."""
     block = master.together()
     block.__enter__()
     master.tell("registerService", "/a")
@@ -75,7 +75,7 @@ def test_a_refusal_among_several_calls_is_an_error(master):
 
 
 def test_a_block_that_fails_registers_nothing(recording, master):
-    """A simulator that could not be set up must not be found."""
+    """Clients must not find a simulator that could not be set up."""
     with suppress(ZeroDivisionError), master.together():
         master.tell("registerService", "/a")
         raise ZeroDivisionError

@@ -1,4 +1,4 @@
-"""The stub's node on the wire, as programs that are not ours would use it."""
+"""The stub's node, as programs of other projects use its connections."""
 
 import gc
 import os
@@ -22,7 +22,10 @@ LONG_TEXT = "x" * 20_000_000  # longer than the buffers of a connection
 
 @pytest.fixture
 def dial(peer):
-    """Opens raw TCPROS connections to the peer: sends a header, returns socket and answer header."""
+    """Yield a function that opens raw TCPROS connections to the peer.
+
+    The function sends a header, and returns the socket and the response header.
+    """
     opened = []
 
     def connect(**header):
@@ -38,7 +41,7 @@ def dial(peer):
 
 
 def read_exactly(connection, count):
-    """Return that many bytes."""
+    """Return this many bytes."""
     data = b""
     while len(data) < count:
         piece = connection.recv(count - len(data))
@@ -64,19 +67,20 @@ def slave_api(peer):
 
 
 def test_the_answer_header_tells_the_type(peer, dial):
-    """`rosservice type` reads it."""
+    """`rosservice type` reads the type from it."""
     _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
 
     assert header["type"] == "webots_ros/set_float"
     assert header["callerid"] == f"/{peer.name}"
 
 
-# Of `uint64 node; string fieldName; bool queryBaseNode --- uint64 field`, the type in Webots R2025a.
+# The checksum of `uint64 node; string fieldName; bool queryBaseNode --- uint64 field`, the type in Webots
+# R2025a.
 GET_FIELD_2025A = "88d5309880e1463a89aff87d30e09f1c"
 
 
 def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
-    """It renamed a field of three requests, so their sums differ, and their bytes do not."""
+    """Webots R2025a renamed a field of three requests, so their checksums differ, but their bytes do not."""
     peer.do(
         lambda: peer.node.serve(
             "field", "webots_ros/node_get_field", lambda it: {"field": it.node + it.proto}
@@ -91,7 +95,7 @@ def test_a_client_of_webots_r2025a_is_served_too(peer, dial):
 
 
 def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
-    """Without `persistent` a connection serves one call."""
+    """Without `persistent` a connection serves only one call."""
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
     connection.sendall(frame(ASK) * 2)
 
@@ -101,13 +105,13 @@ def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
 
 
 def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
-    """Roscpp drops an answer that it has not read yet when the server closes (ros/ros_comm#1976)."""
+    """Roscpp drops a response that it has not read when the server closes (ros/ros_comm#1976)."""
     monkeypatch.setattr(links, "LINGER_S", DEADLINE_S)
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
     connection.sendall(frame(ASK))
     read_exactly(connection, 1)
     read_frame(connection)
-    peer.do(lambda: None)  # the node has done all that follows an answer
+    peer.do(lambda: None)  # the node has done everything that follows a response
 
     connection.setblocking(False)
     with pytest.raises(BlockingIOError):
@@ -116,7 +120,10 @@ def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
 
 @pytest.fixture
 def ask_for_much(peer, dial, monkeypatch):
-    """Returns a client's connection, after the first byte of an answer that is longer than its buffers."""
+    """Return a function that returns a client's connection after the first byte of a long response.
+
+    The response is longer than the connection's buffers.
+    """
     monkeypatch.setattr(links, "LINGER_S", 0.01)
     peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": LONG_TEXT}))
     connection, _ = dial(**service_header(peer, "get_text", "webots_ros/get_string"))
@@ -130,7 +137,7 @@ def ask_for_much(peer, dial, monkeypatch):
 
 
 def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_for_much):
-    """A picture of a camera may be that long."""
+    """The picture of a camera may be that long."""
     connection = ask_for_much()
     peer.do(lambda: None)
 
@@ -138,7 +145,7 @@ def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_f
 
 
 def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
-    """The time to close begins when all is sent: a client may read over a slow network."""
+    """The time limit begins after everything was sent, because a client may read over a slow network."""
     connection, later = ask_for_much(), threading.Event()
     peer.do(lambda: peer.node.later(10 * links.LINGER_S, later.set))
     assert later.wait(DEADLINE_S)
@@ -147,7 +154,7 @@ def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
 
 
 def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monkeypatch):
-    """Else it keeps a picture for each client that was stopped in the middle of one."""
+    """Otherwise it would keep a picture for each client that stopped in the middle of one."""
     monkeypatch.setattr(links, "SEND_S", 0.01)
     connection = ask_for_much()
     eventually(lambda: all(link.closed for link in links_there()))
@@ -157,7 +164,7 @@ def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monk
 
 
 def test_two_requests_in_one_packet_are_both_answered(peer, dial):
-    """The stream is cut into frames, not into packets."""
+    """The stream consists of frames, whatever its packets are."""
     header = service_header(peer, "get_time", "webots_ros/get_float", persistent="1")
     connection, _ = dial(**header)
     connection.sendall(frame(ASK) * 2)
@@ -168,7 +175,7 @@ def test_two_requests_in_one_packet_are_both_answered(peer, dial):
 
 
 def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
-    """The connection stays, as roscpp's does."""
+    """The connection stays open, as with roscpp."""
     header = service_header(peer, "double", "webots_ros/set_float", persistent="1")
     connection, _ = dial(**header)
     connection.sendall(frame(b"abc") + frame(struct.pack("<d", 1.0)))
@@ -189,7 +196,7 @@ def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
     ],
 )
 def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
-    """And the connection is closed."""
+    """The node also closes the connection."""
     connection, answer = dial(**header)
 
     assert answer["error"] == fact
@@ -197,7 +204,7 @@ def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
 
 
 def test_rosnode_info_lists_what_a_node_publishes_and_to_whom(peer, dial):
-    """`getPublications` and `getBusInfo`, as every roscpp node answers them."""
+    """The methods are `getPublications` and `getBusInfo`, and every roscpp node responds in the same way."""
     topic = f"/{peer.name}/ir1/value"
     connection, _ = dial(topic=topic, md5sum="*")
     with slave_api(peer) as node:
@@ -219,22 +226,22 @@ def test_noise_on_the_port_disturbs_nobody(peer, dial):
 
 
 def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
-    """A client of another release asks again every few seconds, for days."""
+    """A client of another release repeats its request every few seconds for days."""
     before, count = len(links_there()), 5
     for _ in range(count):
         _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
         assert "error" in answer
 
-    eventually(lambda: len(links_there()) < before + count)  # the loop holds the last one that it has called
+    eventually(lambda: len(links_there()) < before + count)  # the loop still holds its last one
 
 
 def links_there():
-    """Return the connections of nodes that this process holds, open or closed."""
+    """Return the connections of nodes in this process, open or closed."""
     return [each for each in gc.get_objects() if isinstance(each, links.RosLink)]
 
 
 def test_requests_wait_while_the_controller_is_blocked(peer, dial):
-    """Webots holds a mutex during a step: everything else of that robot waits its turn."""
+    """Webots locks a mutex during a step, so that all other requests to that robot wait."""
     blocked = []
     calls = []
 
@@ -268,7 +275,7 @@ def test_requests_wait_while_the_controller_is_blocked(peer, dial):
 
 
 def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
-    """How /model_name tells who is there."""
+    """The topic /model_name shows in this way which robots exist."""
     peer.do(lambda: peer.node.advertise("name", "std_msgs/String", latched=True).send({"data": "robot"}))
 
     connection, header = dial(topic=f"/{peer.name}/name", md5sum="*", type="std_msgs/String")
@@ -278,7 +285,7 @@ def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
 
 
 def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
-    """Queue size 1: it loses old messages and slows nobody down."""
+    """With the queue size 1 it loses old messages and delays nobody."""
     topic = {"topic": f"/{peer.name}/ir1/value", "md5sum": "*", "type": "sensor_msgs/Range"}
     connection, _ = dial(**topic)
     count = 200_000
@@ -293,7 +300,7 @@ def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
 
 
 def test_the_slave_api_answers_what_tools_ask(peer):
-    """`rosnode info` and `rosnode ping` do."""
+    """`rosnode info` and `rosnode ping` use these methods."""
     with slave_api(peer) as slave:
         assert slave.getPid("/raw")[2] == os.getpid()
         assert slave.getMasterUri("/raw")[2] == os.environ["ROS_MASTER_URI"]

@@ -1,4 +1,4 @@
-"""Services over a real master and real sockets: they answer, or the fault has a kind."""
+"""Services over a real master and real sockets: they respond, or the fault has a kind."""
 
 import contextlib
 import gc
@@ -41,7 +41,7 @@ print(json.dumps({
 
 @pytest.fixture
 def service(peer):
-    """Makes services of the peer, closed when the test ends."""
+    """Yield a function that makes services of the peer, and close them at the end."""
     made = []
 
     def make(path, type_name="webots_ros/get_float", **options):
@@ -55,7 +55,7 @@ def service(peer):
 
 @pytest.mark.parametrize("length", [0, 430, 439, 440, 449, 5_000, 100_000])
 def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service, length):
-    """The first read is short; the rest of a longer answer comes in parts."""
+    """The first read is short, and the rest of a longer response comes in parts."""
     texts = []
     peer.do(lambda: peer.node.serve("text", "webots_ros/get_string", lambda _: {"value": texts.pop()}))
     ask = service("text", "webots_ros/get_string")
@@ -69,7 +69,7 @@ def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service
 
 @pytest.mark.parametrize("length", [0, 439, 440, 441, 5_000, 100_000])
 def test_a_request_of_any_length_arrives_whole(peer, service, length):
-    """One request holds a whole world."""
+    """A single request can contain a whole world."""
     heard = []
     peer.do(lambda: peer.node.serve("hear", "webots_ros/set_string", lambda it: heard.append(it.value) or {}))
 
@@ -80,12 +80,12 @@ def test_a_request_of_any_length_arrives_whole(peer, service, length):
 
 
 def test_a_call_returns_the_response(service):
-    """The response's fields are attributes."""
+    """The fields of the response are attributes."""
     assert service("get_time")(ask=True).value == 1.25
 
 
 def test_one_connection_serves_all_calls(peer, service):
-    """Looking the service up anew each time would cost forty times as much."""
+    """A new look-up of the service for each call would cost forty times as much."""
     double = service("double", "webots_ros/set_float")
 
     assert [double(value=value).success for value in (1.0, -1.0, 2.0)] == [True, False, True]
@@ -93,7 +93,7 @@ def test_one_connection_serves_all_calls(peer, service):
 
 
 def test_calls_together_are_all_answered(service):
-    """Three wheels get their commands in one round trip's time."""
+    """Three wheels receive their commands in the time of one round trip."""
     double = service("double", "webots_ros/set_float")
     time = service("get_time")
 
@@ -103,7 +103,7 @@ def test_calls_together_are_all_answered(service):
 
 
 def test_both_ends_are_set_up_for_small_messages(service):
-    """BBR, a common default, keeps a timer for each connection: with it four simulators are slower."""
+    """BBR, a common default, has a timer for each connection, and four simulators are slower with it."""
     double = service("double", "webots_ros/set_float")
     double.begin(value=1.0)
 
@@ -115,7 +115,10 @@ def test_both_ends_are_set_up_for_small_messages(service):
 
 
 def connected_to(address):
-    """Return this process's socket whose peer has that address: the node runs in a thread."""
+    """Return this process's socket whose peer has that address.
+
+    It is in this process because the node runs in a thread.
+    """
     for it in gc.get_objects():
         if isinstance(it, socket.socket):
             with contextlib.suppress(OSError):
@@ -125,25 +128,25 @@ def connected_to(address):
 
 
 def test_a_service_nobody_offers_means_a_dead_simulator(service):
-    """The master has no such name."""
+    """The master does not know such a name."""
     with pytest.raises(SimulatorDead, match="no node serves"):
         service("nothing")(ask=True)
 
 
 def test_a_failed_call_is_wrong_data_with_the_servers_words(service):
-    """It answered, so it neither hangs nor is dead."""
+    """The server responded, so it neither hangs nor is dead."""
     with pytest.raises(WrongData, match="the handle is 0"):
         service("fail")(ask=True)
 
 
 def test_a_service_that_does_not_answer_hangs(service):
-    """Rospy's proxy would wait for ever here."""
+    """The proxy of rospy would wait for ever here."""
     with pytest.raises(SimulatorHung, match=r"does not answer within 0\.2 s"):
         service("never", deadline_s=0.2)(ask=True)
 
 
 def test_when_patience_is_over_nobody_is_waited_for(service):
-    """Sixteen simulators that hang would take sixteen deadlines from a trainer that is asked to end."""
+    """Sixteen simulators that hang would delay the end of a trainer by sixteen deadlines."""
     never = [service("never", deadline_s=30.0) for _ in range(16)]
     get_time = service("get_time")
     get_time(ask=True)
@@ -164,7 +167,7 @@ def test_when_patience_is_over_nobody_is_waited_for(service):
 
 
 def test_what_a_call_waited_for_its_answer_is_counted(service):
-    """So that a run can tell what simulators cost it from what it costs itself."""
+    """A run can then separate the time of its simulators from its own."""
     before = waited_s()
     with pytest.raises(SimulatorHung):
         service("never", deadline_s=0.2)(ask=True)
@@ -173,7 +176,7 @@ def test_what_a_call_waited_for_its_answer_is_counted(service):
 
 
 def test_a_killed_node_is_dead(peer, service):
-    """Its sockets are closed without a word; the master still lists it."""
+    """Its sockets are closed without a message, and the master still lists it."""
     get_time = service("get_time")
     get_time(ask=True)
     peer.end(peer.node.abandon)
@@ -206,21 +209,24 @@ def test_another_type_is_refused(service):
 
 
 def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
-    """`rosservice type` probes with the md5 `*`."""
+    """`rosservice type` sends the md5 `*`."""
     host, port = Master("/probe").service_address(f"/{peer.name}/double")
 
     assert (host, port > 0) == ("localhost", True)
 
 
 def test_the_node_is_listed_by_the_master(peer):
-    """What `rosnode list` prints."""
+    """`rosnode list` prints these names."""
     names = Master(ensure_node()).node_names()
 
     assert f"/{peer.name}" in names
 
 
 def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
-    """A process has one node: scripts begin with an `init_node` of their own, and are found by its name."""
+    """A process has only one node.
+
+    Scripts begin with their own `init_node`, and others find them by its name.
+    """
     program = [sys.executable, "-c", PROGRAM_WITH_A_NODE, f"/{peer.name}"]
 
     answer = subprocess.run(program, capture_output=True, text=True, timeout=60, check=False)
@@ -233,7 +239,7 @@ def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
 
 
 def test_a_node_that_ends_in_good_order_is_unregistered(peer):
-    """Else the next simulator of that name would be found at the old address."""
+    """Otherwise the next simulator with that name would be found at the old address."""
     peer.end()
 
     assert Master("/probe").service_address(f"/{peer.name}/double") is None

@@ -1,4 +1,4 @@
-"""`palaestra run` as a person types it: real master, sidecars, stubs and trainer."""
+"""`palaestra run` as a user types it, with real master, sidecars, stubs and trainer."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.soak.jobs import example
 
 @pytest.fixture
 def run(tmp_path):
-    """Makes runs of an example in a folder of their own; what is left of them is ended with the test."""
+    """Yield a function that makes runs of an example in a separate folder, and end them with the test."""
     made = []
 
     def make(name="move-to-target", **trainer):

@@ -1,8 +1,8 @@
-"""Each part of `make bench`, and what tests do not run otherwise of `make soak`, at its smallest scale.
+"""Each part of `make bench`, and the parts of `make soak` without another test, at the smallest scale.
 
-The figures mean nothing here. Without these tests, a rename would break a measurement for months: until a
-change has to be measured. The parts `recovery`, `shutdown` and `memory` are in test_run_unattended.py,
-`operator` is in test_operator_scale.py.
+The figures mean nothing here. Without these tests, a changed name could break a measurement, and nobody would
+notice for months, until a change has to be measured. The parts `recovery`, `shutdown` and `memory` are in
+test_run_unattended.py, and `operator` is in test_operator_scale.py.
 """
 
 import json
@@ -24,13 +24,13 @@ DEADLINE_S = 800  # of a minute or two, on a busy machine
 
 
 def numbers(found):
-    """Yield all numbers in what a part found."""
+    """Yield all numbers in the results of a part."""
     for value in found.values():
         yield from numbers(value) if isinstance(value, dict) else [value]
 
 
 def test_every_part_is_run_by_a_test():
-    """A new one must come with its test."""
+    """A new part must come with its test."""
     assert PARTS.keys() == {*SMALL, *OF_A_CLUSTER, *OF_WHOLE_RUNS, *ELSEWHERE}
 
 
@@ -58,7 +58,10 @@ def test_the_benchmark_measures(parts, tmp_path):
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
 def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
-    """With one job of each, on a control plane of its own; the operator has the rights of an installation."""
+    """There is one job of each tenant on a separate control plane.
+
+    The operator has the permissions of an installation.
+    """
     found = hostile.measure(0.0)
 
     assert found["hostile_jobs"] == 1
@@ -69,7 +72,7 @@ def test_the_costly_worlds_of_one_tenant_beside_jobs_of_another_are_measured():
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(900)
 def test_the_soak_of_a_training_amid_chaos_comes_to_its_figures():
-    """With the example chaos, and 1,000 of its steps."""
+    """The soak uses the example chaos with 1,000 of its steps."""
     found = chaos.measure(0.0)
 
     assert found["summary"]["steps"] >= chaos.LEAST_STEPS

@@ -1,6 +1,6 @@
 """An interrupted and resumed run equals an uninterrupted one, bit for bit, with deterministic simulators.
 
-Each variant is the same story with another world, simulator and environment; `make soak` plays it with every
+Each variant does the same with another world, simulator and environment; `make soak` does it with every
 algorithm.
 """
 
@@ -27,7 +27,7 @@ FEW = {"episodes": 1, "confirmEpisodes": 1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """A job, and the step past which its trainer is asked to end."""
+    """A job, and the step after which its trainer is interrupted."""
 
     job: dict[str, Any]
     asked_at: int
@@ -48,7 +48,7 @@ def learning(environment: dict[str, Any], steps: int, driver: str) -> Variant:
 
 
 def seeing() -> Variant:
-    """Return PPO on pictures, which a new simulator has to draw as the first one would have."""
+    """Return PPO on pictures, which a new simulator must draw exactly as the first one would."""
     job = make_job(
         collect=SEEING,
         evaluate=SEEING,
@@ -65,7 +65,7 @@ VARIANTS = {
     "the page's scattered cylinders": learning(
         yaml.safe_load(PAGE["yaml"])["spec"]["trainer"]["environment"], 360, "stub"
     ),
-    # Each episode is replayed at the progress at which it began.
+    # Each episode is replayed with the progress at which it began.
     "the example's curriculum in MuJoCo": learning(
         {"id": "curriculum:Curriculum-v0", "options": {"max_steps": 40}}, 240, "mujoco"
     ),
@@ -86,7 +86,7 @@ def modules(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("modules")
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
-    """Compared are world, experience, parameters and evaluations; the signal comes during an episode."""
+    """The test compares world, experience, parameters and evaluations; the signal comes during an episode."""
     whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:
         code, output = whole.end()
@@ -106,6 +106,6 @@ def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
 
 
 def begun(folder: Path, job: dict[str, Any]) -> LocalRun:
-    """Return a run of a job in a folder of its own."""
+    """Return a run of a job in a separate folder."""
     folder.mkdir()
     return LocalRun(folder, job)

@@ -19,7 +19,7 @@ gymnasium.register("Leaves-v0", Leaves)
 
 
 def test_a_library_that_ends_the_process_does_not_complete_the_run(tmp_path, monkeypatch):
-    """With the exit code 0 of a program that has done its work, and without a model."""
+    """The exit code is 0, as of a program that has finished its work, but there is no model."""
     (tmp_path / "leaves.py").write_text(LEAVES)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     environment = {"id": "leaves:Leaves-v0"}

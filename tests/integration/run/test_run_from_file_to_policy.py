@@ -1,4 +1,4 @@
-"""From a TrainingJob file to a policy, on one machine."""
+"""From a TrainingJob file to a policy on one machine."""
 
 import json
 import os
@@ -28,15 +28,15 @@ FEWEST = {
     "evaluation": {"everySteps": 200, "episodes": 1, "confirmEpisodes": 1},
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
-# test_bench.py runs these.
+# The tests in test_bench.py run these.
 MEASURED = {"chaos", "move-to-target", "move-to-target-mujoco", "navigate", "see-target", "sparse-reward"}
-# Of the example two-collectors; its own rollouts have eight times as many steps.
+# For the example two-collectors, whose own rollouts have eight times as many steps.
 ROLLOUT_STEPS = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """A run to its end, the simulator that it collects with killed on the way."""
+    """A complete run whose collecting simulator was killed during training."""
 
     run: LocalRun
     code: int
@@ -45,9 +45,9 @@ class Finished:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """One run for the tests of what a run comes to."""
+    """Return one run for the tests of a run's results."""
     job = example("move-to-target")
-    job["spec"]["trainer"].update(FEW | {"steps": 1000})  # many enough to be met amid them
+    job["spec"]["trainer"].update(FEW | {"steps": 1000})  # enough for the test to find it during training
     with LocalRun(tmp_path_factory.mktemp("finished"), job) as run:
         run.wait_for_step(200)
         os.kill(run.pid_of("palaestra-stub", "collect-0"), signal.SIGKILL)
@@ -57,13 +57,13 @@ def finished(tmp_path_factory):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unplugged:
-    """What there was of a run amid its training, and of its processes after its runner was killed.
+    """The state of a run during training, and of its processes after its runner was killed.
 
     Attributes:
         nodes: the robots that the ROS master knew.
-        named: the robots of the worlds that its sidecars made.
+        named: the robots in the worlds that its sidecars made.
         pids: every process below the runner.
-        left: those that stayed.
+        left: the processes that still ran.
     """
 
     nodes: set[str]
@@ -74,7 +74,7 @@ class Unplugged:
 
 @pytest.fixture(scope="module")
 def unplugged(tmp_path_factory):
-    """One run, with two simulators in a group, for the tests of what is there while it trains."""
+    """Return one run with two simulators in a group, for the tests of its state during training."""
     job = example("two-collectors")
     job["spec"]["trainer"].update(FEW | {"steps": 50_000})
     run = LocalRun(tmp_path_factory.mktemp("unplugged"), job)
@@ -96,7 +96,10 @@ def unplugged(tmp_path_factory):
 
 
 def registered(run):
-    """Return the names of the robots that the ROS master of a run knows; the run tells where it is."""
+    """Return the names of the robots that the ROS master of a run knows.
+
+    The run's output has the master's address.
+    """
     master = Master("/test")
     master.uri = re.search("ROS_MASTER_URI=(.+)", run.output())[1]
     return {name for name in master.node_names() if "robotino" in name}
@@ -104,7 +107,10 @@ def registered(run):
 
 @pytest.mark.parametrize("name", sorted({path.stem for path in EXAMPLES.glob("*.yaml")} - MEASURED))
 def test_every_example_runs(run, name):
-    """With few steps here; what people copy must work."""
+    """The number of steps is small here.
+
+    Users copy the examples, so they must work.
+    """
     code, output = run(name, **FEWEST).start().end()
 
     assert code == 0, output
@@ -112,19 +118,19 @@ def test_every_example_runs(run, name):
 
 
 def test_each_simulator_has_a_legal_name_of_its_own(unplugged):
-    """What `rosnode list` shows, and what stands in the worlds that the simulators run."""
+    """The names are those in `rosnode list` and in the worlds of the simulators."""
     assert len(unplugged.nodes) == 3
     assert unplugged.nodes == unplugged.named
 
 
 def test_after_a_sigkill_of_the_runner_nothing_is_left(unplugged):
-    """Pulling the plug on the runner must not leave simulators behind."""
+    """The sudden end of the runner must not leave simulators behind."""
     assert len(unplugged.pids) >= 8
     assert unplugged.left == []
 
 
 def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
-    """It alone is restarted; the run ends as if nothing had been."""
+    """Only this simulator is restarted, and the run ends as it would have without the fault."""
     assert finished.code == 0, finished.output
     assert finished.run.summary()["steps"] == 1000
     assert finished.run.summary()["faults"] == 1
@@ -132,7 +138,7 @@ def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
 
 
 def test_a_finished_run_is_reported_and_not_repeated(finished):
-    """A second `make run` says what there is, in seconds."""
+    """A second `make run` prints the result within seconds."""
     before = (finished.run.directory / "attempts.jsonl").read_text()
 
     code, output = finished.run.start().end()
@@ -143,7 +149,7 @@ def test_a_finished_run_is_reported_and_not_repeated(finished):
 
 
 def test_a_policy_can_be_measured_afterwards(finished):
-    """As the runner says at its end."""
+    """The runner names this command at its end."""
     result = subprocess.run(
         [EVAL, finished.run.directory, "--episodes", "3"],
         capture_output=True,
@@ -156,9 +162,9 @@ def test_a_policy_can_be_measured_afterwards(finished):
 
 
 def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(tmp_path):
-    """At PPO's rollout boundary, as without the interruption; test_run_exact_resume.py has DQN.
+    """It ends at the boundary of PPO's rollout, as without an interruption; test_run_exact_resume.py has DQN.
 
-    In between nothing of it runs: no simulator, no sidecar, no master.
+    Between the two commands no process of the run exists: no simulator, no sidecar, no master.
     """
     job = example("two-collectors")
     trainer = job["spec"]["trainer"]

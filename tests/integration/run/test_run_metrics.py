@@ -1,6 +1,6 @@
-"""What the programs of a real run serve, compared with docs/reference/metrics.md.
+"""The metrics of a real run's programs, compared with docs/reference/metrics.md.
 
-The operator's metrics are in its folder.
+The operator's metrics have their test with the operator.
 """
 
 import re
@@ -24,7 +24,7 @@ def scrape(address):
 
 @pytest.fixture(scope="module")
 def texts(tmp_path_factory):
-    """What trainer and sidecar of a run serve, once it has evaluated and saved."""
+    """Return the metrics of a run's trainer and sidecar, after an evaluation and a checkpoint."""
     job = make_job(
         environment={"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
         algorithm=LITTLE_DQN,
@@ -41,7 +41,7 @@ def texts(tmp_path_factory):
 
 
 def test_a_run_serves_the_page(texts):
-    """Every family of it and none besides, each with its type; and by then each has a value, but few."""
+    """The programs serve exactly the families of the page, each with its type and, by then, a value."""
     assert served(texts["trainer"]) == documented("trainer")
     assert served(texts["sidecar"]) == documented("sidecar")
     silent = {
@@ -55,12 +55,12 @@ def test_a_run_serves_the_page(texts):
 
 @pytest.mark.parametrize("program", ["trainer", "sidecar"])
 def test_promtool_has_nothing_to_say_of_it(texts, program):
-    """Prometheus' own rules of names, types and texts."""
+    """Promtool checks Prometheus' own rules about names, types and texts."""
     assert complaints(texts[program]) == ""
 
 
 def test_a_run_tells_numbers_that_fit_together(texts):
-    """From different places of the trainer, and of the process that it plays in."""
+    """The numbers come from different parts of the trainer, and from the process of its simulator."""
     values = {
         (sample.name, *sorted(sample.labels.values())): sample.value
         for text in texts.values()
@@ -71,7 +71,7 @@ def test_a_run_tells_numbers_that_fit_together(texts):
     taken = values["palaestra_simulator_step_duration_seconds_count", "collect-0"]
     simulated_s = values["palaestra_simulator_simulated_seconds_total", "collect-0"]
 
-    assert steps <= taken < 2 * steps  # read one after the other, while it steps
+    assert steps <= taken < 2 * steps  # they are read one after the other, while the simulator steps
     assert simulated_s >= 0.192 * steps  # and the steps of each reset
     episodes = values["palaestra_trainer_episodes_total",]
     assert 0 <= values["palaestra_trainer_episode_return_bucket", "+Inf"] - episodes <= 3

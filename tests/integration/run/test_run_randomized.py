@@ -1,6 +1,6 @@
-"""The worlds of docs/howto/randomization.md, which change in every episode, by its seed, and with training.
+"""The worlds of docs/howto/randomization.md, which change in every episode, with its seed and with training.
 
-Their jobs are trained, interrupted and resumed in test_run_exact_resume.py.
+The tests in test_run_exact_resume.py train, interrupt and resume their jobs.
 """
 
 import importlib.util
@@ -21,7 +21,7 @@ CYLINDERS = [f"CYLINDER_{number}" for number in range(4)]
 
 @pytest.fixture
 def module(tmp_path):
-    """The file of the page's module."""
+    """Return the file with the page's module."""
     path = tmp_path / "scattered.py"
     path.write_text(PAGE["python in-a-job"])
     return path
@@ -36,12 +36,12 @@ def module_at(path):
 
 
 def places(scene):
-    """Where the cylinders stand."""
+    """Return the positions of the cylinders."""
     return [scene.supervisor.get_field(name, "translation") for name in CYLINDERS]
 
 
 def test_the_same_seed_places_the_same_cylinders(master, module):
-    """And another seed others."""
+    """Another seed places others."""
     del master
     scattered = module_at(module)
     webots = Webots("robotino", "arena")
@@ -65,12 +65,12 @@ def test_the_same_seed_places_the_same_cylinders(master, module):
 
 @pytest.fixture
 def curriculum():
-    """The module of the example."""
+    """Return the module of the example."""
     return module_at(EXAMPLE)
 
 
 def test_the_example_changes_world_and_robot_with_the_progress_of_training(master, curriculum):
-    """No cylinder and no noise at first; the same episode is the same again."""
+    """At first there are no cylinders and no noise; the same episode is equal when it is repeated."""
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)

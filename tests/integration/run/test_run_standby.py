@@ -17,21 +17,21 @@ READY = {"collect-0": "ready", "collect-1": "ready", "evaluate-0": None}
 
 
 def job(steps, **collect):
-    """Return a job of two simulators with spares, and one that evaluates without."""
+    """Return a job of two simulators with spares, and one for evaluation without a spare."""
     pair = {"count": 2, "standby": True} | collect
     return make_job(collect=pair, algorithm=LITTLE_DQN, steps=steps, **SELDOM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replaced:
-    """What came of a simulator that was killed while its spare stood by.
+    """The observations of a simulator that was killed while its spare was ready.
 
     Attributes:
-        waited: whether the one that is played in now stood by when it was killed.
+        waited: whether the simulator now in use was the spare when the other one was killed.
         faults: of the run, by kind.
-        took_over: what the trainer's log says of it.
-        spares: what the first place of the pair, which was killed, runs again.
-        left: the simulators that stayed after the run's end.
+        took_over: the lines of the trainer's log about the change.
+        spares: the processes that the first slot of the pair, which was killed, runs again.
+        left: the simulators that still ran after the run's end.
     """
 
     waited: bool
@@ -43,7 +43,7 @@ class Replaced:
 
 @pytest.fixture(scope="module")
 def replaced():
-    """One run that goes on after the fault until all of its spares are ready again."""
+    """Return one run that continues after the fault until all of its spares are ready again."""
     with running(job(1_000_000, recycle={"afterResets": 0})) as run:
         run.wait_for_step(recovery.WARM_STEPS)
         run.until(lambda: recovery.is_ready(run, standby=True), recovery.SPARE_READY_S)
@@ -65,12 +65,15 @@ def replaced():
 
 
 def test_a_crash_waits_for_no_start(replaced):
-    """It costs what a recycled simulator costs: next to nothing, as `make soak` measures."""
+    """It costs next to nothing, like a recycled simulator, as `make soak` measures."""
     assert replaced.waited
 
 
 def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(replaced):
-    """One fault, no wait for a start, and the ROS name tells which of the two is played in."""
+    """It costs one fault and no wait for a start.
+
+    The ROS name shows which of the two is in use.
+    """
     (took_over,) = replaced.took_over
 
     assert "_0b_robotino_" in took_over
@@ -79,12 +82,15 @@ def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(re
 
 
 def test_spares_end_with_their_run(replaced):
-    """As every simulator."""
+    """All simulators end with their run."""
     assert replaced.left == []
 
 
 def test_a_simulator_with_a_spare_is_recycled_before_it_would_die_and_without_a_fault():
-    """Every 24 resets here, of which it survives no more; `make soak` plays 2,500 episodes so."""
+    """Here it is recycled every 24 resets, because it survives no more.
+
+    `make soak` does the same for 2,500 episodes.
+    """
     recycled = recycling.play(
         EPISODES, {"recycle": {"afterResets": recycling.RESETS}, "standby": True}, recycling.DIES
     )

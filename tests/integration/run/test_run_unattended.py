@@ -1,8 +1,8 @@
-"""Short forms of `make soak`: what breaks amid a run does not end it.
+"""Short forms of `make soak`: failures during a run do not end it.
 
-Each runs a part of tests/soak in its smallest size and shows that this part works. The figures of
-docs/explain/reliability.md come from the full sizes. The test test_run_exact_resume.py compares a resumed run
-with an uninterrupted one.
+Each test runs a part of tests/soak in its smallest size and shows that this part works. The figures in
+docs/explain/reliability.md come from the full sizes. The test in test_run_exact_resume.py compares a resumed
+run with an uninterrupted one.
 """
 
 import os
@@ -20,12 +20,15 @@ from tests.soak import damage, kills, kinds, leaks, recovery
 from tests.soak.jobs import LITTLE_PPO
 
 FAULT = re.compile(r"^\| [^|]+ \| `([^`]+)` \| [^|]+ \| [^|]+ \|$", re.MULTILINE)
-# Of each kind some, and so seldom that a restarted simulator gets a few episodes far.
+# It has some faults of each kind, but so few that a restarted simulator completes a few episodes.
 MANY = "crash:probability=0.02 wrong_value:topic=ir2/value,step=31 exit:step=47 lost:topic=ir1/value,every=20"
 
 
 def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follows():
-    """Both tables are played, each by other tests; here they are compared: what they say may differ."""
+    """Other tests run the faults of both tables.
+
+    This one compares their names, because their texts may differ.
+    """
     text = (ROOT / "docs/reference/faults.md").read_text().partition("## The kinds")[2]
     known = FAULT.findall(text.partition("## When")[0])
 
@@ -34,14 +37,14 @@ def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Troubled:
-    """What came of the troubles of one run, in their order.
+    """The results of the failures of one run, in their order.
 
     Attributes:
-        resumed: whether it went on from its newest checkpoint, killed while it wrote another.
-        ended: how it ended when it was asked to, as `kills.end` tells.
-        code: that of the trainer that lost its ROS master.
+        resumed: whether it continued from its newest checkpoint, after a kill while it wrote another.
+        ended: how it ended on request, as returned by `kills.end`.
+        code: the exit code of the trainer that lost its ROS master.
         again: why the attempt after that began.
-        survived: whether it did without the newest checkpoint, whose networks are damaged.
+        survived: whether it could continue without its newest checkpoint, whose networks are damaged.
     """
 
     resumed: bool
@@ -53,7 +56,7 @@ class Troubled:
 
 @pytest.fixture(scope="module")
 def troubled():
-    """One run: each trouble finds what the one before has left, as in a run of days."""
+    """Return one run: each failure finds the state after the one before, as in a run of days."""
     moments = random.Random(0)
     with running(kills.job()) as run:
         run.until(run.checkpoints)
@@ -68,9 +71,9 @@ def troubled():
 
 
 def lose_the_master(run):
-    """Kill the ROS master; return the trainer's exit code, and why it began again.
+    """Kill the ROS master, and return the trainer's exit code and why the next attempt began.
 
-    The runner is stopped until the trainer has ended: a new master that answers in time costs no attempt.
+    The runner is stopped until the trainer has ended, because a new master in time would need no attempt.
     """
     ends, attempts, trainer = len(kills.ENDED.findall(run.output())), len(run.attempts()), run.trainer()
     run.process.send_signal(signal.SIGSTOP)
@@ -93,7 +96,10 @@ def test_a_run_whose_simulators_break_in_many_ways_succeeds():
 
 
 def test_training_steps_again_after_a_simulator_was_killed_and_notices_one_that_hangs():
-    """How soon is measured where nothing else runs, by `make soak` and `make bench`; both count here, too."""
+    """`make soak` and `make bench` measure the times on an idle machine.
+
+    Here both faults are only counted.
+    """
     with recovery.training() as run:
         recovery.recovery(run, standby=False)
         recovery.noticing(run)
@@ -105,31 +111,31 @@ def test_training_steps_again_after_a_simulator_was_killed_and_notices_one_that_
 
 
 def test_a_trainer_that_is_killed_while_it_saves_resumes(troubled):
-    """A half of a checkpoint is none."""
+    """Half of a checkpoint is not used."""
     assert troubled.resumed
 
 
 def test_a_trainer_that_is_asked_to_end_in_a_call_that_hangs_saves(troubled):
-    """Within its half of the grace period, though the simulator never answers."""
+    """It saves within its half of the grace period, although the simulator never responds."""
     assert kills.is_in_time(troubled.ended), troubled.ended
 
 
 def test_a_lost_ros_master_costs_an_attempt_and_not_the_run(troubled):
-    """Nothing registers again with a new master, so the pod begins anew, from a checkpoint."""
+    """No node registers again with a new master, so the pod starts again from a checkpoint."""
     assert troubled.code == 75
     assert "resumed at step" in troubled.again
 
 
 def test_a_damaged_checkpoint_is_noticed_and_the_one_before_is_used(troubled):
-    """By its checksum; tests of the trainer damage the other files."""
+    """The checksum shows the damage; tests of the trainer damage the other files."""
     assert troubled.survived
 
 
 def test_restarts_of_simulators_leave_nothing_behind():
-    """Neither in the trainer nor in the sidecars."""
+    """Neither the trainer nor the sidecars keep anything."""
     with running(leaks.job()) as run:
         early, late = leaks.least(run, 3, 6), leaks.least(run, 12, 15)
-        if leaks.grown(early, late):  # a leak stays; the memory of a restart does not
+        if leaks.grown(early, late):  # a leak stays, but the memory of a restart does not
             late = leaks.least(run, 20, 40)
 
     assert leaks.grown(early, late) == []

@@ -20,7 +20,7 @@ MOST_LINES = 45
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(600)
 def test_a_policy_is_trained_from_an_empty_folder(tmp_path):
-    """With what the page shows and nothing else; the policy has learned the task."""
+    """Only the files and commands of the page are used, and the policy has learned the task."""
     printed = typed(tmp_path, FILES, 0)
 
     run = tmp_path / "runs/corridor/0"
@@ -31,14 +31,14 @@ def test_a_policy_is_trained_from_an_empty_folder(tmp_path):
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(600)
 def test_the_same_task_is_learned_by_an_e_puck(tmp_path):
-    """Another robot needs a class of its own way of driving, and two lines in the job."""
+    """Another robot needs only a class for its drive, and two lines in the job."""
     printed = typed(tmp_path, ("python corridor.py", "python puck.py", "yaml puck.yaml"), 1)
 
     assert success_rate(tmp_path / "runs/puck/0") >= 0.6, printed
 
 
 def typed(folder, files, number):
-    """Write files of the page and type one of its sessions; return what was printed."""
+    """Write files of the page, type one of its sessions, and return the output."""
     for name in files:
         (folder / name.split()[1]).write_text(PAGE[name])
     return Terminal(folder, path=PALAESTRA.parent).type_in(blocks(TEXT, "sh")[number], TYPED_S)
@@ -50,7 +50,7 @@ def success_rate(run):
 
 
 def test_the_task_is_short_and_its_image_is_of_this_release():
-    """A tutorial is read to its end if it is short; a tag of another release is another interface."""
+    """Readers finish only a short tutorial, and a tag of another release has another interface."""
     assert len(PAGE["python corridor.py"].splitlines()) < MOST_LINES
     assert (
         PAGE["dockerfile Dockerfile"].splitlines()[0]

@@ -19,18 +19,18 @@ from tests import waiting
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
-DEADLINE_S = 20.0  # of whatever ought to take milliseconds, on a busy machine
-ENDS = {0, EXIT_HUNG}  # exit codes after a signal: of its own accord, or by its alarm
-PACE_S = 0.005  # between two looks at what has no event to wait for
+DEADLINE_S = 20.0  # of what takes milliseconds, on a busy machine
+ENDS = {0, EXIT_HUNG}  # exit codes after a signal: without or with its alarm
+PACE_S = 0.005  # between two polls where there is no event
 
 
 def eventually(seen, deadline_s=DEADLINE_S):
-    """Return the first true thing that `seen` returns; fail at the deadline."""
+    """Return the first true value of `seen`; fail at the deadline."""
     return waiting.eventually(seen, deadline_s, PACE_S)
 
 
 def processes_with(mark):
-    """Return the processes that have `mark` in their command line and are no zombies."""
+    """Return the processes with `mark` in their command line, without zombies."""
     found = set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -40,12 +40,15 @@ def processes_with(mark):
 
 
 def was_seen(state):
-    """Return whether a sidecar knows that its simulator ran: the simulator may tell it sooner itself."""
+    """Return whether a sidecar knows that its simulator ran.
+
+    The simulator itself may write that it runs before the sidecar knows it.
+    """
     return state.pid is not None or state.state is not SidecarState.STARTING
 
 
 class Sidecar:
-    """A running sidecar, asked over its ports and read line by line."""
+    """A running sidecar; tests use its ports and read its lines."""
 
     def __init__(self, command) -> None:
         self.process = subprocess.Popen(
@@ -63,7 +66,7 @@ class Sidecar:
             self.lines.append(line.decode().rstrip("\n"))
 
     def ask(self, method, path, body=None, address=None):
-        """Return status and text of the answer; from the control port, unless told otherwise."""
+        """Return status and text of a response, by default from the control port."""
         connection = http.client.HTTPConnection(address or self.control, timeout=DEADLINE_S)
         try:
             connection.request(method, path, None if body is None else json.dumps(body))
@@ -73,14 +76,14 @@ class Sidecar:
             connection.close()
 
     def request(self, path, body=None):
-        """Return the state after a request that is allowed."""
+        """Return the state after an accepted request."""
         status, text = self.ask("POST", path, body or {})
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
 
     @property
     def state(self):
-        """The state that it reports for its simulator."""
+        """Return the state that it reports for its simulator."""
         status, text = self.ask("GET", "/state")
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
@@ -95,25 +98,25 @@ class Sidecar:
         return eventually(seen, deadline_s)
 
     def until_said(self, text, times=1):
-        """Return when it, or its simulator, has printed a line that contains `text`."""
+        """Return once it or its simulator has printed lines with `text`."""
         eventually(lambda: sum(text in line for line in list(self.lines)) >= times)
 
     def start(self):
-        """Start the simulator; return the state when it has printed its first `up` and was seen to run."""
+        """Start the simulator, and return the state once it has printed `up` and is known to run."""
         ups = self.lines.count("up") + 1
         self.request("/start")
         eventually(lambda: self.lines.count("up") >= ups and was_seen(self.state))
         return self.state
 
     def end(self, number=signal.SIGTERM):
-        """Send a signal; return its exit code, once it has ended."""
+        """Send a signal, wait for the end and return the exit code."""
         self.process.send_signal(number)
         return self.process.wait(DEADLINE_S)
 
 
 @pytest.fixture
 def world(tmp_path):
-    """Return the path of a world that ships; it marks all processes of the test."""
+    """Return the path of an included world, which also marks all processes of the test."""
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena"))
     return path
@@ -121,7 +124,10 @@ def world(tmp_path):
 
 @pytest.fixture
 def arguments(tmp_path, world):
-    """Return the command line of a sidecar; its simulator is Python as text, or a command line."""
+    """Return a function that makes a sidecar's command line.
+
+    Its simulator is a Python program as text, or a command line.
+    """
 
     def make(program, *options, executable=PROGRAM):
         if isinstance(program, str):
@@ -138,7 +144,7 @@ def arguments(tmp_path, world):
 
 @pytest.fixture
 def run_sidecar(tmp_path):
-    """Return how to run a sidecar's command line; at the end of the test nothing of it may be left."""
+    """Yield a function that runs a sidecar's command line; at the end no process of it may exist."""
     running = []
 
     def run(command):
@@ -157,7 +163,7 @@ def run_sidecar(tmp_path):
 
 @pytest.fixture
 def sidecar(arguments, run_sidecar):
-    """Return how to run a sidecar whose simulator is a program."""
+    """Return a function that runs a sidecar whose simulator is a program."""
 
     def run(program, *options, before=(), executable=PROGRAM):
         return run_sidecar([*before, *arguments(program, *options, executable=executable)])
@@ -167,13 +173,13 @@ def sidecar(arguments, run_sidecar):
 
 @pytest.fixture
 def left(tmp_path):
-    """Return how to ask which processes of this test are running."""
+    """Return a function that returns the running processes of this test."""
     return lambda: processes_with(str(tmp_path))
 
 
 @pytest.fixture
 def eventually_true():
-    """Return how to wait for something, with a deadline."""
+    """Return a function that waits for a condition, with a deadline."""
     return eventually
 
 
@@ -192,8 +198,8 @@ while True:
     signal.pause()
 """
 
-# As a launcher that starts a server, which starts workers: in sessions and groups of their own,
-# orphaned, without an environment, and all of them deaf to SIGTERM.
+# This is like a launcher that starts a server, which starts workers: they have their own sessions and groups,
+# no parent, no environment, and all of them ignore SIGTERM.
 FAMILY = """
 import os, signal, sys
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -218,23 +224,23 @@ while True:
 
 @pytest.fixture
 def waits():
-    """Return a simulator that does nothing until a signal ends it."""
+    """Return a simulator that waits until a signal ends it."""
     return WAITS
 
 
 @pytest.fixture
 def stubborn():
-    """Return a simulator that no signal but SIGKILL ends."""
+    """Return a simulator that only SIGKILL ends."""
     return STUBBORN
 
 
 @pytest.fixture
 def family():
-    """Return a simulator that has started three processes in three ways of getting away."""
+    """Return a simulator that has started three processes, two of which have left its session."""
     return FAMILY
 
 
 @pytest.fixture
 def ends():
-    """Return how to make a simulator that prints `up` and runs one statement at its end."""
+    """Return a function that makes a simulator which prints `up` and runs one statement at its end."""
     return lambda statement: f"import os, signal, sys\nprint('up')\n{statement}\n"

@@ -1,4 +1,4 @@
-"""What a person types, and what is wrong with it."""
+"""The command line of the sidecar, and the mistakes in it."""
 
 import signal
 import subprocess
@@ -11,18 +11,18 @@ from palaestra_sim.world import RunIdentity, ros_name
 from tests.integration.sidecar.conftest import DEADLINE_S
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
-STANDARD = (1 << 31) - 1  # the signals that are not of real time
+STANDARD = (1 << 31) - 1  # the signals that are not real-time signals
 
 
 def run(*arguments):
-    """Return a sidecar that has ended by itself."""
+    """Return the result of a sidecar that ends by itself."""
     return subprocess.run(
         [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=20, check=False
     )
 
 
 def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
-    """The page that a person sees first."""
+    """This is the first page that a user sees."""
     told = run("--help")
 
     assert told.returncode == 0
@@ -47,7 +47,7 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
     ],
 )
 def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) -> None:
-    """Exit code 2, known before a port is open."""
+    """The exit code is 2, and the mistake is found before a port is open."""
     told = run("--driver=stub", f"--world={world}", "--control=127.0.0.1:0", *arguments)
 
     assert (told.returncode, told.stdout) == (2, "")
@@ -56,7 +56,7 @@ def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) ->
 
 
 def test_the_error_for_a_broken_world_has_line_and_column(tmp_path) -> None:
-    """Line and column, as a compiler does."""
+    """Compilers also give line and column."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nRobot { name \n}\n")
 
@@ -67,7 +67,7 @@ def test_the_error_for_a_broken_world_has_line_and_column(tmp_path) -> None:
 
 
 def test_the_simulator_gets_a_world_with_its_own_names(sidecar, tmp_path) -> None:
-    """And the trainer gets the names from /state."""
+    """The trainer reads the names from /state."""
     program = "import sys\nprint('world', sys.argv[2])\nprint('up')\nsys.stdin.read()"
     it = sidecar(program, f"--work={tmp_path}/work", "--job=j", "--uid=u", "--replica=1", "--group=eval")
     identity = RunIdentity(job="j", uid="u", replica=1, group="eval", index=0)
@@ -80,7 +80,7 @@ def test_the_simulator_gets_a_world_with_its_own_names(sidecar, tmp_path) -> Non
 
 
 def test_without_a_job_the_world_runs_as_it_is(sidecar, waits, world) -> None:
-    """That is how a person tries a simulator by hand."""
+    """A user tries a simulator by hand in this way."""
     state = sidecar(waits).state
 
     assert state.world == str(world)
@@ -88,7 +88,7 @@ def test_without_a_job_the_world_runs_as_it_is(sidecar, waits, world) -> None:
 
 
 def test_a_world_that_ships_needs_no_path(sidecar, waits) -> None:
-    """A notebook starts with one."""
+    """A notebook starts with such a world."""
     state = sidecar(waits, "--world=arena").state
 
     assert Path(state.world).name == "arena.wbt"
@@ -96,7 +96,7 @@ def test_a_world_that_ships_needs_no_path(sidecar, waits) -> None:
 
 
 def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
-    """A notebook that was killed has no time to send a signal."""
+    """A killed notebook cannot send a signal."""
     command = arguments(waits, "--until-stdin-closes")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdout.readline()
@@ -107,7 +107,7 @@ def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
 
 
 def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
-    """Repeatable, in order, and one may begin with two dashes."""
+    """The option may be repeated, keeps its order, and may begin with two dashes."""
     program = "import sys\nprint('got', sys.argv[2:])\nprint('up')\nsys.exit(0)"
     it = sidecar(program, "--option=--a=1", "--option=b c")
 
@@ -117,9 +117,9 @@ def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
 
 
 def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None:
-    """An ignored SIGPIPE, as Python has it, would let a simulator write to nobody for ever.
+    """With an ignored SIGPIPE, as in Python, a simulator would write to a closed pipe for ever.
 
-    A signal that our parent ignores, as nohup does SIGHUP, stays ignored, as in a shell.
+    A signal that our parent ignores, as nohup ignores SIGHUP, stays ignored, as in a shell.
     """
     it = sidecar(["sh", "-c", "grep -E '^Sig(Ign|Blk)' /proc/self/status; echo up; sleep 60"])
 
@@ -130,7 +130,10 @@ def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None
 
 
 def _ignored_around_us():
-    """Return the signals that this process was started with as ignored; Python adds two by itself."""
+    """Return the signals that this process ignored from its start.
+
+    Python itself adds two.
+    """
     (line,) = (
         line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("SigIgn")
     )
@@ -139,7 +142,7 @@ def _ignored_around_us():
 
 
 def test_a_simulator_gets_none_of_our_files(sidecar) -> None:
-    """With the reaper's pipe in its hands it would hold itself alive."""
+    """A simulator with the reaper's pipe would keep itself alive."""
     it = sidecar(["sh", "-c", "for fd in /proc/$$/fd/*; do readlink $fd; done; echo up; sleep 60"])
 
     it.start()

@@ -1,4 +1,4 @@
-"""Whatever the simulator started ends with it, and with the sidecar, however that ended."""
+"""All processes that the simulator started end with it, and with the sidecar, however that ended."""
 
 import http.client
 import os
@@ -18,7 +18,7 @@ IN_A_NAMESPACE = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
 
 
 def namespaces_work():
-    """Return whether this machine lets us be process 1."""
+    """Return whether this machine allows us to be process 1."""
     if shutil.which("unshare") is None:
         return False
     return subprocess.run([*IN_A_NAMESPACE, "true"], capture_output=True, check=False).returncode == 0
@@ -28,7 +28,7 @@ as_process_1 = pytest.mark.skipif(not namespaces_work(), reason="no pid namespac
 
 
 def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
-    """A child that left group, session, parent and environment is found as well as one that stayed."""
+    """A child that left group, session, parent and environment is found like one that stayed."""
     it = sidecar(family)
     it.start()
     eventually_true(lambda: len(left()) == 6)  # sidecar, reaper, simulator, and three more
@@ -40,7 +40,7 @@ def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_tr
 
 
 def test_a_simulator_that_dies_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
-    """A worker that lives on would keep the ROS name, and the graphics card."""
+    """Otherwise a worker would keep the ROS name and the graphics card."""
     it = sidecar(family)
     pid = it.start().pid
 
@@ -54,7 +54,7 @@ def test_a_simulator_that_dies_takes_its_family_along(sidecar, family, left, eve
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_signal_ends_everything(sidecar, request, left, eventually_true, number, what) -> None:
-    """Of its own accord, or by its alarm where the machine is too busy for that."""
+    """Where the machine is too busy, the sidecar ends by its alarm."""
     it = sidecar(request.getfixturevalue(what))
     it.start()
 
@@ -63,17 +63,20 @@ def test_a_signal_ends_everything(sidecar, request, left, eventually_true, numbe
 
 
 def test_the_end_takes_less_than_two_seconds() -> None:
-    """The last sidecars of a pod get no more: the alarm comes before, the simulator's SIGKILL before that."""
+    """The last sidecars of a pod get no more.
+
+    The simulator's SIGKILL comes first, and the alarm after it.
+    """
     assert SHUTDOWN_GRACE_S < SHUTDOWN_S < 2
 
 
 def test_a_signal_ends_a_sidecar_whose_simulator_does_not_run(sidecar, waits) -> None:
-    """There is nothing to wait for."""
+    """There is no process to wait for."""
     assert sidecar(waits).end() == 0
 
 
 def test_a_signal_during_a_stop_does_not_wait_for_its_deadline(sidecar, stubborn) -> None:
-    """The container's end is nearer than the trainer's patience."""
+    """The container must end sooner than the trainer's deadline."""
     it = sidecar(stubborn)
     it.start()
     it.request("/stop", {"deadline_s": 3600})
@@ -82,7 +85,7 @@ def test_a_signal_during_a_stop_does_not_wait_for_its_deadline(sidecar, stubborn
 
 
 def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
-    """SIGTERM reaches it first: Webots' launcher removes its temporary files then."""
+    """SIGTERM comes first, because Webots' launcher then removes its temporary files."""
     it = sidecar(
         ends("signal.signal(signal.SIGTERM, lambda *_: (print('bye'), sys.exit(0)))\nsignal.pause()")
     )
@@ -96,7 +99,7 @@ def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_true, what) -> None:
-    """SIGKILL gives it no time to say anything: the reaper sees the end of its pipe."""
+    """After SIGKILL it can do nothing, but the reaper sees the end of its pipe."""
     it = sidecar(request.getfixturevalue(what))
     it.start()
 
@@ -105,7 +108,7 @@ def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_t
 
 
 def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left, eventually_true) -> None:
-    """What it held becomes the sidecar's own, which ends it and can start again."""
+    """The reaper's processes become children of the sidecar, which ends them and can start again."""
     it = sidecar(family)
     it.start()
     (reaper,) = children({it.process.pid})
@@ -119,7 +122,7 @@ def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left,
 
 
 def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, eventually_true) -> None:
-    """A full pipe blocks every write into it; the alarm does not write."""
+    """A full pipe blocks every write into it, and the alarm does not write."""
     source, sink = os.pipe()
     program = "while True: print('x' * 1000)"
     process = subprocess.Popen(arguments(ends(program)), stdout=sink, stdin=subprocess.DEVNULL)
@@ -141,13 +144,13 @@ def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, even
 
 @pytest.fixture
 def inside():
-    """Return the sidecar's process as this machine sees it, when it is process 1 of a namespace."""
+    """Return a function that returns the outer id of a sidecar that is process 1 of a namespace."""
     return lambda it: next(iter(children({it.process.pid})))
 
 
 @as_process_1
 def test_process_1_reaps_the_orphans_of_the_container(sidecar, waits, inside, eventually_true) -> None:
-    """Those of a shell that somebody opened in the container, too: nobody else would."""
+    """Only process 1 can reap them, even those of a shell that a user opened in the container."""
     it = sidecar(waits, before=IN_A_NAMESPACE)
     it.start()
     before = children({inside(it)})
@@ -164,7 +167,7 @@ def test_process_1_reaps_the_orphans_of_the_container(sidecar, waits, inside, ev
 def test_process_1_ends_by_sigterm_as_any_other(
     sidecar, request, left, eventually_true, inside, what
 ) -> None:
-    """The kernel keeps from process 1 whatever it did not ask for."""
+    """The kernel gives process 1 only the signals for which it has a handler."""
     it = sidecar(request.getfixturevalue(what), before=IN_A_NAMESPACE)
     it.start()
 

@@ -1,4 +1,4 @@
-"""What the two listeners answer, and what they refuse."""
+"""The responses of the two ports, and the requests that they refuse."""
 
 import re
 import socket
@@ -24,7 +24,7 @@ signal.pause()
 
 
 def raw(address, text):
-    """Return the first line of the answer to bytes that need not be HTTP."""
+    """Return the first line of the response to bytes that need not be HTTP."""
     host, port = address.split(":")
     with socket.create_connection((host, int(port)), 10) as connection:
         connection.sendall(text)
@@ -32,7 +32,7 @@ def raw(address, text):
 
 
 def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
-    """The liveness probe asks for the sidecar: a dead simulator is the trainer's to restart."""
+    """The liveness probe is for the sidecar; the trainer restarts a dead simulator."""
     it = sidecar(ends("sys.exit(1)"))
     it.request("/start")
     it.until(SidecarState.FAILED)
@@ -41,7 +41,7 @@ def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
 
 
 def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
-    """The trainer reads one, people and the operator the other."""
+    """The trainer reads one port, users and the operator read the other."""
     it = sidecar(waits)
     it.start()
 
@@ -50,7 +50,7 @@ def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
 
 @pytest.mark.parametrize("path", ["/start", "/ready", "/stop"])
 def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
-    """It is open to every client that reaches the pod."""
+    """Every client that reaches the pod can use this port."""
     it = sidecar(waits)
 
     status, _ = it.ask("POST", path, {"deadline_s": 0}, it.health)
@@ -60,7 +60,7 @@ def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
 
 
 def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
-    """All labels are there from the start, so that a rate over them is right."""
+    """All labels exist from the start, so that a rate of them is right."""
     it = sidecar(ends("os.kill(os.getpid(), signal.SIGBUS)"))
     it.request("/start")
     it.until(SidecarState.FAILED)
@@ -86,7 +86,7 @@ def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
 
 
 def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> None:
-    """A launcher is small; what it launched is not."""
+    """A launcher is small, but the processes that it launched are not."""
     it = sidecar(family)
     it.start()
 
@@ -98,7 +98,7 @@ def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> Non
 
 
 def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> None:
-    """Also that of those who have ended: by then it is their parent's."""
+    """The time of ended processes is included, because it then belongs to their parent."""
     it = sidecar(BUSY)
     it.start()
 
@@ -118,7 +118,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
     ],
 )
 def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) -> None:
-    """400, so that nobody takes it for a matter of the state."""
+    """The status is 400, so that no client takes the error for one of the state."""
     it = sidecar(waits)
     it.start()
 
@@ -144,7 +144,7 @@ def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) 
     ],
 )
 def test_a_request_of_the_wrong_size_or_kind_is_refused(sidecar, waits, request_, status) -> None:
-    """Nothing is read that nobody asked for."""
+    """The sidecar reads only what it needs."""
     it = sidecar(waits)
 
     assert raw(it.control, request_).split()[1] == str(status)
@@ -152,7 +152,7 @@ def test_a_request_of_the_wrong_size_or_kind_is_refused(sidecar, waits, request_
 
 
 def test_many_silent_connections_do_not_take_the_port_away(sidecar, waits, eventually_true) -> None:
-    """Those beyond the limit are closed, the rest time out: then it answers again."""
+    """The connections beyond the limit are closed and the others time out, so the port responds again."""
     it = sidecar(waits)
     host, port = it.health.split(":")
     silent = [socket.create_connection((host, int(port)), 10) for _ in range(60)]
@@ -169,7 +169,7 @@ def test_many_silent_connections_do_not_take_the_port_away(sidecar, waits, event
 
 
 def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, arguments, waits) -> None:
-    """Exit code 2: trying again cannot help."""
+    """The exit code is 2, because another attempt cannot help."""
     taken = sidecar(waits).control
 
     second = subprocess.run(
@@ -184,7 +184,7 @@ def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, argumen
 
 
 def test_a_sidecar_is_small(sidecar, family) -> None:
-    """Under 40 MB with its reaper, so that a laptop and a node take many."""
+    """It takes less than 40 MB with its reaper, so that a laptop or a node can run many."""
     it = sidecar(family)
     it.start()
     it.ask("GET", "/metrics", address=it.health)

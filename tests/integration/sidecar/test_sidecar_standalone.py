@@ -1,4 +1,4 @@
-"""The folder with the sidecar for users' own images: Python and prometheus_client, and nothing else."""
+"""The folder with the sidecar for users' own images contains only Python code and prometheus_client."""
 
 import shutil
 import subprocess
@@ -15,7 +15,7 @@ SIM_IMAGE = Path(__file__).parents[3] / "sim_image"
 
 @pytest.fixture
 def standalone(tmp_path):
-    """The folder, made of the packages in the wheel by the image's own script."""
+    """Return the folder that the image's own script makes of the wheel's packages."""
     wheel = tomllib.loads((SIM_IMAGE / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]
     installed = tmp_path / "installed"
     for package in wheel["wheel"]["packages"]:
@@ -30,7 +30,7 @@ def standalone(tmp_path):
 
 
 def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_path) -> None:
-    """No environment, no installed package and no Python of the image is used."""
+    """It uses no environment, no installed package and no Python of the image."""
     moved = standalone.rename(tmp_path / "moved")
 
     it = sidecar(waits, before=("env", "-i"), executable=str(moved / "palaestra-sidecar"))
@@ -41,7 +41,7 @@ def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_p
 
 
 def test_the_folder_has_nothing_that_speaks_ros(standalone) -> None:
-    """A sidecar starts and stops a process; every image of a simulator would carry the rest."""
+    """A sidecar only starts and stops a process; every image of a simulator would contain the rest."""
     packages = standalone / "lib/python3/dist-packages"
 
     assert {path.name.partition("-")[0] for path in packages.iterdir()} == {

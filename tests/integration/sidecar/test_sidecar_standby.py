@@ -18,20 +18,20 @@ FIRST, SECOND = "", "/standby"
 
 
 class Two:
-    """A sidecar with two simulators, each of them known by what stands before its paths."""
+    """A sidecar with two simulators, each identified by the prefix of its paths."""
 
     def __init__(self, sidecar, eventually) -> None:
         self.it = sidecar
         self._eventually = eventually
 
     def state(self, above, address=None):
-        """The state that it reports for one of them."""
+        """Return the state that it reports for one of them."""
         status, text = self.it.ask("GET", f"{above}/state", address=address)
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
 
     def start(self, above):
-        """Start one; return its state when it has printed `up` and was seen to run."""
+        """Start one, and return its state once it has printed `up` and is known to run."""
         line = {FIRST: "a: up", SECOND: "b: up"}[above]
         ups = self.it.lines.count(line) + 1
         self.it.request(f"{above}/start")
@@ -46,7 +46,7 @@ class Two:
 
 @pytest.fixture
 def two(sidecar, tmp_path, eventually_true):
-    """Return how to run a sidecar whose two simulators are the same program."""
+    """Return a function that runs a sidecar whose two simulators are the same program."""
 
     def run(program):
         given = (f"--work={tmp_path}/work", "--job=j", "--uid=u", "--clock", "--standby")
@@ -56,7 +56,10 @@ def two(sidecar, tmp_path, eventually_true):
 
 
 def test_each_has_a_world_with_names_of_its_own(two, waits) -> None:
-    """Slot b: another readable part and another hash, or the two would throw each other out."""
+    """Slot b needs another readable part and another hash.
+
+    With equal names each would remove the other from the ROS master.
+    """
     it = two(waits)
 
     for above, slot, file in ((FIRST, "a", "collect-0.wbt"), (SECOND, "b", "collect-0b.wbt")):
@@ -68,7 +71,7 @@ def test_each_has_a_world_with_names_of_its_own(two, waits) -> None:
 
 
 def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
-    """One publisher of /clock a ROS master, also when both run."""
+    """Only one simulator per ROS master publishes /clock, even when both run."""
     it = two(waits)
 
     assert b"--clock" in Path(it.state(FIRST).world).read_bytes()
@@ -76,7 +79,7 @@ def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
 
 
 def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
-    """The trainer says which of them is played in; here they are equal."""
+    """The trainer decides which of them is in use; for the sidecar both are equal."""
     it = two(waits)
 
     first, second = it.start(FIRST), it.start(SECOND)
@@ -91,7 +94,7 @@ def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
 
 @pytest.mark.parametrize(("broken", "whole"), [(FIRST, SECOND), (SECOND, FIRST)])
 def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> None:
-    """Its own fault, its own count, its own start after that."""
+    """It has its own fault, its own count, and its own start after that."""
     it = two(waits)
     pid, other = it.start(broken).pid, it.start(whole).pid
 
@@ -107,7 +110,7 @@ def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> N
 def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
     two, family, left, eventually_true
 ) -> None:
-    """What it leaves becomes the sidecar's child, as the other reaper is, which is no orphan."""
+    """The sidecar inherits the simulator's processes. The other reaper is its child, but not an orphan."""
     it = two(family)
     sidecar = it.it.process.pid
     it.start(FIRST)
@@ -124,7 +127,7 @@ def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
-    """As it ends one."""
+    """A signal ends one simulator in the same way."""
     it = two(request.getfixturevalue(what))
     it.start(FIRST)
     it.start(SECOND)
@@ -157,7 +160,7 @@ def test_the_log_says_whose_line_it_is(two, waits) -> None:
 
 
 def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
-    """A program that needs a port of its own can choose by it."""
+    """A program that needs its own port can choose it by the slot."""
     it = two("import os; print('up', os.environ['PALAESTRA_SIMULATOR_SLOT'])")
 
     it.it.request("/start")
@@ -168,7 +171,7 @@ def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
 
 
 def test_the_metrics_tell_the_two_apart(two, waits) -> None:
-    """By a label of which a sidecar with one simulator has one value."""
+    """A label separates them, which has only one value for a sidecar with one simulator."""
     it = two(waits)
     it.start(SECOND)
 
@@ -182,7 +185,7 @@ def test_the_metrics_tell_the_two_apart(two, waits) -> None:
 
 
 def test_the_health_port_shows_both_and_takes_no_orders(two, waits) -> None:
-    """People and the operator see the one that stands by, too."""
+    """Users and the operator also see the standby."""
     it = two(waits)
     it.start(SECOND)
 
@@ -200,7 +203,10 @@ def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
 
 
 def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family) -> None:
-    """It is the memory of all its processes. Before that the state is read fifty times a second."""
+    """It is the memory of all its processes.
+
+    Before that, the state is read fifty times a second.
+    """
     it = sidecar(family)
     before = it.start().rss_bytes
 

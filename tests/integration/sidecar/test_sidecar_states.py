@@ -1,4 +1,4 @@
-"""What other threads see of a simulator while its one owner acts."""
+"""The states that other threads see of a simulator while its only owner changes it."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ from tests.integration.sidecar.conftest import DEADLINE_S, eventually
 
 
 class Watched(SupervisedSimulator):
-    """A simulator that keeps every state which it lets others see."""
+    """A simulator that records every state which others can see."""
 
     def __setattr__(self, name, value):
         super().__setattr__(name, value)
@@ -24,7 +24,10 @@ class Watched(SupervisedSimulator):
 
 @pytest.mark.parametrize("statement", ["sys.exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
 def test_no_state_is_seen_half_made(statement) -> None:
-    """A trainer may ask at any moment and acts on what it reads: a failure comes with how it ended."""
+    """A trainer may read at any moment.
+
+    A failure is visible only together with how the simulator ended.
+    """
     program = (sys.executable, "-I", "-S", "-c", f"import os, signal, sys; {statement}")
     simulator = Watched(
         CommandLine(arguments=program, environment=dict(os.environ)),

@@ -1,4 +1,4 @@
-"""Driver webots, with a program that looks for controllers as Webots does."""
+"""The driver webots, with a program that looks for controllers as Webots does."""
 
 import os
 import sys
@@ -27,7 +27,7 @@ signal.pause()
 
 @pytest.fixture
 def webots(run_sidecar, tmp_path):
-    """Return how to run a sidecar with driver webots on the world `source/worlds/arena.wbt`."""
+    """Return a function that runs a sidecar with driver webots on the world `source/worlds/arena.wbt`."""
     program = tmp_path / "bin" / "webots"
     program.parent.mkdir()
     program.write_text(WEBOTS)
@@ -50,7 +50,7 @@ def webots(run_sidecar, tmp_path):
 
 @pytest.fixture
 def roll(tmp_path):
-    """Put the controller `roll` into the project of the world."""
+    """Write the controller `roll` into the project of the world."""
     path = tmp_path / "source" / "controllers" / "roll" / "roll.py"
     path.parent.mkdir(parents=True)
     path.write_text("roll.py")
@@ -58,7 +58,7 @@ def roll(tmp_path):
 
 @pytest.mark.usefixtures("roll")
 def test_webots_finds_the_controllers_of_the_project(webots) -> None:
-    """After a restart of the simulator and of the container too."""
+    """This also holds after a restart of the simulator and of the container."""
     it = webots("--job=j")
     it.start()
     it.request("/stop", {"deadline_s": 0})
@@ -87,7 +87,10 @@ def test_webots_finds_them_for_a_standby_as_well(webots) -> None:
 
 
 def test_a_controller_without_a_project_is_named_once(webots) -> None:
-    """In one line behind the addresses, which programs read; Webots warns of it at every start, if at all."""
+    """One line after the addresses names it, because programs read the addresses.
+
+    Webots warns about it at every start, if at all.
+    """
     it = webots("--job=j", "--standby")
     it.request("/start")
     it.until_said("a: started <generic> in collect-0.wbt")
@@ -98,7 +101,7 @@ def test_a_controller_without_a_project_is_named_once(webots) -> None:
 
 
 def test_a_world_for_ros_gets_the_name_and_the_option_that_it_lacks(webots) -> None:
-    """Most worlds that were made for the ros controller have neither."""
+    """Most worlds for the ros controller have neither."""
     it = webots("--job=j", "--uid=u")
 
     state = it.state

@@ -1,4 +1,4 @@
-"""Stubs that fail, and Palaestra's own robot as the client that has to bear it."""
+"""Stubs that fail, and Palaestra's own robot as the client that has to handle it."""
 
 import os
 import subprocess
@@ -17,18 +17,18 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.webots import Mode, Webots
 
-DEADLINE_S = 60.0  # of whatever ought to take moments, on a busy machine
+DEADLINE_S = 60.0  # of what takes moments, on a busy machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
 
 class Player:
-    """A simulator with faults, behind a sidecar, and the robot that is driven in it.
+    """A simulator with faults, run by a sidecar, and the robot in it.
 
     Attributes:
-        fault: what the facade made of the first thing that went wrong; None: nothing did.
-        durations_s: of the steps that were answered.
-        extra_steps: how many of them there were.
+        fault: the facade's error for the first failure; None if nothing failed.
+        durations_s: of the steps with a response.
+        extra_steps: the number of extra steps among them.
     """
 
     def __init__(self, *options):
@@ -42,7 +42,7 @@ class Player:
         self.memory_mib = []
 
     def play(self, episodes=26, steps=2):
-        """Start, play episodes until something goes wrong, and connect once more."""
+        """Start, run episodes until something fails, and connect once more."""
         try:
             self.start()
             for number in range(episodes):
@@ -61,7 +61,7 @@ class Player:
         self.memory_mib.append(self.resident_mib())
 
     def step(self):
-        """Take one step, and note how long it took."""
+        """Take one step, and record how long it took."""
         began = time.monotonic()
         self.extra_steps += self.robot.advance()
         self.robot.pose()
@@ -69,17 +69,17 @@ class Player:
         self.memory_mib.append(self.resident_mib())
 
     def resident_mib(self):
-        """Return the memory that the simulator's first process holds."""
+        """Return the memory of the simulator's first process."""
         pages = int(Path(f"/proc/{self.pid}/statm").read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
     @property
     def pid(self):
-        """The simulator's process."""
+        """Return the simulator's process id."""
         return self.launcher.state().pid
 
     def ended(self):
-        """Return how the simulator ended, once it has: its exit code, or its signal."""
+        """Wait for the end of the simulator, and return its exit code or its signal."""
         self.launcher.wait_stopped(DEADLINE_S)
         last = self.launcher.state().last_exit
         return last.code if last.signal is None else last.signal
@@ -93,7 +93,10 @@ class Player:
 
 @pytest.fixture
 def player(master):
-    """`player("crash:step=20", ...)`: a Player, in the first life of the simulator unless told otherwise."""
+    """Yield `player("crash:step=20", ...)`, which returns a Player.
+
+    By default the simulator is in its first life.
+    """
     del master
     made = []
 
@@ -108,7 +111,7 @@ def player(master):
 
 
 class Stubs:
-    """Stubs without a sidecar, under a name that no other test has left at the master.
+    """Stubs without a sidecar, with a name that no other test has left at the master.
 
     Attributes:
         name: of their robot.
@@ -124,7 +127,7 @@ class Stubs:
         self._started = []
 
     def __call__(self, *options, **variables):
-        """Start one."""
+        """Start a stub."""
         command = [STUB, *options, self._world]
         environment = {**self._variables, **variables}
         self._started.append(subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True))
@@ -139,7 +142,7 @@ class Stubs:
         return Master("/test").service_address(f"/{self.name}/robot/get_time") is not None
 
     def close(self):
-        """Kill what is left."""
+        """Kill the processes that still run."""
         for process in self._started:
             process.kill()
             process.communicate()
@@ -147,7 +150,10 @@ class Stubs:
 
 @pytest.fixture
 def stub(master, tmp_path):
-    """`stub("--fault=...", PALAESTRA_SIMULATOR_START="2")`: a running process, killed when the test ends."""
+    """Yield `stub("--fault=...", PALAESTRA_SIMULATOR_START="2")`, which starts a process.
+
+    It is killed when the test ends.
+    """
     stubs = Stubs(master, tmp_path)
     yield stubs
     stubs.close()

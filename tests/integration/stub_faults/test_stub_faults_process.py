@@ -1,4 +1,4 @@
-"""What becomes of the stub's process: how it ends, when it does not begin, and what it leaves alone."""
+"""The stub's process with faults: how it ends, when it does not start, and what it does not change."""
 
 import os
 import signal
@@ -13,13 +13,13 @@ from tests.waiting import eventually
 
 
 def up(process):
-    """Wait for the line that says that the controllers are up; the one about faults comes before it."""
+    """Wait for the line about the running controllers, which comes after the one about faults."""
     lines = iter(process.stderr.readline, "")
     assert any("arena.wbt: faulty_" in line for line in lines)
 
 
 def is_stopped(pid):
-    """Return whether a process was stopped by a signal."""
+    """Return whether a signal has stopped a process."""
     return "State:\tT" in Path(f"/proc/{pid}/status").read_text()
 
 
@@ -36,7 +36,7 @@ def is_stopped(pid):
     ],
 )
 def test_the_sidecar_sees_the_end_that_was_ordered(player, fault, how):
-    """What a person reads in its log, and what the operator tells a crash from."""
+    """A user reads it in the log, and the operator uses it to recognize a crash."""
     played = player(fault).play(episodes=1)
 
     assert played.ended() == how
@@ -44,7 +44,7 @@ def test_the_sidecar_sees_the_end_that_was_ordered(player, fault, how):
 
 
 def test_the_step_that_is_named_is_the_first_that_is_not_answered(player):
-    """So that a test can say which transition is lost."""
+    """A test can then say which transition is lost."""
     played = player("crash:step=5")
     played.start()
     for _ in range(4):
@@ -55,7 +55,7 @@ def test_the_step_that_is_named_is_the_first_that_is_not_answered(player):
 
 
 def test_24_resets_go_well_and_the_next_ends_in_a_bus_error(player):
-    """The paper reports this of its simulator."""
+    """The paper reports this for its simulator."""
     played = player("crash:signal=SIGBUS,reset=25").play()
 
     assert played.scene.resets == 25
@@ -63,7 +63,7 @@ def test_24_resets_go_well_and_the_next_ends_in_a_bus_error(player):
 
 
 def test_steps_are_counted_anew_after_a_restart(player):
-    """A fault at a step is a fault of each life."""
+    """A fault at a step occurs in each life."""
     played = player("crash:step=4").play(episodes=2)
     played.webots.stop()
     answered = len(played.durations_s)
@@ -78,7 +78,7 @@ def test_steps_are_counted_anew_after_a_restart(player):
 
 
 def test_a_simulator_that_never_starts_is_tried_again_in_vain(player):
-    """Each start is refused, and told as what it is."""
+    """Each start is refused, and the error says so."""
     played = player("start_refused")
     for _ in range(2):
         with pytest.raises(SimulatorDead, match="code 1"):
@@ -88,7 +88,7 @@ def test_a_simulator_that_never_starts_is_tried_again_in_vain(player):
 
 
 def test_one_start_can_be_refused_and_the_next_allowed(stub):
-    """The number of the start is what the sidecar counts."""
+    """The sidecar counts the starts."""
     refused = stub("--fault=start_refused:start=1", PALAESTRA_SIMULATOR_START="1")
 
     assert refused.wait(20) == 1
@@ -99,7 +99,7 @@ def test_one_start_can_be_refused_and_the_next_allowed(stub):
 
 
 def test_a_slow_start_can_be_ended_at_once(stub):
-    """Nothing is deaf while it waits: SIGTERM still ends it in good order."""
+    """During the wait, SIGTERM still ends it properly."""
     process = stub("--fault=slow_start:latency_ms=60000", "--fault-life=1")
     assert "faults: slow_start:latency_ms=60000 (seed 0, life 1)" in process.stderr.readline()
 
@@ -110,7 +110,7 @@ def test_a_slow_start_can_be_ended_at_once(stub):
 
 
 def test_a_hanging_process_is_stopped_and_can_be_continued(player):
-    """SIGCONT lets the step go on, so a hang that ends late can be tried too."""
+    """After SIGCONT the step continues, so that a late end of a hang can also be tested."""
     played = player("hang:step=2")
     played.start()
     played.step()
@@ -125,7 +125,7 @@ def test_a_hanging_process_is_stopped_and_can_be_continued(player):
 
 
 def test_names_that_are_lost_are_gone_while_the_process_lives(stub):
-    """Connections that are open go on."""
+    """Open connections continue to work."""
     process = stub("--fault=names_lost:step=1")
     up(process)
     get_time = stub.service("robot/get_time", "get_float")
@@ -141,7 +141,7 @@ def test_names_that_are_lost_are_gone_while_the_process_lives(stub):
 
 
 def test_memory_grows_up_to_its_limit(player):
-    """It is really in use, not only asked for; a container's limit would end it."""
+    """The process really uses it, so a container's limit would end it."""
     played = player("memory_growth:mib=10,most_mib=60")
     played.start()
     before = played.memory_mib[-1]
@@ -176,7 +176,7 @@ def test_the_environment_orders_faults_for_a_job(stub):
     ],
 )
 def test_what_is_written_wrongly_is_refused_before_anything_starts(stub, text, words):
-    """A fault that never happens would look like code that bears it."""
+    """A fault that never happens would look as if the code could handle it."""
     process = stub(f"--fault={text}")
 
     _, said = process.communicate(timeout=20)
@@ -195,21 +195,21 @@ def test_without_a_count_the_life_is_drawn_and_printed(stub):
 
 
 def steps_of_a_life(played):
-    """Return how many steps of one long episode a simulator answers until it dies."""
+    """Return the number of steps in one long episode before a simulator dies."""
     played.play(episodes=1, steps=400)
     played.webots.stop()
     return len(played.durations_s)
 
 
 def test_lives_do_not_end_at_the_same_step(player):
-    """A crash by chance stays a crash by chance, however often the simulator is restarted."""
+    """A crash by chance occurs at another step in each life, however often the simulator is restarted."""
     lengths = [steps_of_a_life(player("crash:probability=0.05", life=life)) for life in (1, 2, 3)]
 
     assert len(set(lengths)) == 3
 
 
 def test_a_life_can_be_repeated(player):
-    """Same seed, same simulator, same life: same faults."""
+    """The same life of the same simulator with the same seed has the same faults."""
     lengths = [steps_of_a_life(player("crash:probability=0.05", life=2)) for _ in range(2)]
 
     assert lengths[0] == lengths[1]

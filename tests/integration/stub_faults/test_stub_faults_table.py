@@ -1,4 +1,4 @@
-"""The table of faults in docs/reference/faults.md: each of its lines happens, and is reported as it says."""
+"""The table of faults in docs/reference/faults.md: each line occurs, with the report in the table."""
 
 import re
 from pathlib import Path
@@ -16,13 +16,13 @@ DELAY_S = 0.05
 
 
 def rows():
-    """Return the lines of the table: the fault as it is written, and the report."""
+    """Return the lines of the table as fault and report."""
     text = PAGE.read_text().partition("## The kinds")[2].partition("## When")[0]
     return [pytest.param(row["fault"], row["report"], id=row["fault"]) for row in ROW.finditer(text)]
 
 
 def test_the_table_names_every_kind_of_the_language():
-    """A fault that nobody can look up would as well not be there."""
+    """Users must find every kind of fault in the table."""
     written = {row.values[0].partition(":")[0] for row in rows()}
 
     assert written == set(KINDS)

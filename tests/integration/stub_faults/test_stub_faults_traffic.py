@@ -1,4 +1,4 @@
-"""What becomes of requests, answers and messages, seen from the other end of the wire."""
+"""The requests, responses and messages of a stub with faults, as a client sees them."""
 
 import math
 import select
@@ -13,12 +13,12 @@ from tests.integration.stub_faults.conftest import DEADLINE_S
 from tests.waiting import eventually
 
 PERIOD_MS = 192
-SLOW_MS = 3000  # so long that what does not wait for it comes before, on a busy machine
+SLOW_MS = 3000  # so long that all other requests are faster, on a busy machine
 
 
 @pytest.fixture
 def connected(player):
-    """`connected("slow:...")`: a Player that has started, with services of its own beside it."""
+    """Yield `connected("slow:...")`, which returns a started Player and a function for its services."""
     services = []
 
     def make(*faults):
@@ -37,7 +37,7 @@ def connected(player):
 
 
 def test_everything_else_waits_behind_a_slow_step(connected):
-    """Webots holds a mutex while it steps; so a slow step is not told from a busy simulator."""
+    """Webots locks a mutex while it steps, so a slow step looks to clients like a busy simulator."""
     _, service = connected("slow:latency_ms=300,step=1")
     step, get_time = service("robot/time_step", "set_int"), service("robot/get_time")
     get_time(ask=True)
@@ -50,7 +50,7 @@ def test_everything_else_waits_behind_a_slow_step(connected):
 
 
 def test_only_its_own_client_waits_for_a_slow_service(connected):
-    """The controller is not blocked by it."""
+    """The service does not block the controller."""
     _, service = connected(f"slow:service=robot/get_model,latency_ms={SLOW_MS}")
     get_model, get_time = service("robot/get_model", "get_string", DEADLINE_S), service("robot/get_time")
     get_time(ask=True)
@@ -62,7 +62,7 @@ def test_only_its_own_client_waits_for_a_slow_service(connected):
 
 
 def test_a_service_that_hangs_leaves_the_others_alone(connected):
-    """And a new connection to it hangs too."""
+    """A new connection to this service also hangs."""
     played, service = connected("hang:service=robot/get_model")
     for _ in range(2):
         with pytest.raises(SimulatorHung):
@@ -73,7 +73,7 @@ def test_a_service_that_hangs_leaves_the_others_alone(connected):
 
 
 def test_one_call_can_go_wrong(connected):
-    """The first and the third do not."""
+    """The first and the third call do not fail."""
     _, service = connected("wrong_value:service=robot/get_basic_time_step,call=2,value=inf")
     ask = service("robot/get_basic_time_step")
 
@@ -81,7 +81,7 @@ def test_one_call_can_go_wrong(connected):
 
 
 def test_numbers_inside_of_an_answer_go_wrong_too(connected):
-    """A position is a point, whose numbers are one level down."""
+    """A position is a point, whose numbers are one level deeper."""
     _, service = connected("wrong_value:service=supervisor/node/get_position,value=-inf")
     node = service("supervisor/get_from_def", "supervisor_get_from_def")(name="ROBOTINO").node
 
@@ -91,7 +91,7 @@ def test_numbers_inside_of_an_answer_go_wrong_too(connected):
 
 
 def test_an_answer_cut_short_cannot_be_read(connected):
-    """Its frame is whole, so the stream stays in step and the next answer is right."""
+    """Its frame is complete, so the stream stays in step and the next response is right."""
     _, service = connected("wrong_shape:service=robot/get_basic_time_step,call=1")
     ask = service("robot/get_basic_time_step")
 
@@ -101,7 +101,7 @@ def test_an_answer_cut_short_cannot_be_read(connected):
 
 
 def test_a_message_cut_short_cannot_be_read(connected):
-    """A reader that decodes only the last bytes of a message must check its length, too."""
+    """A reader that decodes only the last bytes of a message must also check its length."""
     _, service = connected("wrong_shape:topic=ir1/value,step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range")
     subscriber.connect()
@@ -116,7 +116,7 @@ def test_a_message_cut_short_cannot_be_read(connected):
 
 
 def test_late_messages_come_after_newer_ones(connected):
-    """The order of a topic is not the order of steps any more, as with a subscriber that lags."""
+    """The order of a topic then differs from the order of the steps, as with a slow subscriber."""
     _, service = connected(f"late:topic=ir1/value,latency_ms={SLOW_MS},step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range", deadline_s=DEADLINE_S)
     subscriber.connect()
@@ -131,7 +131,7 @@ def test_late_messages_come_after_newer_ones(connected):
 
 
 def test_messages_of_other_sensors_are_left_alone(connected):
-    """A star takes them together: here all distances but not the bumper."""
+    """A star selects several topics: here all distances, but not the bumper."""
     _, service = connected("lost:topic=ir*/value")
     silent = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range", deadline_s=0.2)
     heard = RosSubscriber("/robotino/touch_sensor/value", "webots_ros/BoolStamped")
@@ -148,7 +148,7 @@ def test_messages_of_other_sensors_are_left_alone(connected):
 
 
 def test_a_client_that_gave_up_a_slow_step_does_not_block_the_next(connected):
-    """Its step is not made; the robot is free again."""
+    """Its step is not made, and the robot is free again."""
     _, service = connected("slow:latency_ms=500,step=1")
     impatient = service("robot/time_step", "set_int", deadline_s=0.1)
     with pytest.raises(SimulatorHung):
@@ -159,7 +159,7 @@ def test_a_client_that_gave_up_a_slow_step_does_not_block_the_next(connected):
 
 
 def test_two_clients_are_served_after_a_slow_step(connected):
-    """Everyone who waited gets an answer, in order."""
+    """Each client that waited gets a response, in order."""
     _, service = connected("slow:latency_ms=300,step=1")
     step = service("robot/time_step", "set_int")
     answers = []
@@ -178,7 +178,7 @@ def test_two_clients_are_served_after_a_slow_step(connected):
 
 
 def test_a_subscriber_that_has_gone_is_listed_no_more(connected, master):
-    """`rosnode info` of a stub with faults showed every subscriber that it has ever had."""
+    """Once, `rosnode info` of a stub with faults listed every subscriber since its start."""
     connected("lost:topic=ir1/value,every=20")
     with xmlrpc.client.ServerProxy(master) as names:
         node = xmlrpc.client.ServerProxy(names.lookupNode("/test", "/robotino")[2])

@@ -1,4 +1,4 @@
-"""Runs on fakes: in this process, or as a program of their own, which has to import PyTorch first."""
+"""Runs on fakes: in this process, or as a separate program, which has to import PyTorch first."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate
 
 @pytest.fixture(scope="session")
 def fakes() -> ModuleType:
-    """Return the module with the fake simulators, which is a program as well."""
+    """Return the module with the fake simulators, which is also a program."""
     spec = importlib.util.spec_from_file_location("fakes", PROGRAM)
     assert spec
     assert spec.loader
@@ -36,7 +36,7 @@ def fakes() -> ModuleType:
 
 @pytest.fixture
 def write_job(tmp_path):
-    """Write a training.yaml; the test says what matters."""
+    """Return a function that writes a training.yaml; the test gives the fields that matter."""
 
     def write(*, collectors: int = 1, **changes: Any) -> Path:
         groups = [("collect", "Collect", index) for index in range(collectors)]
@@ -62,9 +62,9 @@ def write_job(tmp_path):
 
 @pytest.fixture
 def play(fakes, tmp_path, monkeypatch, capsys):
-    """Play an attempt in this process; return its exit code and its log.
+    """Return a function that runs an attempt in this process and returns its exit code and log.
 
-    The first simulator dies at its steps `deaths`; at its step `at`, this process gets a signal.
+    The first simulator dies at its steps `deaths`. At its step `at`, this process gets a signal.
     """
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     configure_logs()
@@ -83,7 +83,7 @@ def play(fakes, tmp_path, monkeypatch, capsys):
 
 @pytest.fixture
 def start(tmp_path):
-    """Start the program on a configuration; it is killed at the end if it is still there."""
+    """Yield a function that starts the program on a configuration, and kill the programs at the end."""
     started = []
 
     def begin(job: Path, deaths: str = "") -> subprocess.Popen[str]:
@@ -108,7 +108,10 @@ def start(tmp_path):
 
 @pytest.fixture
 def simulators(master, tmp_path, monkeypatch):
-    """Sidecars of a job with two collecting simulators and one that evaluates; PALAESTRA_CONFIG names it."""
+    """Yield the sidecars of a job with two collecting simulators and one evaluating simulator.
+
+    PALAESTRA_CONFIG names the job.
+    """
     del master
     launchers = {
         name: ProcessLauncher(

@@ -1,9 +1,8 @@
 """A trainer whose simulators are fakes in its own process: `fakes.py CONFIG RUN [DEATHS]`.
 
-The same program as `palaestra-train` but for where simulators come from, so
-that signals, exit codes and resuming are tried on a real process. DEATHS are
-the numbers of the steps, separated by commas, at which `collect-0` dies; at 0
-it does not even come up.
+It is `palaestra-train` with other simulators, so that tests can use a real process for signals, exit codes
+and resumed runs. DEATHS are the numbers of the steps, separated by commas, at which `collect-0` dies. With 0
+it does not even start.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ from palaestra_trainer.testing import fake_arena, fake_seeing
 
 
 class CountedResets(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment that knows how often it was reset."""
+    """An environment that counts its resets."""
 
     resets = 0
 
     def reset(self, **options: Any) -> Any:
-        """Count it."""
+        """Count the reset."""
         self.resets += 1
         return super().reset(**options)
 
@@ -52,14 +51,14 @@ class FakeSimulator:
 
     @property
     def resets(self) -> int:
-        """Resets since the last restart."""
+        """Return the resets since the last restart."""
         return self.env.resets
 
     def due(self, episodes: int = 1) -> None:
-        """It does not wear out."""
+        """Do nothing, because a fake does not wear out."""
 
     def start(self) -> None:
-        """Begin to live, or never come up."""
+        """Start, or never become ready."""
         self.log.append("start")
         if self._hangs:
             sys.stderr.write("never comes up\n")
@@ -67,29 +66,29 @@ class FakeSimulator:
             raise SimulatorDead(self.name, "abandoned")
 
     def stop(self) -> None:
-        """Note it."""
+        """Record the call."""
         self.log.append("stop")
 
     def close(self) -> None:
-        """Note it."""
+        """Record the call."""
         self.log.append("close")
 
     def restart(self) -> None:
-        """Live again."""
+        """Begin another life."""
         self.log.append("restart")
         self.robot.restart()
         self.env.resets = 0
 
     def abandon(self) -> None:
-        """Come up no more."""
+        """End the start, which then fails."""
         self._abandoned.set()
 
     def pause(self) -> None:
-        """Note it."""
+        """Record the call."""
         self.log.append("pause")
 
     def unpause(self) -> None:
-        """Note it."""
+        """Record the call."""
         self.log.append("run")
 
 
@@ -103,13 +102,13 @@ def make_members(configuration: Configuration, deaths: Collection[int] = ()) -> 
 
 
 def before_step(robot: Any, step: int, act: Callable[[], Any]) -> None:
-    """Let `act` be called before that step of a robot, counted from 1; at 0 it is not."""
+    """Make a robot call `act` before the given step, counted from 1; with 0 it never does."""
     steps, advance = itertools.count(1), robot.advance
     robot.advance = lambda: (next(steps) == step and act(), advance())[1]
 
 
 def main(config: str, run: str, deaths: str = "") -> int:
-    """Train; return the exit code."""
+    """Train, and return the exit code."""
     configure_logs()
     numbers = [int(number) for number in deaths.split(",") if number]
     return attempt.run(load(Path(config)), RunDirectory(Path(run)), lambda it: make_members(it, numbers))

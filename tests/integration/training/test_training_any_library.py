@@ -35,7 +35,10 @@ while True:
 
 @pytest.fixture
 def stubs(master, monkeypatch):
-    """As in a notebook, with stubs that have the faults that the test orders; the same ones each time."""
+    """Return a function that gives stubs the faults of the test, as in a notebook.
+
+    The faults are the same ones each time.
+    """
     del master
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
     monkeypatch.setenv("PALAESTRA_STUB_FAULT_SEED", "1")
@@ -43,14 +46,14 @@ def stubs(master, monkeypatch):
 
 
 class Checked(gymnasium.vector.VectorWrapper):
-    """A vector environment whose rows are all looked at; it counts steps, and episodes that a fault cut."""
+    """A vector environment that checks all rows, and counts steps and episodes that a fault ended."""
 
     def __init__(self, env):
         super().__init__(env)
         self.steps = self.cut = 0
 
     def step(self, actions):
-        """Step, and look."""
+        """Take a step and check the result."""
         result = super().step(actions)
         observations, rewards, _, truncations, infos = result
         faults = (
@@ -67,7 +70,7 @@ class Checked(gymnasium.vector.VectorWrapper):
 
 @pytest.mark.parametrize("script", ["ppo_in_one_file.py", "skrl_ppo.py"])
 def test_a_loop_of_another_library_survives_crashes(stubs, script, monkeypatch, tmp_path, capsys):
-    """It is unmodified: it takes an environment, and knows nothing of simulators."""
+    """The loop is unmodified: it accepts an environment, and knows nothing about simulators."""
     stubs("crash:probability=0.02")
     make, made = palaestra_trainer.make_vec_env, []
     monkeypatch.setattr(
@@ -85,7 +88,7 @@ def test_a_loop_of_another_library_survives_crashes(stubs, script, monkeypatch, 
 
 
 def test_stable_baselines3_survives_crashes(stubs):
-    """Its own check looks at every number."""
+    """The library's own check examines every number."""
     stubs("crash:probability=0.02")
     env = palaestra_trainer.make_sb3_vec_env(TASK, 2, max_steps=30)
     try:
@@ -100,7 +103,7 @@ def test_stable_baselines3_survives_crashes(stubs):
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_the_checkers_accept_an_environment_of_one_simulator(stubs):
-    """On a real stub; gymnasium's and Stable-Baselines3's."""
+    """The checkers of gymnasium and Stable-Baselines3 run on a real stub."""
     stubs("")
     env = palaestra_trainer.make_env(TASK)
     try:
@@ -112,7 +115,7 @@ def test_the_checkers_accept_an_environment_of_one_simulator(stubs):
 
 @pytest.mark.usefixtures("stubs")
 def test_an_environment_without_a_name_needs_a_job():
-    """In a notebook nothing else names it."""
+    """In a notebook nothing else names the environment."""
     with pytest.raises(
         ConfigurationError, match="environment: none was given, and PALAESTRA_CONFIG is not set"
     ):
@@ -124,7 +127,10 @@ def test_an_environment_without_a_name_needs_a_job():
 
 
 def test_the_simulators_of_a_job_are_used_and_released(simulators):
-    """All that collect, and none that evaluates; after `close` another environment may have them."""
+    """The environment uses all collecting simulators and no evaluating one.
+
+    After `close` another environment may have them.
+    """
     envs = palaestra_trainer.make_vec_env()
     envs.reset(seed=1)
     running = [name for name, launcher in simulators.items() if launcher.ready()]
@@ -144,7 +150,7 @@ def test_ctrl_c_ends_everything_that_was_started(stubs):
     with subprocess.Popen(
         [sys.executable, "-c", LOOP], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:
-        assert "steps\n" in iter(program.stdout.readline, "")  # after what it logs on a busy machine
+        assert "steps\n" in iter(program.stdout.readline, "")  # after the log lines of a busy machine
         started = [pid for pid, _ in below(program.pid) if pid != program.pid]
         program.send_signal(signal.SIGINT)
         _, said = program.communicate(timeout=PATIENCE_S)

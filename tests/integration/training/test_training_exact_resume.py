@@ -1,4 +1,4 @@
-"""A run that was interrupted is the run that was not: bit by bit, on fakes."""
+"""An interrupted and resumed run is equal to an uninterrupted one, bit for bit, on fakes."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ SMALL = {"policy_kwargs": {"net_arch": [16]}}
 OFF_POLICY = SMALL | {"learning_starts": 50, "batch_size": 16, "buffer_size": 300}
 ON_POLICY = SMALL | {"learning_rate": "lin_1e-3"}
 ALGORITHMS = {
-    # The target network changes amid a rollout, and epsilon and learning rate with progress.
+    # The target network changes during a rollout; epsilon and learning rate change with progress.
     "DQN": OFF_POLICY | {"exploration_fraction": 0.7},
     "PPO": ON_POLICY | {"n_steps": 64, "batch_size": 16, "n_epochs": 2},
     "A2C": ON_POLICY,
-    # Its entropy coefficient is learned, by an optimizer of its own.
+    # Another optimizer learns its entropy coefficient.
     "SAC": OFF_POLICY,
     "REINFORCE": ON_POLICY | {"episodes_per_update": 2},
 }
 
 
 def terminate():
-    """Ask the run to end, at whatever it does."""
+    """Interrupt the run at any point."""
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def lose_the_master():
-    """End the run amid a rollout; it saves where it last was whole."""
+    """End the run during a rollout; it saves its last complete state."""
     raise MasterLost("gone")
 
 
 def kill():
-    """End the run without a word."""
+    """End the run suddenly."""
     raise ZeroDivisionError("as good as a kill")
 
 
@@ -58,23 +58,24 @@ INTERRUPTIONS = {terminate: 75, lose_the_master: 75, kill: 1}
 
 
 class Listening(Progress):
-    """Keeps step, return and length of each episode."""
+    """A display that keeps step, return and length of each episode."""
 
     def __init__(self, configuration):
         super().__init__(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
         self.ended = []
 
     def collected(self, step, infos):
-        """Keep what ended in this step."""
+        """Keep the episodes that ended in this step."""
         super().collected(step, infos)
         self.ended += [(step, *(info["episode"][key] for key in "rl")) for info in infos if "episode" in info]
 
 
 @pytest.fixture
 def attempt(fakes):
-    """Play one attempt; return its exit code. `interrupt` is called at one step of the first robot.
+    """Return a function that runs one attempt and returns its exit code.
 
-    `episodes` becomes those up to the checkpoint that it began from, and its own.
+    It calls `interrupt` at one step of the first robot. `episodes` becomes those up to the checkpoint from
+    which the attempt began, and the attempt's own.
     """
     configure_logs()
 
@@ -98,7 +99,7 @@ def attempt(fakes):
 
 
 def tensors(path):
-    """Return every tensor of a model and its optimizers by name, and what it normalizes by."""
+    """Return every tensor of a model and its optimizers by name, and the statistics of its normalization."""
     _, parameters, variables = load_from_zip_file(path, device="cpu", load_data=False)
 
     def walk(name, value):
@@ -115,7 +116,7 @@ def tensors(path):
 
 
 def outcome(directory):
-    """Return what a run came to, by name: all that its next step would depend on, and its evaluations."""
+    """Return the results of a run by name: all data that its next step uses, and its evaluations."""
     found = checkpoint.newest(directory.checkpoints)
     state = json.loads((found.path / "state.json").read_text())
     for episode in state["episodes"]:
@@ -128,14 +129,14 @@ def outcome(directory):
 
 
 def differences(one, other):
-    """Return the names of what is not equal in two runs."""
+    """Return the names of the data that differ between two runs."""
     this, that = outcome(one), outcome(other)
     return [name for name in this.keys() | that.keys() if this.get(name) != that.get(name)]
 
 
 @pytest.fixture
 def job(write_job):
-    """Write the job of a short run of an algorithm."""
+    """Return a function that writes the job of a short run of an algorithm."""
 
     def write(name, collectors=1, actions="discrete", normalize=None, **hyperparameters):
         options = {"max_steps": 30, "actions": "continuous" if name == "SAC" else actions}
@@ -155,9 +156,10 @@ def job(write_job):
 @pytest.mark.parametrize("collectors", [1, 2])
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name, collectors):
-    """By a signal, amid a rollout and by a kill, at random points; equal to the last bit.
+    """A signal, the loss of the master and a kill interrupt runs at random points.
 
-    Compared are returns, evaluations, parameters, optimizers, experience and random generators.
+    The test compares returns, evaluations, parameters, optimizers, experience and random generators, to the
+    last bit.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     points = random.Random(f"{name} {collectors}")
@@ -184,7 +186,7 @@ def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name
     ],
 )
 def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, name, collectors, normalize):
-    """Its statistics change with every step, also amid a rollout that is played again."""
+    """The statistics change with every step, also during a rollout that is repeated."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     normalizing = job(name, collectors, normalize=normalize)
     ended, played = [], []
@@ -201,9 +203,9 @@ def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, n
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_path, name):
-    """A signal waits for no update of minutes; what it changed so far is put back.
+    """A signal does not wait minutes for an update; its changes so far are undone.
 
-    In its second gradient step of an optimizer, where it takes so many; none is taken after it.
+    The signal comes in the second gradient step of an optimizer that makes many, and no further step follows.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     asked_at = 1 if name in {"A2C", "REINFORCE"} else 2
@@ -227,7 +229,7 @@ def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_p
 
 @pytest.mark.parametrize("name", ["DQN", "SAC"])
 def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name):
-    """Before an off-policy run learns, its updates take no time: that says nothing of the first one."""
+    """Before an off-policy run learns, its updates take no time, which says nothing about the first one."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     thorough = job(name, gradient_steps=4)
     ended, played, steps = [], [], itertools.count(1)
@@ -249,7 +251,7 @@ def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name)
 
 @pytest.mark.parametrize("name", ["PPO", "SAC"])
 def test_state_dependent_exploration_goes_on_with_its_noise(attempt, job, tmp_path, name):
-    """It is drawn once a rollout, before the boundary."""
+    """The noise is drawn once per rollout, before the boundary."""
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     noisy = job(name, actions="continuous", use_sde=True, sde_sample_freq=7)
 

@@ -1,4 +1,4 @@
-"""`examples/own_training_script.py`, on fakes."""
+"""The script `examples/own_training_script.py`, on fakes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
 
 class Hall(gymnasium.Env):
-    """An environment with the two arguments that it needs: neither role nor reward."""
+    """An environment with only the two arguments that it needs, without role or reward."""
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)
@@ -44,7 +44,7 @@ class Hall(gymnasium.Env):
 
 @pytest.fixture
 def hall():
-    """Return the id under which it is registered."""
+    """Register the environment and yield its id."""
     gymnasium.register(id="Hall-v0", entry_point=Hall)
     yield "Hall-v0"
     gymnasium.registry.pop("Hall-v0")
@@ -52,7 +52,10 @@ def hall():
 
 @pytest.fixture
 def script(write_job, fakes, tmp_path, monkeypatch):
-    """Run the script in two simulators and one to evaluate in; return the names of those that it started."""
+    """Yield a function that runs the script with two simulators and one for evaluation.
+
+    It returns the names of the simulators that the script started.
+    """
     before = signal.getsignal(signal.SIGTERM)
     (tmp_path / "run").mkdir()
     monkeypatch.setenv("PALAESTRA_RUN", str(tmp_path / "run"))
@@ -78,7 +81,7 @@ def script(write_job, fakes, tmp_path, monkeypatch):
 
 
 def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_path, capsys):
-    """It needs nothing but gymnasium, Stable-Baselines3 and the two variables."""
+    """It needs only gymnasium, Stable-Baselines3 and the two variables."""
     started = script("first")
 
     assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == 1024
@@ -87,14 +90,14 @@ def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_p
 
 
 def test_a_script_of_one_s_own_trains_in_an_environment_without_reward_and_role(script, hall, capsys):
-    """What people copy must take any environment that the built-in loop takes."""
+    """Users copy the script, so it must accept any environment that the built-in loop accepts."""
     script("first", environment={"id": hall})
 
     assert "mean return 5.00 over 4 episodes" in capsys.readouterr().out
 
 
 def test_a_script_that_is_interrupted_goes_on_from_its_model(script, tmp_path, capsys):
-    """Its exit code asks to be started again; that would be a lie if everything were lost."""
+    """Its exit code requests a restart, which would be useless if the script lost its work."""
     with pytest.raises(SystemExit) as ended:
         script("first", on_start=lambda: os.kill(os.getpid(), signal.SIGTERM))
     first = PPO.load(tmp_path / "run" / "model.zip").num_timesteps

@@ -1,4 +1,4 @@
-"""A policy leaves its run as one file, which acts as it did."""
+"""A policy leaves its run as one file, which acts like the policy in the run."""
 
 import json
 import os
@@ -36,7 +36,10 @@ CASES = {
 
 @pytest.fixture
 def trained(write_job, play, tmp_path):
-    """Return the run directory of a short run; its job is that of the others but for what is given."""
+    """Return a function that trains a short run and returns its run directory.
+
+    The arguments change fields of the usual job.
+    """
 
     def run(**changes):
         wanted = {"steps": 128, "evaluation": {"everySteps": 64, "episodes": 2, "confirmEpisodes": 3}}
@@ -48,7 +51,7 @@ def trained(write_job, play, tmp_path):
 
 @pytest.mark.parametrize("case", CASES)
 def test_onnxruntime_acts_as_the_policy_in_the_environment(trained, case):
-    """With the environment's own observations; the export compares a thousand that it draws."""
+    """The observations here come from the environment, while the export compares a thousand random ones."""
     run = trained(**CASES[case])
 
     written = exporting.export(run, "onnx")
@@ -93,7 +96,7 @@ def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
 
 
 def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
-    """So a person can load them into the same network, elsewhere."""
+    """A user can then load them into the same network elsewhere."""
     run = trained(**CASES["PPO"])
 
     written = exporting.export(run, "safetensors", run / "of my own.safetensors")
@@ -107,7 +110,10 @@ def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
 
 
 def test_a_file_that_acts_differently_is_not_written(trained, monkeypatch):
-    """A converter with a bug ends here, not on a robot; the file of before stays."""
+    """A converter's fault ends here and not on a robot.
+
+    The earlier file stays.
+    """
     run = trained(**CASES["A2C"])
     (run / "policy.onnx").write_bytes(b"before")
     right = onnx_file.runner
@@ -125,7 +131,7 @@ def test_a_file_that_acts_differently_is_not_written(trained, monkeypatch):
 
 
 def test_the_program_prints_where_the_file_is(trained, capsys):
-    """As JSON, for scripts."""
+    """The output is JSON, for scripts."""
     run = trained(**CASES["A2C"])
 
     assert cli.export([str(run), "--to", "safetensors"]) == 0
@@ -136,14 +142,14 @@ def test_the_program_prints_where_the_file_is(trained, capsys):
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path, capsys):
-    """With the remedy, and the exit code of wrong input."""
+    """The error gives the remedy, and the exit code is that of wrong input."""
     assert cli.export([str(tmp_path), "--to", "onnx"]) == 2
 
     assert "model.zip: does not exist; train first" in capsys.readouterr().err
 
 
 def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
-    """With onnxruntime and the robot's facades; the process never imports the library that trained."""
+    """It uses onnxruntime and the robot's facades; the process never imports the library that trained."""
     written = exporting.export(trained(**CASES["PPO"]), "onnx")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     alone = (

@@ -27,7 +27,7 @@ HINDSIGHT = {
 
 @pytest.fixture
 def job(write_job):
-    """Write a job with hindsight experience replay."""
+    """Return a function that writes a job with hindsight experience replay."""
 
     def write(name="DQN", environment=GOALS, **changes):
         actions = {"actions": "continuous"} if name == "SAC" else {}
@@ -40,7 +40,10 @@ def job(write_job):
 
 @pytest.fixture
 def attempt(fakes, tmp_path):
-    """Play one attempt into a folder; a signal comes at step `at` of the first robot."""
+    """Return a function that runs one attempt into a folder.
+
+    A signal comes at step `at` of the first robot.
+    """
 
     def play(job, folder, at=0, deaths=(90, 150)):
         def make_members(given):
@@ -55,7 +58,7 @@ def attempt(fakes, tmp_path):
 
 
 def digests(directory):
-    """Return the digests of the newest checkpoint's experience, and its weights."""
+    """Return the step of the newest checkpoint and the digests of its experience."""
     newest = checkpoint.newest(directory.checkpoints)
     files = newest.manifest.files
     return newest.manifest.step, {name: files[name] for name in files if name.startswith("experience")}
@@ -63,7 +66,7 @@ def digests(directory):
 
 @pytest.mark.parametrize(("name", "more"), [("DQN", {}), ("SAC", {}), ("DQN", {"normalize": {}})])
 def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more):
-    """With several members, of which one dies twice; its model is one of Stable-Baselines3."""
+    """It has several members, of which one dies twice; its model is one of Stable-Baselines3."""
     algorithm = {"name": name, "hyperparameters": HINDSIGHT} | more
     code, directory = attempt(job(name, algorithm=algorithm), "run")
 
@@ -79,7 +82,10 @@ def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more)
 
 @pytest.mark.parametrize("at", [20, 77, 120, 201])
 def test_an_interrupted_run_ends_as_one_that_was_not(job, attempt, at):
-    """Before the first episode is whole, amid episodes, and after the buffer is full; bit by bit."""
+    """The signal comes before the end of the first episode, during episodes, or after the buffer is full.
+
+    The ends are equal, bit for bit.
+    """
     written = job(steps=600, evaluation={"everySteps": 300, "episodes": 2, "confirmEpisodes": 0})
 
     _, whole = attempt(written, "whole", deaths=())
@@ -92,7 +98,7 @@ def test_an_interrupted_run_ends_as_one_that_was_not(job, attempt, at):
 
 
 def test_a_task_without_goals_is_refused(job, play):
-    """Before a simulator starts."""
+    """The error comes before a simulator starts."""
     plain = {"id": "MoveToTargetEnv-v0", "options": {}}
 
     code, log = play(job(environment=plain))

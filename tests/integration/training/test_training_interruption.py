@@ -1,4 +1,4 @@
-"""Signals that come before a run listens for them, or after its end."""
+"""Signals that arrive before a run handles them, or after its end."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ with leaving_when_asked():
 
 
 def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
-    """Its imports take seconds; an eviction in them must not count as a failure of the trainer."""
+    """The imports take seconds, and an eviction during them must not count as a failure of the trainer."""
     ended = subprocess.run(
         [sys.executable, "-c", ASKED_DURING_IMPORTS], capture_output=True, text=True, check=False
     )
@@ -30,7 +30,7 @@ def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
 
 
 def test_a_trainer_that_is_asked_to_end_after_its_run_keeps_its_exit_code():
-    """Python needs a second to exit; a finished run must not count as one that was killed."""
+    """Python needs a second to exit, and a finished run must not count as a killed one."""
     ended = subprocess.run([sys.executable, "-c", ASKED_AT_EXIT], capture_output=True, text=True, check=False)
 
     assert ended.returncode == 0, ended.stderr

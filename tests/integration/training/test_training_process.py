@@ -1,6 +1,6 @@
-"""A trainer as a process has it: signals, exit codes, resuming.
+"""A trainer as a process: signals, exit codes, resumed runs.
 
-A process of its own is started where the test ends it; elsewhere the same runs in this one.
+Where a test kills the trainer, it starts a separate process; elsewhere it runs the same program in this one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ REINFORCE = {"name": "REINFORCE", "hyperparameters": {"episodes_per_update": 2}}
 
 
 def await_line(process, word):
-    """Read its log until a line holds `word`."""
+    """Read the process's log up to a line with `word`."""
     for line in process.stderr:
         if word in line:
             return line
@@ -28,13 +28,13 @@ def await_line(process, word):
 
 
 def end(process):
-    """Return its exit code and the rest of its log."""
+    """Return the process's exit code and the rest of its log."""
     _, log = process.communicate(timeout=DEADLINE_S)
     return process.returncode, log
 
 
 def summary(folder):
-    """Return summary.json of the run."""
+    """Return the contents of the run's summary.json."""
     return json.loads((folder / "run" / "summary.json").read_text())
 
 
@@ -44,9 +44,9 @@ def summary(folder):
     ids=["DQN", "PPO", "REINFORCE"],
 )
 def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors, steps):
-    """It ends with 0 and all of its steps, and says that there was one.
+    """It ends with 0 after all of its steps, and reports one fault.
 
-    A rollout of two has as many invalid rows as the mending takes steps of the other.
+    A rollout of two simulators has one invalid row for each step of the other simulator during the repair.
     """
     job = write_job(algorithm=algorithm, collectors=collectors)
 
@@ -68,7 +68,7 @@ def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors
 def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
     write_job, play, tmp_path, algorithm, total, number
 ):
-    """Ctrl-C at a third, and again: it goes on at the step of its checkpoint."""
+    """Ctrl-C comes after a third of the steps; the same command then continues from the checkpoint's step."""
     job = write_job(algorithm=algorithm, steps=1200)
     code, _ = play(job, at=400, number=number)
     word = Termination.from_message((tmp_path / "word").read_text())
@@ -84,7 +84,7 @@ def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
 
 
 def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, play, tmp_path):
-    """A node that dies says nothing before."""
+    """A node that fails sends no signal before."""
     job = write_job(algorithm=DQN, steps=800)
     first = start(job)
     await_line(first, "checkpoint written")
@@ -99,7 +99,7 @@ def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, play,
 
 
 def test_a_run_that_diverges_says_where_and_keeps_its_last_good_checkpoint(write_job, play, tmp_path):
-    """With 81: no attempt from there would do better."""
+    """The exit code is 81, because no attempt from there would do better."""
     wild = {"learning_starts": 100, "learning_rate": float("inf"), "policy_kwargs": {"net_arch": [16]}}
     job = write_job(
         algorithm={"name": "DQN", "hyperparameters": wild}, checkpoint={"everySteps": 100, "keep": 3}
@@ -128,7 +128,7 @@ def test_ctrl_c_does_not_wait_for_a_simulator_that_starts(write_job, start):
 
 
 def test_a_second_signal_ends_the_process_at_once(write_job, start):
-    """Somebody who presses Ctrl-C twice does not want to wait for a long rollout's learning."""
+    """A user who presses Ctrl-C twice does not want to wait until a long rollout is learned."""
     endless = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 100_000}}
     process = start(write_job(algorithm=endless))
     await_line(process, "training")

@@ -1,4 +1,4 @@
-"""Keeping a real simulator going: killed, stopped, without its sidecar, and ended amid a start."""
+"""Repairs of a real simulator: killed, stopped, without its sidecar, and ended during a start."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ PATIENCE_S = 60.0
 
 
 class Restarts(NullWatcher):
-    """A watcher that counts them."""
+    """A watcher that counts the restarts."""
 
     def __init__(self):
         self.count = 0
 
     def restarted(self, simulator, *, recycled):
-        """Count it."""
+        """Count the restart."""
         del simulator, recycled
         self.count += 1
 
 
 class Trained:
-    """One simulator in a vector environment, started.
+    """One started simulator in a vector environment.
 
     Attributes:
         restarter: of the simulator.
@@ -63,21 +63,21 @@ class Trained:
 
     @property
     def pid(self):
-        """The simulator's process."""
+        """Return the simulator's process id."""
         return self._sidecar.state().pid
 
     def step(self):
-        """Take a step; return whether its row is valid, and its info."""
+        """Take a step, and return whether its row is valid, and its info."""
         _, _, _, (info,) = self.env.step(STAND)
         return info["palaestra"]["valid"], info
 
     def break_by(self, number):
-        """Send a signal to the simulator; return the fault that this was."""
+        """Send a signal to the simulator, and return the fault that follows."""
         os.kill(self.pid, number)
         return self.fault()
 
     def fault(self):
-        """Step until the simulator is found broken; return the fault."""
+        """Step until the simulator has a fault, and return the fault."""
         while (info := self.step()[1])["palaestra"]["valid"]:
             pass
         return info["palaestra"]["sim_fault"]
@@ -87,14 +87,14 @@ class Trained:
         eventually(lambda: self.step()[0], PATIENCE_S)
 
     def close(self):
-        """End everything."""
+        """End the environment and the simulator."""
         self.env.close()
         self.restarter.stop()
 
 
 @pytest.fixture
 def train(master):
-    """Return a started simulator; what it is started by may be given."""
+    """Yield a function that returns a started simulator; an argument may give its sidecar."""
     del master
     made = []
 
@@ -111,7 +111,7 @@ def train(master):
 
 
 def test_a_killed_simulator_is_played_in_again(train):
-    """As after a bus error, or when the kernel takes its memory."""
+    """This happens after a bus error, or when the kernel takes its memory."""
     trained = train()
 
     fault = trained.break_by(signal.SIGKILL)
@@ -122,7 +122,7 @@ def test_a_killed_simulator_is_played_in_again(train):
 
 
 def test_a_stopped_simulator_is_noticed(train):
-    """Its socket stays open: nothing but a deadline tells."""
+    """Its socket stays open, so that only a deadline shows the fault."""
     trained = train()
 
     fault = trained.break_by(signal.SIGSTOP)
@@ -132,7 +132,7 @@ def test_a_stopped_simulator_is_noticed(train):
 
 
 def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
-    """A week of training has thousands of them."""
+    """A week of training has thousands of faults."""
     trained = train()
     trained.break_by(signal.SIGKILL)
     trained.go_on()
@@ -143,7 +143,7 @@ def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
         trained.go_on()
 
     assert trained.restarts.count == 11
-    eventually(lambda: left() == before, PATIENCE_S)  # a master may still be telling our node
+    eventually(lambda: left() == before, PATIENCE_S)  # a master may still be calling our node
 
 
 def left():
@@ -155,13 +155,13 @@ def left():
     tasks = Path("/proc/self/task").iterdir()
     children = []
     for task in tasks:
-        with contextlib.suppress(OSError):  # it has ended meanwhile
+        with contextlib.suppress(OSError):  # it has ended in the meantime
             children += (task / "children").read_text().split()
     return sorted(thread.name for thread in threading.enumerate()), len(descriptors), len(children)
 
 
 def test_ending_amid_a_start_waits_for_nobody(train):
-    """A simulator may take a minute to come up; the pod's time to end is shorter."""
+    """A simulator may need a minute to start, and the pod has less time to end."""
     trained = train(options=["--fault=slow_start:start=2,latency_ms=600000"])
     trained.break_by(signal.SIGKILL)
 
@@ -171,7 +171,7 @@ def test_ending_amid_a_start_waits_for_nobody(train):
 
 
 class OwnSidecar:
-    """A sidecar at an address that stays, as that of a container does, whatever becomes of it."""
+    """A sidecar whose address stays the same after restarts, as that of a container does."""
 
     def __init__(self):
         self._ports = HeldPorts()
@@ -179,7 +179,7 @@ class OwnSidecar:
         self.process = None
 
     def start(self):
-        """Start it, as a kubelet would."""
+        """Start the sidecar, as a kubelet would."""
         self.process = subprocess.Popen(
             [
                 Path(sys.executable).with_name("palaestra-sidecar"),
@@ -193,19 +193,19 @@ class OwnSidecar:
         )
 
     def kill(self):
-        """Let it be gone, and the simulator with it."""
+        """Kill the sidecar, and the simulator with it."""
         self.process.kill()
         self.process.wait(PATIENCE_S)
 
     def end(self):
-        """Let it be gone for good."""
+        """Kill the sidecar for good."""
         self.kill()
         self._ports.close()
 
 
 @pytest.fixture
 def own_sidecar():
-    """A sidecar that is started and killed by the test."""
+    """Yield a sidecar that the test starts and kills."""
     own = OwnSidecar()
     own.start()
     yield own
@@ -213,7 +213,7 @@ def own_sidecar():
 
 
 def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
-    """Its container is started again within a minute; ten tries would be over within a second."""
+    """Its container is started again within a minute, but ten tries would end within a second."""
     trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
     own_sidecar.kill()
     assert trained.fault()["kind"] == "dead"
@@ -228,7 +228,7 @@ def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
 
 
 def test_ending_does_not_wait_for_a_sidecar_that_is_gone(train, own_sidecar):
-    """It may be gone because the pod is ending."""
+    """The end of the pod may be the reason why it is gone."""
     trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
     own_sidecar.kill()
     trained.fault()

@@ -26,7 +26,7 @@ FEW = {"everySteps": 200, "episodes": 2, "confirmEpisodes": 2}
 
 @pytest.fixture
 def interrupted_and_resumed(write_job, play, tmp_path):
-    """Play a run with a tracker in two attempts; return the run directory."""
+    """Return a function that runs a job with a tracker in two attempts and returns the run directory."""
 
     def run(name, **options):
         algorithm = PPO | {"callbacks": [{"name": name, "options": options}]}
@@ -40,7 +40,10 @@ def interrupted_and_resumed(write_job, play, tmp_path):
 
 
 def curve(run: Path, name: str) -> dict[int, float]:
-    """Return a curve in TensorBoard by step; evaluations log some values twice, and the last one counts."""
+    """Return a curve in TensorBoard by step.
+
+    Evaluations log some values twice, and the last one counts.
+    """
     points = EventAccumulator(str(run / "tensorboard")).Reload().Scalars(name)
     return {point.step: pytest.approx(point.value, rel=1e-5) for point in points}
 
@@ -63,7 +66,7 @@ def records(path: Path) -> Iterator[bytes]:
 def test_wandb_writes_both_attempts_as_one_run_with_the_curves_of_tensorboard(
     interrupted_and_resumed, monkeypatch, tmp_path
 ):
-    """Offline: no network, no account, and a home that cannot be written, as in a pod."""
+    """It is offline: as in a pod, it has no network, no account, and a home that cannot be written."""
     messages = pytest.importorskip("wandb.proto.wandb_internal_pb2", reason=INSTALL)
     monkeypatch.setenv("HOME", str(tmp_path / "none" / "such"))
     run = interrupted_and_resumed("palaestra_trainer.trackers.wandb:Wandb", project="corridors")
@@ -85,7 +88,7 @@ def test_wandb_writes_both_attempts_as_one_run_with_the_curves_of_tensorboard(
 
 @pytest.fixture
 def server(tmp_path):
-    """Return the address of an MLflow server that answers."""
+    """Yield the address of a running MLflow server."""
     if not (importlib.util.find_spec("mlflow") and importlib.util.find_spec("flask")):
         pytest.skip(INSTALL)
     with socket.socket() as free:
@@ -118,7 +121,7 @@ def _answers(url: str) -> bool:
 
 
 def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(server, interrupted_and_resumed):
-    """On a server, because the client has no store of its own."""
+    """The test uses a server, because the client has no store."""
     tracking = pytest.importorskip("mlflow.tracking", reason=INSTALL)
     run = interrupted_and_resumed("palaestra_trainer.trackers.mlflow:MLflow", uri=server)
 
@@ -134,7 +137,7 @@ def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(serv
 
 
 def test_a_server_that_does_not_answer_ends_an_attempt_with_the_callback_s_name(write_job, play, monkeypatch):
-    """The run ends at its beginning; otherwise its curves would be missing only at the end."""
+    """The run ends at its beginning. Otherwise its curves would be missing only at the end."""
     pytest.importorskip("mlflow", reason=INSTALL)
     monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
     callback = {"name": "palaestra_trainer.trackers.mlflow:MLflow", "options": {"uri": "http://127.0.0.1:9"}}

@@ -1,4 +1,4 @@
-"""The vector environments of gymnasium and Stable-Baselines3, in the simulators of a job: real stubs."""
+"""The vector environments of gymnasium and Stable-Baselines3 in a job's simulators, which are real stubs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_each_worker_of_gymnasium_drives_a_simulator_of_its_own(simulators, meth
 
 
 def assert_apart(envs):
-    """One drives forward while the other one stands: each sees its own way only."""
+    """Assert that each simulator sees only its own movement, when one drives and the other one stands."""
     _, infos = envs.reset(seed=[1, 2])
     assert infos["start"].shape[0] == 2
     distances = []
@@ -63,6 +63,9 @@ def test_each_worker_of_stable_baselines3_drives_a_simulator_of_its_own(simulato
 
 
 def make_environment(variables):
-    """Return the environment of the job; the server has the variables of the test that started it."""
+    """Return the environment of the job.
+
+    The server process still has the variables of an earlier test.
+    """
     os.environ.update(variables)
     return gymnasium.make(TASK)

@@ -1,4 +1,4 @@
-"""A stub simulator, started the way a notebook does it."""
+"""A stub simulator, started in the same way as by a notebook."""
 
 from contextlib import ExitStack
 
@@ -11,7 +11,7 @@ from palaestra_trainer.webots import Mode, Webots
 
 
 class Simulator:
-    """A running simulator; a short timeout, so that a hang is detected soon."""
+    """A running simulator with a short timeout, so that a hang is detected soon."""
 
     def __init__(self, *options, world="arena", supervisor="robotino"):
         self.launcher = ProcessLauncher(world, options=options)
@@ -19,14 +19,14 @@ class Simulator:
         self.webots.start()
 
     def close(self):
-        """End it and its sidecar."""
+        """End the simulator and its sidecar."""
         self.webots.stop()
         self.webots.close()
         self.launcher.close()
 
 
 class Setup:
-    """A robot and its scene in a simulator, which runs."""
+    """A robot and its scene in a running simulator."""
 
     def __init__(self, simulator, robot=None):
         self.launcher, self.webots = simulator.launcher, simulator.webots
@@ -37,24 +37,24 @@ class Setup:
 
     @property
     def pid(self):
-        """The simulator's process."""
+        """Return the simulator's process id."""
         return self.launcher.state().pid
 
 
 class Standing:
-    """A simulator for several tests, which is away while others with its names run."""
+    """A simulator for several tests, which ends while others with its names run."""
 
     def __init__(self):
         self._simulator = None
 
     def simulator(self):
-        """Return it, running."""
+        """Return the simulator, which runs."""
         if self._simulator is None:
             self._simulator = Simulator()
         return self._simulator
 
     def go(self):
-        """End it until it is asked for again."""
+        """End the simulator until the next test needs it."""
         if self._simulator is not None:
             self._simulator.close()
             self._simulator = None
@@ -62,7 +62,7 @@ class Standing:
 
 @pytest.fixture(scope="module")
 def standing(master):
-    """The shipped arena for all tests of a module."""
+    """Yield the included arena for all tests of a module."""
     del master
     one = Standing()
     yield one
@@ -71,7 +71,7 @@ def standing(master):
 
 @pytest.fixture
 def start(standing):
-    """Starts simulators with options; ended when the test is."""
+    """Yield a function that starts simulators with options, and end them with the test."""
     standing.go()
     with ExitStack() as started:
 
@@ -87,7 +87,7 @@ def start(standing):
 
 @pytest.fixture
 def arena(standing):
-    """The shipped arena as it is after a start, running; `own_arena` is for tests of its process."""
+    """Yield the included arena as it is after a start; `own_arena` is for tests of its process."""
     setup = Setup(standing.simulator())
     yield setup
     with setup.webots:
@@ -97,5 +97,5 @@ def arena(standing):
 
 @pytest.fixture
 def own_arena(start):
-    """The shipped arena, running for one test, which may stop it."""
+    """Yield the included arena, running for one test, which may stop it."""
     return start()

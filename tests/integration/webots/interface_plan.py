@@ -1,7 +1,8 @@
-"""What the clients with rospy and roscpp ask of a simulator, and the answers that they expect.
+"""The requests of the clients with rospy and roscpp to a simulator, and the expected responses.
 
-A service that is not here is called with an empty request, and has to succeed. `REQUESTS` has the requests of
-the others, by the end of their paths, `ANSWERS` what some of them answer: a value that is set is read back.
+A service without an entry here is called with an empty request and must succeed. `REQUESTS` has the requests
+for the others, by the end of their paths. `ANSWERS` has the responses of some of them, such as a value that
+was set before.
 """
 
 from tools.interface.everything import ROBOT, offered
@@ -9,7 +10,7 @@ from tools.interface.everything import ROBOT, offered
 STEP_MS = 32
 QUIT_STATUS = 3
 STEP = (f"/{ROBOT}/robot/time_step", "webots_ros/set_int", {"value": STEP_MS})
-REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # /rosout has it
+REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # it causes a log message for /rosout
 DRAWN = """DEF DRAWN Pose { children [ DEF SHADED Shape { castShadows FALSE
   appearance DEF PAINT PBRAppearance { roughness 0.25 baseColor 1 0.5 0.25 name "red" }
   geometry DEF ROUND Cylinder { subdivision 24 } } Shape { geometry DEF FLAT Plane { size 3 2 } } ] }"""
@@ -120,7 +121,7 @@ ANSWERS = {
     "connector/is_locked": {"value": False},
     "vacuum_gripper/is_on": {"value": True},
     "display/get_info": {"width": 64, "height": 64},
-    "display/image_load": {"ir": 1},  # the one before was deleted
+    "display/image_load": {"ir": 1},  # the first image was deleted
     "skin/get_bone_count": {"value": 0},
     "joystick/get_number_of_axes": {"value": 6},
     "joystick/is_connected": {"value": True},
@@ -135,7 +136,7 @@ ANSWERS = {
     "supervisor/node/get_base_type_name": {"name": "Solid"},
     "supervisor/node/is_proto": {"value": False},
     "supervisor/node/get_def": {"name": "BOX"},
-    # A field that is set moves the node with the next step.
+    # A changed field moves the node with the next step.
     "supervisor/node/get_position": {"position": {"x": 2.0, "y": 0.0, "z": 0.5}},
     "supervisor/field/get_name": {"name": "roughness"},
     "supervisor/field/get_type": {"type": 3},
@@ -143,13 +144,16 @@ ANSWERS = {
 }
 
 
-LATE = ("camera/recognition_enable_segmentation",)  # after what ends it: its topic is listened to
+LATE = ("camera/recognition_enable_segmentation",)  # at the end, because the service ends its topic
 
 HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 
 
 def plan(world_path, simulator):
-    """Return the plan for the client; the name of a call is its path, but for those that get handles."""
+    """Return the plan for the client.
+
+    The name of a call is its path, except for calls that return handles.
+    """
     survey = offered(simulator)
     typed = {**survey.services}
     calls = [_call(typed, name, path, request) for name, path, request in _opening()]
@@ -166,7 +170,7 @@ def plan(world_path, simulator):
 
 
 def absolute(path):
-    """Return the name in ROS of a path below the robot's name."""
+    """Return the ROS name of a path below the robot's name."""
     return path if path.startswith("/") else f"/{ROBOT}/{path}"
 
 
@@ -175,7 +179,7 @@ def _call(typed, name, path, request):
 
 
 def _opening():
-    """Yield calls that come first: handles, and one field of every type, which is written and read back."""
+    """Yield the first calls: handles, and one field of every type, which is written and read back."""
     get_field, from_def = "supervisor/node/get_field", "supervisor/get_from_def"
     for name, text in (("data", "eight"), ("custom_data", "seven")):
         yield f"robot/set_{name}", f"robot/set_{name}", {"value": text}
@@ -213,7 +217,7 @@ def _request(path, world_path):
 
 
 def _of_files(path, world_path):
-    """Return the request of a service that reads or writes a file; None for the others."""
+    """Return the request of a service that reads or writes a file, or None for other services."""
     if path == "supervisor/world_load":
         return {"value": str(world_path)}
     if path == "display/image_load":

@@ -1,11 +1,10 @@
-"""Carries out a plan of the interface with a client, whatever library the client is written with.
+"""Carry out a plan of the interface with a client that uses any library.
 
-A plan has `calls`, a list of [name, path, type, request]; `topics`, type by path; `rounds`, a list of
-[path, type, request] that make topics speak; `last`, calls that end what runs. A string "@name" in a request
-is the first value of the answer to that call, such as the handle of a node.
-
-A client has three functions: `call(path, type, request)` returns the answer as a dictionary, or
-{"failed": text}; `listen(topic, type)` subscribes; `heard()` returns the first message of each topic.
+A plan has `calls`, a list of [name, path, type, request]; `topics`, type by path; `rounds`, a list of [path,
+type, request] that cause messages on topics; `last`, calls that end the simulator. A string "@name" in a
+request stands for the first value in the response to that call, such as the handle of a node. A client has
+three functions. `call(path, type, request)` returns the response as a dictionary, or {"failed": text}.
+`listen(topic, type)` subscribes. `heard()` returns the first message of each topic.
 """
 
 import time
@@ -31,14 +30,14 @@ def play(plan, client):
 
 
 def request_of(service, fields):
-    """Return the request of a class of genpy with these fields, the others as they are at first."""
+    """Return the request of a class of genpy with these fields and the defaults of the others."""
     message = service._request_class()
     genpy.message.fill_message_args(message, [fields])
     return message
 
 
 def plain(value):
-    """Return a message, or what is in one, as JSON has it."""
+    """Return a message, or a value inside one, as JSON data."""
     if isinstance(value, genpy.Message):
         return {name: plain(getattr(value, name)) for name in value.__slots__}
     if isinstance(value, genpy.Time | genpy.Duration):
@@ -51,7 +50,7 @@ def plain(value):
 
 
 def _filled(request, answers):
-    """Return a request with the answers that it refers to."""
+    """Return a request with the values from earlier responses."""
     return {
         name: next(iter(answers[value[1:]].values())) if str(value).startswith("@") else value
         for name, value in request.items()
@@ -59,7 +58,7 @@ def _filled(request, answers):
 
 
 def _heard(plan, client):
-    """Return the first message of every topic; those that stay silent are missing."""
+    """Return the first message of every topic that sent one."""
     end = time.monotonic() + DEADLINE_S
     heard = {}
     while plan["topics"].keys() - heard.keys() and time.monotonic() < end:
@@ -70,7 +69,10 @@ def _heard(plan, client):
 
 
 def _call_again(client, path, type_name, request):
-    """Call until the service answers: a controller that restarts takes its services back for a moment."""
+    """Call until the service responds.
+
+    A controller that restarts removes its services for a moment.
+    """
     end = time.monotonic() + DEADLINE_S
     while True:
         answer = client.call(path, type_name, request)

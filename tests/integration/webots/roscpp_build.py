@@ -1,7 +1,7 @@
-"""The client with roscpp, compiled: headers made by gencpp, and one program for all types of the interface.
+"""The client with roscpp, compiled with headers from gencpp: one program for all types of the interface.
 
-Run as a program, it makes the headers: `python roscpp_build.py FOLDER PACKAGE FILE...`. It is a process of
-its own then, because gencpp's template engine replaces the output of the process that it runs in.
+As a program it makes the headers: `python roscpp_build.py FOLDER PACKAGE FILE...`. Then it is a separate
+process, because gencpp's template engine replaces the output of its own process.
 """
 
 import subprocess
@@ -14,19 +14,19 @@ from palaestra_sim.message_package.package_writer import write
 
 PROGRAM = Path(__file__).with_name("roscpp_client.cpp")
 TEMPLATES = "/usr/share/gencpp"
-MESSAGES = Path("/usr/share")  # Debian's definitions of messages, a folder for each package
+MESSAGES = Path("/usr/share")  # Debian's message definitions, in one folder per package
 NESTED = ("std_msgs", "geometry_msgs", "sensor_msgs")
 LIBRARIES = ("roscpp", "roscpp_serialization", "rosconsole", "rostime", "boost_thread")
 DEADLINE_S = 240.0  # of the compiler, on a slow and busy machine
 
 
 def build(folder, services, topics):
-    """Return the program in `folder`, for those names of service and topic types."""
+    """Build the program in `folder` for these service and topic types, and return its path."""
     ours = sorted(name for name in {*services, *topics} if name.startswith("webots_ros/"))
     package = write(folder)
     kinds = {name: "srv" if name in services else "msg" for name in ours}
     files = [package / kinds[name] / f"{name.partition('/')[2]}.{kinds[name]}" for name in ours]
-    nested = [*(package / "msg").glob("*.msg")]  # of messages and services that hold others of the package
+    nested = [*(package / "msg").glob("*.msg")]  # of messages and services that contain others of the package
     includes = folder / "include"
     _run(sys.executable, __file__, includes / "webots_ros", package, *{*files, *nested})
     (includes / "interface.inc").write_text(_interface(services, topics))
@@ -55,7 +55,7 @@ def _run(*words):
 
 
 def make_headers(folder, package, files):
-    """Write the C++ header of each definition, and those of a service's request and answer."""
+    """Write the C++ header of each definition, and those of a service's request and response."""
     paths = [f"webots_ros:{package}/msg", *(f"{name}:{MESSAGES / name / 'msg'}" for name in NESTED)]
     for file in files:
         genmsg.template_tools.generate_from_file(

@@ -1,4 +1,4 @@
-"""The client with roscpp as a process, which takes requests and returns answers as bytes."""
+"""The client with roscpp as a process, which reads requests and returns responses as bytes."""
 
 import subprocess
 from io import BytesIO
@@ -9,12 +9,12 @@ from tests.integration.webots.interface_player import plain, request_of
 
 
 class RoscppClient:
-    """Calls and listens with the classes that gencpp made; a context, which ends the process.
+    """Calls and listens with the classes from gencpp; it is a context, which ends the process.
 
     Args:
         program: its path.
         environment: of its process.
-        log: the file that gets the errors that roscpp logs.
+        log: the file for the errors that roscpp logs.
 
     Attributes:
         digests: the md5 of each type, in the program.
@@ -44,7 +44,7 @@ class RoscppClient:
         self._errors.close()
 
     def call(self, path, type_name, request):
-        """Return the answer of a service once it can be reached, or what roscpp logged of the failure."""
+        """Return the response of a service once it can be reached, or roscpp's log of the failure."""
         service = roslib.message.get_service_class(type_name)
         self._tell("call", type_name, path, _bytes_of(request_of(service, request)).hex())
         result, _, answer = self._line().partition(" ")

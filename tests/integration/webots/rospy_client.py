@@ -1,6 +1,6 @@
-"""A client with rospy: reads a plan as JSON from its input, and prints what comes back.
+"""A client with rospy: it reads a plan as JSON from its input, and prints the results.
 
-A process of its own, because rospy has one node a process.
+It is a separate process, because rospy has one node per process.
 """
 
 import json
@@ -20,7 +20,7 @@ class RospyClient:
         self._heard = {}
 
     def call(self, path, type_name, request):
-        """Return the answer of a service, or the text of its failure, once it can be reached."""
+        """Return the response of a service once it can be reached, or the text of its failure."""
         service = roslib.message.get_service_class(type_name)
         try:
             rospy.wait_for_service(path, timeout=DEADLINE_S)
@@ -38,5 +38,5 @@ class RospyClient:
         return dict(self._heard)
 
 
-answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints there that it reaches a service only later
+answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints to stdout when it reaches a service only later
 json.dump(play(json.load(sys.stdin), RospyClient()), answers)

@@ -21,7 +21,7 @@ EYES = b"""Camera { name "camera" width 64 height 48 }
 
 @pytest.fixture
 def seer(start, tmp_path):
-    """A stub with the arena, whose robot has cameras and a lidar."""
+    """Return a stub with the arena, whose robot has cameras and a lidar."""
     source = builtin("arena").replace(BUMPER, EYES + BUMPER)
     path = tmp_path / "seer.wbt"
     path.write_bytes(source)
@@ -29,7 +29,7 @@ def seer(start, tmp_path):
 
 
 def test_a_lidar_measures_in_layers_and_as_points(seer):
-    """Both describe the same rays: a point is as far from the lidar as its range."""
+    """Both describe the same rays: each point's distance from the lidar is the range of its ray."""
     ranges, points = Lidar("robotino", "lidar"), LidarPoints("robotino", "lidar")
     seer.robot.simulation.add([ranges, points], [])
     seer.robot.connect()
@@ -43,7 +43,7 @@ def test_a_lidar_measures_in_layers_and_as_points(seer):
 
 
 def test_a_lidar_sends_a_new_array_every_step(seer):
-    """A copy keeps the old one; the view does not."""
+    """A copy keeps the old array, and the view does not."""
     ranges = Lidar("robotino", "lidar")
     seer.robot.simulation.add([ranges], [])
     seer.robot.connect()
@@ -67,7 +67,7 @@ def test_a_simulator_that_renders_nothing_does_not_fit(seer, sensor):
 
 
 def test_there_is_no_image_before_the_first_step():
-    """It would be an image of nothing."""
+    """The image would show nothing."""
     for read in (lambda: Camera("robotino", "camera").rgb, lambda: RangeFinder("robotino", "depth").depths):
         with pytest.raises(NoReading, match="let a period pass"):
             read()
@@ -105,7 +105,7 @@ class Renderer:
 
 @pytest.fixture
 def renderer(master):
-    """A simulator that renders what the test says."""
+    """Yield a simulator that renders the images of the test."""
     made = Renderer("renderer", master)
     yield made
     made.end()
@@ -113,7 +113,10 @@ def renderer(master):
 
 @SIZES
 def test_a_camera_reads_each_image_as_it_was_sent(renderer, height, width):
-    """From the size of a policy's eye to one that comes in pieces; RGB is the same, reversed."""
+    """Some images are as small as a policy's input, others arrive in pieces.
+
+    RGB has the same values in reverse order.
+    """
     sent = np.random.default_rng(1).integers(0, 256, (3, height, width, 4), np.uint8)
     camera = Camera("renderer", "camera")
     camera.enable(192)
@@ -129,7 +132,7 @@ def test_a_camera_reads_each_image_as_it_was_sent(renderer, height, width):
 
 @SIZES
 def test_a_depth_camera_reads_meters(renderer, height, width):
-    """Infinite where nothing is in range."""
+    """The reading is infinite where nothing is in range."""
     sent = np.random.default_rng(1).uniform(0.0, 6.0, (height, width)).astype(np.float32)
     sent[0] = np.inf
     depth_camera = RangeFinder("renderer", "depth camera")

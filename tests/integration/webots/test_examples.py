@@ -1,4 +1,4 @@
-"""The scripts that the documentation asks people to run."""
+"""The scripts in the documentation for users."""
 
 import json
 import os
@@ -13,7 +13,7 @@ EXAMPLES = ROOT / "examples"
 
 
 def carried_out(*program, folder=None, **variables):
-    """Return what comes of a Python program, without pod, runner and ROS master."""
+    """Return the result of a Python program, without pod, runner and ROS master."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     return subprocess.run(
         [sys.executable, *program],
@@ -27,7 +27,7 @@ def carried_out(*program, folder=None, **variables):
 
 
 def test_the_facade_example_drives_and_reads():
-    """As on the page about notebooks."""
+    """The script runs as on the page about notebooks."""
     result = carried_out(EXAMPLES / "facade.py")
 
     assert result.stdout.startswith("Pose(x_m=0.03")
@@ -36,7 +36,7 @@ def test_the_facade_example_drives_and_reads():
 
 
 def test_the_blocks_of_the_page_about_facades_are_one_script():
-    """In a process of its own: it wants to start the ROS master too."""
+    """The script is a separate process, because it also starts the ROS master."""
     page = (ROOT / "docs/howto/facades.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
@@ -47,7 +47,7 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
 
 
 def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
-    """In a process of its own: it starts simulators."""
+    """These blocks are a user's own training loop."""
     page = (ROOT / "docs/howto/training-loop.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
@@ -64,7 +64,10 @@ def test_the_listings_of_the_paper_run_in_their_order():
 
 
 def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom(tmp_path):
-    """`make e2e` does it in the notebook's pod; and a notebook that is new holds no results."""
+    """`make e2e` runs them in the notebook's pod.
+
+    A new notebook contains no results.
+    """
     cells = json.loads((EXAMPLES / "first-steps.ipynb").read_text())["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
 

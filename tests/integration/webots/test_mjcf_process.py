@@ -27,13 +27,13 @@ class CartPole:
         self._services = []
 
     def call(self, path, type_name, **request):
-        """Return the answer of a service."""
+        """Return the response of a service."""
         service = RosService(f"/cartpole/{path}", f"webots_ros/{type_name}")
         self._services.append(service)
         return service(**request)
 
     def step(self):
-        """Step once, and return the position of the cart."""
+        """Take one step, and return the position of the cart."""
         assert self.call("robot/time_step", "set_int", value=STEP_MS).success
         assert self.position.read()
         return self.position.value
@@ -53,14 +53,14 @@ class CartPole:
 
 @pytest.fixture
 def source():
-    """The world of the example."""
+    """Return the world of the example."""
     job = yaml.safe_load(EXAMPLE.read_text())
     return job["spec"]["simulators"][0]["world"]["inline"]
 
 
 @pytest.fixture
 def cartpole(master, tmp_path, source):
-    """The world, running under the name cartpole."""
+    """Yield the world, which runs under the name cartpole."""
     del master
     world = tmp_path / "cartpole.xml"
     world.write_text(source)
@@ -70,7 +70,7 @@ def cartpole(master, tmp_path, source):
 
 
 def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole):
-    """The same services and facades as for a robot of Webots."""
+    """The services and facades are the same as for a robot of Webots."""
     devices = cartpole.call("robot/get_device_list", "robot_get_device_list", ask=True).list
     assert list(devices) == ["push", "cart position", "cart speed", "pole angle", "pole speed"]
     start = cartpole.step()
@@ -94,16 +94,16 @@ def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole)
 
 
 class TestAKeyframe:
-    """A world whose keyframe has a control: it pushes the cart."""
+    """A world whose keyframe has a control that pushes the cart."""
 
     @pytest.fixture
     def source(self, source):
-        """The world of the example with the keyframe."""
+        """Return the world of the example with the keyframe."""
         named = source.replace("<custom>", '<custom><text name="keyframe" data="home"/>')
         return named.replace("</mujoco>", '<keyframe><key name="home" ctrl="5"/></keyframe></mujoco>')
 
     def test_its_control_acts_until_the_first_command_after_a_reset(self, cartpole):
-        """A command of 0 at a reset would let a robot fall that its keyframe holds up."""
+        """With a command of 0 at a reset, a robot would fall that its keyframe holds up."""
         lever = JointMotor("cartpole", "push", "force")
         lever.release()
         start = [cartpole.step() for _ in range(5)]
@@ -125,14 +125,14 @@ class TestWhatWebotsDoesNotHave:
 
     @pytest.fixture
     def source(self, source):
-        """The world of the example with both."""
+        """Return the world of the example with both."""
         sensor = '<subtreecom name="center of mass" body="cart"/></sensor>'
         return source.replace(
             "</actuator>", '<adhesion name="grip" body="cart" ctrlrange="0 1"/></actuator>'
         ).replace("</sensor>", sensor)
 
     def test_facades_read_its_numbers_and_set_its_control(self, cartpole):
-        """Below `mujoco/`, with the names of the model."""
+        """They are below `mujoco/`, with the names of the model."""
         sensor = MujocoSensor("cartpole", "center of mass")
         sensor.enable(STEP_MS)
         grip = MujocoActuator("cartpole", "grip")

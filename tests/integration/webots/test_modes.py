@@ -1,4 +1,4 @@
-"""When time passes: inside `with webots:` and `webots.run(...)`, and never else."""
+"""Time passes only inside `with webots:` and `webots.run(...)`."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from palaestra_trainer.webots import Mode
 
 
 def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
-    """The controller would wait for time to pass, and hear nobody who lets it pass."""
+    """The controller would wait for time to pass, and could not be resumed during that wait."""
     with arena.webots:
         arena.robot.advance()
     pid, before = arena.pid, arena.webots.observer.time()
@@ -23,7 +23,7 @@ def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
 
 
 def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
-    """The next step of any client would otherwise carry out half a reset."""
+    """Otherwise the next step of any client would carry out half a reset."""
     with arena.webots:
         arena.scene.reset(1, Pose(-1.0, 0.0, 0.0), (1.0, 0.0))
 
@@ -36,12 +36,12 @@ def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
 
 
 def test_a_step_while_paused_is_no_fault_of_the_simulator():
-    """Else training would restart a simulator that is well, over and over."""
+    """Otherwise training would restart a working simulator again and again."""
     assert not issubclass(Paused, SimulatorFault)
 
 
 def test_a_simulator_that_did_not_confirm_its_mode_is_not_taken_for_paused(start):
-    """Whether it runs is then found out by a step: a fault, that is mended, and no mistake of the caller."""
+    """The next step shows whether it runs, and its failure is a fault, no error of the caller."""
     arena = start("--fault=wrong_shape:service=supervisor/simulation_set_mode,call=4")
     arena.webots.supervisor.set_mode(Mode.PAUSE)
     with pytest.raises(WrongData):
@@ -51,7 +51,7 @@ def test_a_simulator_that_did_not_confirm_its_mode_is_not_taken_for_paused(start
 
 
 def test_only_the_outermost_context_pauses(arena):
-    """`run` in a `with` is in the paper, for what is collected and for what is evaluated."""
+    """The paper has `run` inside a `with`, for collection and for evaluation."""
     with arena.webots:
         with arena.webots:
             arena.robot.advance()
@@ -73,7 +73,10 @@ def test_after_a_context_that_broke_the_outermost_one_pauses_still(arena):
 
 
 def test_a_simulator_that_was_started_stands_until_it_is_let_go(arena):
-    """The stub would run and Webots would not: what works with one has to work with the other."""
+    """Without the pause the stub would run and Webots would not.
+
+    Code for one must work with the other.
+    """
     arena.webots()
 
     mode = arena.webots.observer.mode()
@@ -84,7 +87,7 @@ def test_a_simulator_that_was_started_stands_until_it_is_let_go(arena):
 
 
 def test_a_simulator_that_is_restarted_inside_of_a_context_runs(arena):
-    """Inside is inside."""
+    """A restart does not end the context."""
     with arena.webots:
         arena.webots()
         inside = arena.webots.observer.mode()
@@ -103,6 +106,9 @@ def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(aren
 
 
 def test_a_refused_mode_raises_an_error(arena):
-    """3 was FAST until Webots R2020b; a client that believes this would wait for steps for ever."""
+    """The number 3 was FAST until Webots R2020b.
+
+    A client that still uses it would wait for ever.
+    """
     with pytest.raises(WrongData, match="robotino: refuses mode 3"):
         arena.webots.supervisor.set_mode(3)

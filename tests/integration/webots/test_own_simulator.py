@@ -1,4 +1,4 @@
-"""An environment by its name alone, on a stub or on MuJoCo, and gymnasium's checker."""
+"""An environment is created only by its name, on a stub or on MuJoCo, and gymnasium's checker accepts it."""
 
 import gymnasium
 import pytest
@@ -16,14 +16,14 @@ WRAPPED = "ignore:.*different from the unwrapped version"
 
 @pytest.fixture
 def nothing_configured(master, monkeypatch):
-    """As in a notebook."""
+    """Remove the configuration, as in a notebook."""
     del master
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_an_environment_made_by_its_name_alone_starts_a_simulator_that_ends_with_it():
-    """Two of them have one each."""
+    """Two environments have two simulators."""
     one, other = gymnasium.make(NAME), gymnasium.make(NAME)
     names = [env.unwrapped._robot.node_name for env in (one, other)]
 
@@ -64,7 +64,7 @@ def test_an_environment_of_another_robot_starts_the_world_of_that_robot(make):
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program():
-    """The facade itself knows no robot."""
+    """The facade itself has no robot."""
     webots = Webots("burger", "court")
     try:
         env = gymnasium.make("Navigate-v0")
@@ -80,7 +80,7 @@ def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program()
 
 @pytest.mark.usefixtures("nothing_configured")
 def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
-    """A job's own program may create the facade; the job says what robot is in its world."""
+    """A job's own program may create the facade; the job says which robot is in its world."""
     job = {
         "job": "j",
         "environment": {"id": "Navigate-v0"},
@@ -101,7 +101,7 @@ def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
 
 @pytest.fixture
 def webots(nothing_configured):
-    """A facade as a notebook creates it, closed with the test."""
+    """Yield a facade as a notebook creates it."""
     del nothing_configured
     made = Webots("robotino", "arena")
     yield made
@@ -110,7 +110,7 @@ def webots(nothing_configured):
 
 
 def test_an_environment_uses_the_facade_that_was_made_before_it(webots):
-    """As in the paper: the facade starts its simulator when the environment is reset; then it is paused."""
+    """In the paper, the environment's reset starts the facade's simulator, which is then paused."""
     env = gymnasium.make(NAME)
 
     first, _ = webots.run(lambda: env.reset(seed=1))
@@ -124,7 +124,7 @@ def test_an_environment_uses_the_facade_that_was_made_before_it(webots):
 
 
 def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
-    """So that it can be paused after the step, as `run` does."""
+    """The simulator can then be paused after the step, as `run` does."""
     env = palaestra_trainer.make_env(NAME)
     webots.run(lambda: env.reset(seed=1))
     webots.supervisor.quit()
@@ -153,5 +153,5 @@ def test_an_episode_does_not_go_on_in_a_simulator_that_the_program_restarted(web
 
 @pytest.mark.filterwarnings(WRAPPED)
 def test_the_checker_of_gymnasium_accepts_an_environment_on_a_simulated_robot(arena):
-    """It makes the environment once more, from copies of its arguments."""
+    """The checker makes the environment again from copies of its arguments."""
     check_env(gymnasium.make(NAME, robot=arena.robot, scene=arena.scene))

@@ -1,4 +1,4 @@
-"""Simulators that a script starts: they may say what they like, and end with the script."""
+"""Simulators that a script starts may print without limit, and end with the script."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ sys.stdin.read()
 
 
 def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path):
-    """Webots forwards its controllers' output; nobody reads it in a script."""
+    """Webots forwards its controllers' output, which nobody reads in a script."""
     mark = tmp_path / "done"
     program = CHATTERBOX.replace('print("done", file=sys.stderr, flush=True)', f"open({str(mark)!r}, 'w')")
     child = start_child([sys.executable, "-c", program], stderr=subprocess.PIPE)
@@ -49,7 +49,7 @@ def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path)
 
 
 def test_a_killed_script_leaves_no_simulator(master):
-    """The sidecar's standard input closes with its owner, however that ends."""
+    """The sidecar's standard input closes with its owner, however the owner ends."""
     del master
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -109,7 +109,7 @@ def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone
 
 
 def test_after_an_interrupted_call_the_next_answer_is_its_own(own_arena, monkeypatch):
-    """Ctrl-C in a notebook cell must not shift every later answer by one."""
+    """After a Ctrl-C in a notebook cell, each later call must return its own response."""
     probe = own_arena.webots.observer
     before = probe.time()
     monkeypatch.setattr("palaestra_trainer.ros.tcpros_client.TcprosClient.receive", _interrupted)
@@ -128,7 +128,7 @@ def _interrupted(_wire, ahead=0):
 
 
 def test_a_simulator_takes_options_of_its_own(master):
-    """Those of its command line, as in a TrainingJob."""
+    """They are options of its command line, as in a TrainingJob."""
     del master
     webots = Webots("robotino", "arena", options=["--fault=start_refused:code=7"])
 
@@ -147,7 +147,7 @@ def test_a_simulator_that_is_not_known_is_refused_at_once(master):
 
 
 def test_a_simulator_that_does_not_start_raises_an_error_at_its_deadline(master):
-    """Another name than the world's is never answered."""
+    """A name that is not in the world never responds."""
     del master
     webots = Webots("nobody", "arena", start_deadline_s=1.0)
 

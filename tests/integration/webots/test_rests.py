@@ -1,4 +1,4 @@
-"""Simulators that rest while a policy is updated: what happens to them then is a fault, never a mistake."""
+"""Simulators that are paused during an update: what happens to them then is a fault, never an error."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ PATIENCE_S = 60.0
 
 
 class Rested:
-    """One simulator in a vector environment, started."""
+    """One started simulator in a vector environment."""
 
     def __init__(self):
         def make(robot, scene):
@@ -35,11 +35,11 @@ class Rested:
         self.env.reset()
 
     def step(self):
-        """Take a step; return its info."""
+        """Take a step, and return its info."""
         return self.env.step(STAND)[3][0]
 
     def close(self):
-        """End everything."""
+        """End the environment, the simulator and the sidecar."""
         self.env.close()
         self.restarter.stop()
         self.launcher.close()
@@ -47,7 +47,7 @@ class Rested:
 
 @pytest.fixture
 def rested(master):
-    """A simulator that was stepped and rests now."""
+    """Yield a simulator that made a step and is paused now."""
     del master
     rested = Rested()
     rested.step()
@@ -57,7 +57,7 @@ def rested(master):
 
 
 def test_what_has_rested_goes_on(rested):
-    """At the next rollout."""
+    """It continues with the next rollout."""
     mode = rested.simulator.webots.observer.mode()
 
     rested.env.unpause()
@@ -68,7 +68,7 @@ def test_what_has_rested_goes_on(rested):
 
 @pytest.mark.parametrize(("number", "kind"), [(signal.SIGKILL, "dead"), (signal.SIGSTOP, "hung")])
 def test_what_broke_while_it_rested_is_mended(rested, number, kind):
-    """Its rest could not be ended; that it was once paused is held against nobody."""
+    """The pause could not be ended, and the earlier pause is not treated as an error of the caller."""
     os.kill(rested.launcher.state().pid, number)
 
     rested.env.unpause()

@@ -1,4 +1,4 @@
-"""Robots and scenes in simulators: what the classes name is there, and the layout is that of the world."""
+"""Robots and scenes in simulators: the nodes of the classes exist, and the layout is that of the world."""
 
 import pytest
 
@@ -46,21 +46,21 @@ FITTED = b"""
 
 
 class Noting(Services):
-    """Services of a running simulator that note which ones were asked for."""
+    """Services of a running simulator that record which of them were used."""
 
     def __init__(self, node_name):
         super().__init__(node_name)
         self.asked = []
 
     def get(self, path, type_name):
-        """Note the path."""
+        """Record the path."""
         self.asked.append(path)
         return super().get(path, type_name)
 
 
 @pytest.fixture
 def running(master, tmp_path):
-    """`running(robot class, world, supervisor)`: a robot and its scene in a started stub."""
+    """Yield `running(robot class, world, supervisor)`, which returns a robot and its scene in a stub."""
     del master
     started = []
 
@@ -96,7 +96,7 @@ def test_a_robot_on_two_wheels_passes_the_checks(running, kind, world, near):
 
 
 def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
-    """An experiment with rewards on the fake is worth something only then."""
+    """Otherwise an experiment with rewards on the fake would be worth nothing."""
     robot, scene = running(EPuck, builtin("pen"), "epuck")
     fake, fake_scene = fake_pen()
 
@@ -111,7 +111,7 @@ def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
 
 
 def test_a_robotino_uses_what_its_world_fits_it_with(running):
-    """Laser scanner, forklift and gripper; each costs nothing before."""
+    """They are laser scanner, forklift and gripper, and cost nothing before their use."""
     world = builtin("arena").replace(
         b"  supervisor TRUE\n  children [", b"  supervisor TRUE\n  children [" + FITTED
     )
@@ -130,7 +130,7 @@ def test_a_robotino_uses_what_its_world_fits_it_with(running):
 
 @pytest.mark.parametrize("use", ["use_scanner", "use_gripper", "use_forklift"])
 def test_what_a_world_lacks_is_refused_by_name(arena, use):
-    """The robot is connected, so the answer is known."""
+    """The robot is connected, so it knows its devices."""
     with pytest.raises(NoSuchSensor, match="the robot has no device"):
         getattr(arena.robot, use)()
 
@@ -141,13 +141,13 @@ def test_what_a_world_lacks_is_refused_by_name(arena, use):
     ids=["scan", "grip", "lift"],
 )
 def test_what_is_not_in_use_says_how_to_use_it(arena, call):
-    """Before anything is sent."""
+    """The error comes before anything is sent."""
     with pytest.raises(NoSuchSensor, match="is not in use; call use_"):
         call(arena.robot)
 
 
 def test_a_subclass_names_other_nodes_and_devices(running):
-    """As its world has them."""
+    """The names are those in its world."""
 
     class MyBot(Robotino):
         definition = "MYBOT"
@@ -163,7 +163,7 @@ def test_a_subclass_names_other_nodes_and_devices(running):
 
 
 def things(layout):
-    """Return what stands on a floor without its walls, by name."""
+    """Return the objects on a floor without its walls, by name."""
     return {thing.name: thing for thing in layout.obstacles if not thing.name.startswith("WALL")}
 
 
@@ -186,7 +186,7 @@ def test_the_layout_is_that_of_the_world(arena, running):
 
 
 def test_the_layout_follows_a_thing_that_somebody_moved(arena):
-    """Through the supervisor or by `put`; a new episode puts it back."""
+    """The supervisor or `put` moved it; a new episode puts it back."""
     arena.scene.supervisor.set_field("CYLINDER_0", "translation", (1.5, 0.0, 0.2))
     arena.scene.put("CYLINDER_1", (0.0, 1.5, 0.2))
     arena.robot.advance()
@@ -200,7 +200,7 @@ def test_the_layout_follows_a_thing_that_somebody_moved(arena):
 
 
 def test_a_start_is_never_drawn_inside_a_thing_that_the_world_has_elsewhere(running):
-    """The file has moved it; no constant knows where."""
+    """The world file moved the object, and no constant contains its position."""
     world = builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.3 -0.1 0.2")
     robot, scene = running(Robotino, world, "robotino")
     env = MoveToTargetEnv(robot, scene)
@@ -213,7 +213,7 @@ def test_a_start_is_never_drawn_inside_a_thing_that_the_world_has_elsewhere(runn
 
 
 def test_a_world_without_a_floor_is_refused(running):
-    """With the remedy."""
+    """The error gives the remedy."""
     _, scene = running(
         Robotino, builtin("arena").replace(b"DEF FLOOR Solid", b"DEF GROUND Solid"), "robotino"
     )
@@ -223,7 +223,10 @@ def test_a_world_without_a_floor_is_refused(running):
 
 
 def test_only_what_looks_different_when_turned_is_asked_for_its_orientation(arena):
-    """Each call of a reset counts: a layout has a floor with two corners, which no heading changes."""
+    """Each call costs time at a reset.
+
+    A layout has a floor with two corners, which no heading changes.
+    """
     services = Noting(arena.webots.supervisor.node_name)
     try:
         things = ObstacleReader(services).read()

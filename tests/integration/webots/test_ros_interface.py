@@ -1,4 +1,4 @@
-"""Every service and topic of docs/reference/ros-interface.md, called and heard with rospy and roscpp."""
+"""Clients with rospy and roscpp use every service and topic in docs/reference/ros-interface.md."""
 
 import json
 import os
@@ -26,12 +26,12 @@ STEPPED = {"robot/time_step"}
 
 
 def cases(paths):
-    """Return a function that returns each path that `paths(simulator)` has, of each simulator."""
+    """Return a function that returns each path in `paths(simulator)` with each simulator."""
     return lambda: [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
 
 
 def of_rospy(plan_, environment, _folder):
-    """Return what the client with rospy gets."""
+    """Return the results of the client with rospy."""
     client = subprocess.run(
         [sys.executable, "-m", "tests.integration.webots.rospy_client"],
         cwd=ROOT,
@@ -46,22 +46,25 @@ def of_rospy(plan_, environment, _folder):
 
 
 def of_roscpp(plan_, environment, folder):
-    """Return what the client with roscpp gets, and the `digests` of its types."""
+    """Return the results of the client with roscpp, and the `digests` of its types."""
     with RoscppClient(program(folder.parent / "roscpp"), environment, folder / "errors.log") as client:
         return {**play(plan_, client), "digests": client.digests}
 
 
 @cache
 def program(folder):
-    """Return the client with roscpp, built once for all simulators."""
+    """Return the path of the client with roscpp, built once for all simulators."""
     folder.mkdir()
-    survey = offered("mujoco")  # its types include the stub's
+    survey = offered("mujoco")  # its types include those of the stub
     return build(folder, set(survey.services.values()), set(survey.topics.values()))
 
 
 @pytest.fixture(scope="module", params=[of_rospy, of_roscpp], ids=["rospy", "roscpp"])
 def outcomes(request, master, tmp_path_factory):
-    """`outcomes(simulator)`: answers by the names of calls, messages by topic, and its exit status."""
+    """Yield a function that returns the results of a client with a simulator.
+
+    They are the responses by call, the messages by topic, and the simulator's exit status.
+    """
 
     @cache
     def outcomes(simulator):
@@ -73,7 +76,7 @@ def outcomes(request, master, tmp_path_factory):
 
 
 def observed(simulator, client, environment, folder):
-    """Run a simulator and a client, and return what the client observed."""
+    """Run a simulator and a client, and return the client's results."""
     path = folder / "everything.wbt"
     path.write_text(world())
     (folder / "logo.png").write_bytes(encode((1, 1), b"\0\0\xff\xff"))
@@ -88,7 +91,7 @@ def observed(simulator, client, environment, folder):
 
 
 def near(value):
-    """Return an answer that may differ by rounding in any number inside."""
+    """Return a response in which every number may differ by rounding."""
     if isinstance(value, dict):
         return {name: near(inside) for name, inside in value.items()}
     if isinstance(value, list):
@@ -98,7 +101,7 @@ def near(value):
 
 @pytest.mark.parametrize("outcomes", [of_roscpp], ids=["roscpp"], indirect=True)
 def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
-    """A client refuses a service or topic with another md5; gencpp computes it from the definition."""
+    """A client refuses a service or topic with another md5, which gencpp computes from the definition."""
     rows = dict(re.findall(r"^\| `[^`]+` \| (\S+) \| `(\w{32})` ", PAGE, re.MULTILINE))
 
     assert outcomes("stub")["digests"] == rows
@@ -106,7 +109,7 @@ def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
 
 @for_each("simulator, path", cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it]))
 def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
-    """And where its answer is known from what was asked before, it is that."""
+    """Where earlier requests determine the response, it must be that one."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" not in answer, answer
@@ -121,7 +124,7 @@ def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
 
 @for_each("simulator, path", cases(FAILING.__getitem__))
 def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
-    """A success that did nothing would leave a client with a wrong picture."""
+    """Otherwise the service would report success without an effect."""
     answer = outcomes(simulator)["answers"][path]
 
     assert "failed" in answer or not next(iter(answer.values()))
@@ -129,7 +132,7 @@ def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
 
 @for_each("simulator, type_name", [(simulator, name) for simulator in FAILING for name in FIELDS])
 def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, type_name):
-    """Through the messages of rospy and back."""
+    """The value goes through the messages of rospy in both directions."""
     _, _, value = FIELDS[type_name]
 
     answers = outcomes(simulator)["answers"]
@@ -138,7 +141,7 @@ def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, ty
 
 @for_each("simulator, path", cases(lambda it: offered(it).topics))
 def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
-    """In the class of its type, with the time at which it was sent."""
+    """The message has the class of its type, and the time at which it was sent."""
     message = outcomes(simulator)["heard"][absolute(path)]
 
     assert message.get("header", {"stamp": 1.0})["stamp"] > 0.0
@@ -149,7 +152,7 @@ def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     ("topic", "encoding"), [("camera/image", "bgra8"), ("range_finder/range_image", "32FC1")]
 )
 def test_a_picture_arrives_whole(outcomes, topic, encoding):
-    """Four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge knows."""
+    """It has four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge knows."""
     image = outcomes("mujoco")["heard"][absolute(topic)]
 
     assert (image["width"], image["height"], image["encoding"]) == (64, 64, encoding)
@@ -158,7 +161,7 @@ def test_a_picture_arrives_whole(outcomes, topic, encoding):
 
 @pytest.mark.parametrize("simulator", FAILING)
 def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
-    """After reset, restart, revert, reload and load, each of which the client came back from."""
+    """Before it, the client used reset, restart, revert, reload and load, and was connected after each."""
     outcome = outcomes(simulator)
 
     assert outcome["answers"]["supervisor/simulation_quit"]["success"]

@@ -25,7 +25,10 @@ for type_ in (*vars(webots_ros.msg).values(), *vars(webots_ros.srv).values()):
 
 @pytest.fixture
 def environment(master, tmp_path):
-    """Return the variables of a terminal: no path of packages, and a folder of the test for ROS's logs."""
+    """Return the variables of a terminal.
+
+    They have no path of packages, and a folder of the test for ROS's logs.
+    """
     leading = ("PYTHONPATH", "ROS_PACKAGE_PATH")
     given = {name: value for name, value in os.environ.items() if name not in leading}
     return {**given, "ROS_MASTER_URI": master, "ROS_HOME": str(tmp_path)}
@@ -33,7 +36,7 @@ def environment(master, tmp_path):
 
 @pytest.fixture
 def terminal(environment):
-    """Starts blocks of the page, by their kinds, in a shell in the checkout; ended when the test is."""
+    """Yield a function that starts blocks of the page, by their kinds, in a shell in the checkout."""
     started = []
 
     def typed(*kinds, **variables):
@@ -62,14 +65,14 @@ def typed_lines(*kinds):
 
 
 def answer(shell):
-    """Return what the commands of a shell print, when they have ended well."""
+    """Return the output of a shell's commands after they have ended without an error."""
     output, errors = shell.communicate(timeout=DEADLINE_S)
     assert (shell.returncode, errors) == (0, "")
     return output
 
 
 def run_python(code, environment):
-    """Return what a program prints in the Python of the virtual environment."""
+    """Return the output of a program in the Python of the virtual environment."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=environment["ROS_HOME"],
@@ -84,7 +87,7 @@ def run_python(code, environment):
 
 @pytest.fixture
 def simulator(terminal):
-    """Return the shell with the simulator of the page, when it answers."""
+    """Return the shell with the simulator of the page, once that responds."""
     shell = terminal("the-simulator")
     assert "arena.wbt: robotino" in shell.stderr.readline()
     return shell
@@ -103,7 +106,7 @@ def test_rossrv_and_rosservice_read_the_types_of_a_simulator(place, terminal, tm
 
 @pytest.mark.usefixtures("simulator")
 def test_rostopic_echo_prints_a_message_of_a_simulator(terminal):
-    """Nothing shows when rostopic has subscribed, so the test steps until it has printed a message."""
+    """The test steps until rostopic has printed a message, because nothing shows when it has subscribed."""
     answer(terminal("ros-package-path", "the-tools"))
     listening = terminal("ros-package-path", "the-topic")
 
@@ -122,7 +125,7 @@ def test_rospy_calls_a_simulator_with_the_classes_of_the_package(environment):
 
 
 def test_every_class_of_the_package_has_the_md5_of_the_wire(environment):
-    """In the virtual environment that `make setup` made, also after a definition has changed."""
+    """`make setup` has put them into the virtual environment, even after a changed definition."""
     messages, services = type_names()
     of_the_wire = {name: message_type(name).md5 for name in messages if name.startswith("webots_ros/")}
     of_the_wire |= {name: service_type(name).md5 for name in services if name.startswith("webots_ros/")}
@@ -143,7 +146,7 @@ def test_the_packages_that_the_page_names_are_those_that_the_tests_run_with():
 
 
 def test_an_installed_package_comes_before_ours(tmp_path):
-    """A person's Webots may be of another release than our definitions."""
+    """A user's Webots may be of another release than our definitions."""
     installed = tmp_path / "webots_ros"
     (installed / "srv").mkdir(parents=True)
     (installed / "package.xml").write_text("<package><name>webots_ros</name></package>")

@@ -24,13 +24,13 @@ DEADLINE_S = 60.0
 
 @pytest.fixture
 def name():
-    """A ROS name that only this test uses; other tests share its master."""
+    """Return a ROS name that only this test uses, because other tests share its master."""
     return f"twin_{uuid.uuid4().hex[:8]}"
 
 
 @pytest.fixture
 def world(master, tmp_path, name):
-    """The path of an arena in which the robot has that name."""
+    """Return the path of an arena in which the robot has that name."""
     del master
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
@@ -39,7 +39,7 @@ def world(master, tmp_path, name):
 
 @pytest.fixture
 def make(world, name):
-    """`make()`: a facade of that world."""
+    """Yield `make()`, which returns a facade of that world."""
     made = []
 
     def begin(**options):
@@ -52,7 +52,7 @@ def make(world, name):
 
 
 def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
-    """The second one gets the next free name, and says which."""
+    """The second facade gets the next free name, and shows it."""
     first, second = make(), make()
     robots = [Robotino(webots) for webots in (first, second)]
     scenes = [SimulatedScene(webots, robot) for webots, robot in zip((first, second), robots, strict=True)]
@@ -79,7 +79,7 @@ def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
 
 
 def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
-    """Names do not grow for ever."""
+    """Otherwise the numbers in names would grow without end."""
     first = make()
     first.close()
 
@@ -87,7 +87,7 @@ def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
 
 
 def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
-    """The master still lists it."""
+    """The master still lists the name."""
     launcher = ProcessLauncher(world)
     make(launcher=launcher).start()
     os.kill(launcher.state().pid, signal.SIGKILL)
@@ -97,7 +97,7 @@ def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
 
 
 def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, name):
-    """Two notebooks that start at the same time must not get one name."""
+    """Two notebooks that start at the same time must not get the same name."""
     code = (
         "from palaestra_trainer.launching.ros_name_locks import Reservation\n"
         "held = Reservation()\n"
@@ -121,7 +121,7 @@ def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, nam
 
 
 def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
-    """And it is never stopped through it."""
+    """The attached facade never stops the simulator."""
     owner = make()
     owner.start()
     guest = make(launcher=Attached())
@@ -136,12 +136,12 @@ def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
 
 
 def test_attaching_to_nothing_says_so_at_once(make):
-    """Nothing will come that could be waited for."""
+    """There is nothing to wait for."""
     with pytest.raises(SimulatorDead, match="no simulator answers under this name"):
         make(launcher=Attached()).start()
 
 
 def test_a_node_that_does_not_run_is_known_as_such(master):
-    """By asking it, not by its registration."""
+    """The node itself is queried, because its registration may be old."""
     del master
     assert not Master("/test").runs("/nobody")

@@ -1,4 +1,4 @@
-"""A member with a spare, on real stubs: whatever happens to one, the other one takes over."""
+"""A member with a spare, on real stubs: whatever happens to one simulator, the other one takes over."""
 
 import os
 import signal
@@ -24,11 +24,11 @@ from tests.waiting import eventually
 
 PATIENCE_S = 60.0
 START_DEADLINE_S = 60.0
-LONG_S = 30.0  # a change of roles takes milliseconds, a start that is waited for 60 s
+LONG_S = 30.0  # a change of roles takes milliseconds, and a start may take 60 s
 
 
 class Pair:
-    """A member with a spare, and its two simulators to look at."""
+    """A member with a spare, and its two simulators."""
 
     def __init__(self, launcher, recycle, limit):
         def make(robot, scene):
@@ -42,14 +42,14 @@ class Pair:
         self.member = Standby(self.first, self.second, limit)
 
     def begin(self):
-        """Start it, wait for the spare, and begin an episode."""
+        """Start the member, wait for the spare, and begin an episode."""
         self.member.start()
         self.wait_for_spare()
         self.member.env.reset(seed=1)
         return self
 
     def wait_for_spare(self):
-        """Return when the spare is ready."""
+        """Return once the spare is ready."""
         give_up = time.monotonic() + PATIENCE_S
         while self.member.spare() == "starting":
             assert time.monotonic() < give_up
@@ -57,25 +57,28 @@ class Pair:
         assert self.member.spare() == "ready"
 
     def play(self):
-        """Step until it breaks."""
+        """Step until the simulator fails."""
         for _ in range(200):
             self.member.env.step(0)
 
     def plays_in(self, simulator):
-        """Return whether the episodes are played in that simulator, and it answers."""
+        """Return whether the member uses that simulator, and it responds."""
         self.member.env.reset(seed=2)
         self.member.env.step(0)
         return self.member.env is simulator.env
 
 
 def pid_of(simulator):
-    """Return the process of a simulator."""
+    """Return the process id of a simulator."""
     return simulator.sidecar.state().pid
 
 
 @pytest.fixture
 def pair(master, tmp_path):
-    """Makes a member with a spare, not started; with it end its sidecar and both simulators."""
+    """Yield a function that makes a member with a spare, which is not started.
+
+    At the end, its sidecar and both simulators are ended too.
+    """
     del master
     made = []
 
@@ -92,7 +95,7 @@ def pair(master, tmp_path):
 
 
 def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
-    """SIGKILL, as the kernel does for lack of memory. The figure is in docs/explain/reliability.md."""
+    """SIGKILL is the kernel's signal for too much memory. The figure is in docs/explain/reliability.md."""
     it = pair().begin()
     os.kill(pid_of(it.first), signal.SIGKILL)
 
@@ -113,7 +116,7 @@ def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
 
 
 def test_the_one_that_was_killed_becomes_the_next_spare(pair):
-    """So the next fault costs no more than this one."""
+    """The next fault then costs no more than this one."""
     it = pair().begin()
     for broken, next_ in ((it.first, it.second), (it.second, it.first)):
         os.kill(pid_of(broken), signal.SIGKILL)
@@ -127,7 +130,7 @@ def test_the_one_that_was_killed_becomes_the_next_spare(pair):
 
 
 def test_a_recycled_simulator_is_ended_and_is_no_fault(pair):
-    """Between two episodes, and it begins with no resets."""
+    """The change comes between two episodes, and the new simulator begins with no resets."""
     it = pair(recycle=Recycle(after_resets=2)).begin()
     it.member.env.reset(seed=3)
 
@@ -142,7 +145,7 @@ def test_a_recycled_simulator_is_ended_and_is_no_fault(pair):
 
 
 def test_a_hanging_simulator_is_not_waited_for(pair):
-    """Its process is killed in the background, which takes its time."""
+    """Its process is killed in the background, because that takes time."""
     it = pair().begin()
     hung = pid_of(it.first)
     os.kill(hung, signal.SIGSTOP)
@@ -157,7 +160,7 @@ def test_a_hanging_simulator_is_not_waited_for(pair):
 
 
 def test_a_spare_that_is_not_ready_yet_is_waited_for(pair):
-    """Two faults in a row: the second one costs a start, as it would without a spare."""
+    """After two faults in a row, the second costs a start, as it would without a spare."""
     it = pair().begin()
 
     it.member.restart()
@@ -168,7 +171,7 @@ def test_a_spare_that_is_not_ready_yet_is_waited_for(pair):
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number):
-    """Each is a fault of its own, and nothing waits for more than one start."""
+    """Each is a separate fault, and nothing waits for more than one start."""
     it = pair().begin()
     os.kill(pid_of(it.second), number)
 
@@ -181,7 +184,7 @@ def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number
 
 
 def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
-    """Else the next fault would cost a start, however long ago the refusal was."""
+    """Otherwise the next fault would cost a start, however long ago the refusal was."""
     it = pair("--fault=start_refused:start=2").begin()
 
     it.member.restart()
@@ -193,7 +196,7 @@ def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
 
 
 def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_needs_it(pair):
-    """The simulator that works goes on until then."""
+    """Until then the working simulator continues."""
     it = pair("--fault=start_refused:start=2", limit=RestartLimit(restarts=0))
     it.member.start()
     it.member.restart()
@@ -206,7 +209,7 @@ def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_ne
 
 
 def test_a_spare_is_waited_for_as_long_as_a_simulator_may_take_to_start(pair):
-    """Not longer: the member that waits blocks the others."""
+    """The wait is no longer, because a member that waits blocks the others."""
     it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
     it.first.start_deadline_s = 0.5
@@ -227,7 +230,7 @@ def test_a_spare_rests_until_it_takes_over(pair):
 
 
 def test_a_simulator_that_takes_too_much_memory_is_due(pair):
-    """What the sidecar says of all its processes, a second after it was last asked."""
+    """The sidecar reports the memory of all its processes, a second after the last request."""
     it = pair("--fault=memory_growth:mib=20,most_mib=300", recycle=Recycle(above_memory_bytes=200 * 2**20))
     it.begin()
     before = it.member.due()
@@ -258,7 +261,7 @@ def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
 
 
 def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandoned(pair):
-    """However large the budget: a run that ends gives each of its simulators a few seconds."""
+    """This holds for any budget, because a run that ends gives each simulator only a few seconds."""
     held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
     it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
@@ -277,7 +280,7 @@ def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandone
 
 
 def test_what_was_stopped_can_be_started_again(pair):
-    """As any member."""
+    """Every member can do this."""
     it = pair().begin()
     it.member.stop()
 
@@ -288,12 +291,12 @@ def test_what_was_stopped_can_be_started_again(pair):
 
 
 def descriptors():
-    """Return how many files this process has open."""
+    """Return the number of open files of this process."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
 def test_changing_places_again_and_again_leaves_no_file_open(pair):
-    """A run of a week changes places ten thousand times."""
+    """A run of a week changes roles ten thousand times."""
     it = pair().begin()
     opened = []
     for _ in range(4):
@@ -303,4 +306,4 @@ def test_changing_places_again_and_again_leaves_no_file_open(pair):
         it.wait_for_spare()
         opened.append(descriptors())
 
-    eventually(lambda: descriptors() <= opened[1])  # a master may still be telling our node
+    eventually(lambda: descriptors() <= opened[1])  # a master may still be calling our node

@@ -1,4 +1,4 @@
-"""The stub as a program: what it prints, how it ends, what it asks of the master."""
+"""The stub as a program: its output, its end, and its requests to the master."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ import pytest
 
 from palaestra_trainer.ros import Master, RosService
 
-DEADLINE_S = 60.0  # of whatever ought to take moments, on a busy machine
+DEADLINE_S = 60.0  # of what takes moments, on a busy machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 WITHOUT_ROS = """
 import sys
@@ -24,7 +24,7 @@ ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wb
 
 @pytest.fixture
 def stub(master, tmp_path):
-    """Starts stubs of the arena under a name of its own; killed when the test ends."""
+    """Yield a function that starts stubs of the arena under a separate name, and kill them at the end."""
     world = tmp_path / "arena.wbt"
     world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", b"--name=process_test"))
     started = []
@@ -43,14 +43,14 @@ def stub(master, tmp_path):
 
 
 def ready(process):
-    """Wait for the line that says that the controllers are up."""
+    """Wait for the line about the running controllers."""
     line = process.stderr.readline()
     assert "process_test" in line
     return RosService("/process_test/robot/get_time", "webots_ros/get_float")
 
 
 def test_it_runs_where_no_ros_is_installed(stub):
-    """A laptop with another system has none; only the master is elsewhere."""
+    """A laptop with another system has no ROS; only the master is elsewhere."""
     process = stub(program=(sys.executable, "-c", WITHOUT_ROS))
     get_time = ready(process)
 
@@ -59,7 +59,7 @@ def test_it_runs_where_no_ros_is_installed(stub):
 
 
 def test_sigterm_ends_it_in_good_order(stub):
-    """Its names are gone from the master, so the next one is not mistaken for it."""
+    """The master no longer lists its names, so the next simulator is not mistaken for it."""
     process = stub()
     ready(process)
 
@@ -70,7 +70,7 @@ def test_sigterm_ends_it_in_good_order(stub):
 
 
 def test_a_client_can_choose_the_exit_status(stub):
-    """As `simulation_quit` of Webots."""
+    """`simulation_quit` of Webots allows this."""
     process = stub()
     ready(process)
     quit_ = RosService("/process_test/supervisor/simulation_quit", "webots_ros/set_int")
@@ -90,7 +90,7 @@ def test_without_a_master_it_says_so_and_ends(stub):
 
 
 def test_the_error_for_an_invalid_world_has_its_line(master, tmp_path):
-    """The person who wrote it can mend it."""
+    """The line helps the author to correct the world."""
     del master
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nRobot {\n  name 3 {\n}\n")
@@ -102,7 +102,7 @@ def test_the_error_for_an_invalid_world_has_its_line(master, tmp_path):
 
 
 def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(master, tmp_path):
-    """A sidecar reports the last line, and a person reads the rest."""
+    """A sidecar reports the last line, and a user reads the rest."""
     del master
     world = tmp_path / "forest.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nColosseum { }\nMinotaur { }\nMinotaur { }\n")
@@ -119,7 +119,7 @@ def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(mast
 
 
 def test_a_second_one_of_the_same_name_takes_the_name(stub):
-    """By the rules of ROS 1: the older node is asked to go, its simulation runs on."""
+    """The rules of ROS 1 demand it: the older node must shut down, but its simulation continues."""
     older = stub()
     ready(older)
     newer = stub()
@@ -134,7 +134,7 @@ def test_a_second_one_of_the_same_name_takes_the_name(stub):
 
 
 def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
-    """No other node has its name then. `rosnode kill` sends this request to the node."""
+    """No other node then has its name. `rosnode kill` sends this request to the node."""
     process = stub()
     ready(process)
     with xmlrpc.client.ServerProxy(master) as ask_master:

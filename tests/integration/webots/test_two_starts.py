@@ -1,4 +1,4 @@
-"""Two starts of MuJoCo with one seed and the same commands: every message is equal, but for its stamp."""
+"""Two starts of MuJoCo with one seed and the same commands send equal messages, except for their stamps."""
 
 import math
 
@@ -12,8 +12,8 @@ from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.webots import Mode, Webots
 
 STEPS = 20
-START = Pose(0.9, 0.3, 0.2)  # in reach of the wall ahead
-STAMP = slice(4, 12)  # of a message: behind the number of its header
+START = Pose(0.9, 0.3, 0.2)  # close enough to the wall ahead to reach it
+STAMP = slice(4, 12)  # of a message, after the number in its header
 DEADLINE_S = 30.0
 IMAGE, RANGE = "sensor_msgs/Image", "sensor_msgs/Range"
 FLOAT, BOOL = "webots_ros/Float64Stamped", "webots_ros/BoolStamped"
@@ -28,7 +28,7 @@ TOPICS = {
 
 @pytest.fixture
 def messages(master):
-    """`messages(seed)`: what a new simulator sends of each topic, step by step, without stamps."""
+    """Return `messages(seed)`, which returns a new simulator's messages by topic, without stamps."""
     del master
 
     def messages(seed):
@@ -75,7 +75,7 @@ def unstamped(message):
 
 
 def test_two_starts_with_one_seed_send_equal_messages(messages):
-    """Pictures, noise, contacts and encoders, in a world where all of them change on the way."""
+    """The messages contain pictures, noise, contacts and encoders, all of which change in this world."""
     first, second = messages(3), messages(3)
 
     assert [path for path in TOPICS if first[path] != second[path]] == []

@@ -1,4 +1,4 @@
-"""The facade over a real simulator: on demand, controlled, and honest about what answers."""
+"""The facade over a real simulator: it starts on demand, is controlled, and reports its true state."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from palaestra_trainer.webots import Mode
 
 
 def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
-    """Availability is a real round trip, not a memory of calls."""
+    """The test of availability is a real round trip."""
     available = [own_arena.webots.available()]
 
     own_arena.webots.stop()
@@ -20,7 +20,7 @@ def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
 
 
 def test_a_stop_is_no_fault(own_arena):
-    """It was announced before the supervisor was asked to quit."""
+    """The stop was announced before the supervisor received the request to quit."""
     own_arena.webots.stop()
 
     state = own_arena.launcher.state()
@@ -28,7 +28,7 @@ def test_a_stop_is_no_fault(own_arena):
 
 
 def test_calling_the_facade_restarts_the_simulator(own_arena):
-    """Another process answers under the same name."""
+    """Another process responds under the same name."""
     before = own_arena.pid
 
     own_arena.webots()
@@ -38,7 +38,7 @@ def test_calling_the_facade_restarts_the_simulator(own_arena):
 
 
 def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
-    """A simulator takes a whole core between steps unless it is paused."""
+    """Between steps, a simulator needs a whole core unless it is paused."""
     with own_arena.webots:
         inside = own_arena.webots.observer.mode()
 
@@ -46,13 +46,13 @@ def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
 
 
 def test_run_returns_what_the_callback_returns(own_arena):
-    """`run(callback)` and the context are two ways to say the same."""
+    """`run(callback)` and the context do the same."""
     assert own_arena.webots.run(own_arena.webots.observer.mode) is Mode.FAST
     assert own_arena.webots.observer.mode() is Mode.PAUSE
 
 
 def test_run_can_restart_before_the_callback(own_arena):
-    """What the paper's training loop does after 24 resets."""
+    """The paper's training loop does this after 24 resets."""
     before = own_arena.pid
 
     own_arena.webots.run(lambda: None, restart=True)
@@ -61,7 +61,7 @@ def test_run_can_restart_before_the_callback(own_arena):
 
 
 def test_entering_starts_a_simulator_that_does_not_run(own_arena):
-    """On demand: nobody has to call start()."""
+    """The simulator starts on demand, without a call of start()."""
     own_arena.webots.stop()
 
     with own_arena.webots:
@@ -94,7 +94,7 @@ def test_a_stopped_process_hangs_and_can_be_restarted(own_arena):
 
 
 def test_the_observer_changes_nothing(own_arena):
-    """Time stands while it asks."""
+    """The simulated time does not advance during its requests."""
     observer = own_arena.webots.observer
     before = observer.time()
 
@@ -107,7 +107,7 @@ def test_the_observer_changes_nothing(own_arena):
 
 
 def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
-    """Old handles dangle; asked for again, they are looked up again."""
+    """The old handles are invalid, and are looked up again on the next use."""
     own_arena.robot.drive(0.5, 0.0, 0.0)
     for _ in range(3):
         own_arena.robot.advance()

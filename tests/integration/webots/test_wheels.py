@@ -1,4 +1,4 @@
-"""The velocities that are sent to wheels, and when they are sent again."""
+"""The velocities that the facade sends to wheels, and when it sends them again."""
 
 import math
 
@@ -13,17 +13,17 @@ from palaestra_trainer.webots.services import Services
 
 START = Pose(-1.5, 0.0, 0.0)
 AHEAD = (0.5, 0.0, 0.0)
-CURVE = (0.3, 0.1, 0.5)  # turns every wheel
+CURVE = (0.3, 0.1, 0.5)  # it turns every wheel
 
 
 class Stranger:
-    """Somebody else who asks and tells the wheels, which shows what the facade sends and what not."""
+    """Another client of the wheels, which shows what the facade sends and what not."""
 
     def __init__(self):
         self._services = Services("robotino")
 
     def tell(self, velocity):
-        """Let all wheels turn at `velocity` rad/s."""
+        """Turn all wheels at `velocity` rad/s."""
         for wheel in range(3):
             self._services.get(f"wheel{wheel}_joint/set_velocity", "set_float")(value=velocity)
 
@@ -32,13 +32,13 @@ class Stranger:
         return [self._services.ask(f"wheel{wheel}_joint/get_velocity", "get_float") for wheel in range(3)]
 
     def close(self):
-        """Drop the connections."""
+        """Close the connections."""
         self._services.close()
 
 
 @pytest.fixture
 def stranger(master):
-    """Somebody else on the same master."""
+    """Yield another client on the same master."""
     del master
     somebody = Stranger()
     yield somebody
@@ -47,7 +47,7 @@ def stranger(master):
 
 @pytest.fixture
 def motor(arena):
-    """One wheel alone."""
+    """Yield a single wheel."""
     del arena
     wheel = Motor("robotino", "wheel0_joint")
     yield wheel
@@ -55,7 +55,10 @@ def motor(arena):
 
 
 def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
-    """Webots keeps it, and a policy often does the same twice: three messages of fifteen a step."""
+    """Webots keeps the velocity, and a policy often repeats an action.
+
+    This saves three messages of fifteen per step.
+    """
     arena.robot.drive(*CURVE)
     stranger.tell(7.0)
 
@@ -65,7 +68,7 @@ def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
 
 
 def test_only_the_velocities_that_change_are_sent(arena, stranger):
-    """The rear wheel stands, whether the robot drives ahead or back."""
+    """The rear wheel stands when the robot drives ahead or back."""
     arena.robot.drive(*AHEAD)
     stranger.tell(7.0)
 
@@ -75,7 +78,7 @@ def test_only_the_velocities_that_change_are_sent(arena, stranger):
 
 
 def test_after_a_reset_it_is_sent_again(arena, stranger):
-    """A reset takes all motors' velocities away."""
+    """A reset removes the velocities of all motors."""
     arena.robot.drive(*CURVE)
     arena.scene.reset(1, START, (1.0, 0.0))
     assert stranger.ask() == [0.0, 0.0, 0.0]
@@ -86,7 +89,7 @@ def test_after_a_reset_it_is_sent_again(arena, stranger):
 
 
 def test_a_reset_to_standing_is_sent_although_it_stood(arena, stranger):
-    """A velocity that was confirmed before the reset need not hold after it."""
+    """A velocity that was confirmed before the reset may not be valid after it."""
     arena.robot.drive(0.0, 0.0, 0.0)
     stranger.tell(7.0)
 
@@ -96,7 +99,7 @@ def test_a_reset_to_standing_is_sent_although_it_stood(arena, stranger):
 
 
 def test_after_a_restart_it_is_sent_again(arena, stranger):
-    """The new process has never heard of it."""
+    """The new process does not know the velocity."""
     arena.robot.drive(*CURVE)
     stranger.close()
     arena.webots()
@@ -107,7 +110,7 @@ def test_after_a_restart_it_is_sent_again(arena, stranger):
 
 
 def test_after_a_reconnection_it_is_sent_again(arena, stranger):
-    """Another client may have changed the velocity meanwhile."""
+    """Another client may have changed the velocity in the meantime."""
     arena.robot.drive(*CURVE)
     arena.robot.connect()
 
@@ -117,7 +120,7 @@ def test_after_a_reconnection_it_is_sent_again(arena, stranger):
 
 
 def test_what_was_not_confirmed_is_sent_again(start, stranger):
-    """The second command of a wheel gets half an answer, so that nobody knows what became of it."""
+    """The second command of a wheel gets half a response, so its effect is unknown."""
     arena = start("--fault=wrong_shape:service=wheel1_joint/set_velocity,call=2")
     with pytest.raises(WrongData):
         arena.robot.drive(*CURVE)
@@ -129,7 +132,7 @@ def test_what_was_not_confirmed_is_sent_again(start, stranger):
 
 
 def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, stranger):
-    """Webots refuses to turn backward to a position, and confirms it all the same."""
+    """Webots refuses to turn backward to a position, but confirms the command all the same."""
     motor.set_position(1.0)
     motor.set_velocity(-2.0)
     assert stranger.ask()[0] != -2.0

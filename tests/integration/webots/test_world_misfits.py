@@ -1,4 +1,4 @@
-"""Worlds without what the environment needs: told before the first step, as a wrong configuration."""
+"""Worlds without the parts that the environment needs: the error comes before the first step."""
 
 import threading
 from contextlib import nullcontext
@@ -32,7 +32,7 @@ WITHOUT = {
 
 @pytest.fixture
 def world(tmp_path):
-    """`world(source)`: the path of a world file."""
+    """Return `world(source)`, which returns the path of a world file."""
 
     def write(source):
         path = tmp_path / "changed.wbt"
@@ -44,7 +44,7 @@ def world(tmp_path):
 
 @pytest.mark.parametrize(("source", "fact"), WITHOUT.values(), ids=WITHOUT.keys())
 def test_a_start_names_what_the_world_lacks(master, world, source, fact):
-    """Before the first step, by name."""
+    """The error names it before the first step."""
     del master
     assert source != ARENA
     webots = Webots("robotino", world(source), start_deadline_s=DEADLINE_S)
@@ -60,7 +60,7 @@ def test_a_start_names_what_the_world_lacks(master, world, source, fact):
 
 
 def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, world):
-    """The restart budget of ten is not spent on a world that stays as it is."""
+    """The restart budget of ten is not spent on a world that does not change."""
     del master
     source, fact = WITHOUT["a sensor"]
 
@@ -113,7 +113,7 @@ def test_only_a_complete_list_of_devices_is_a_proof(master, count):
 
 
 def test_a_world_without_a_supervisor_is_a_wrong_configuration(master, world):
-    """Every process of it would say the same."""
+    """Every process of such a world would report the same."""
     del master
     launcher = ProcessLauncher(world(ARENA.replace(b"supervisor TRUE", b"supervisor FALSE")))
     try:

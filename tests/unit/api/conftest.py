@@ -1,4 +1,4 @@
-"""The one builder of job files for these tests: what a test names matters, the rest is hidden."""
+"""Build the job files of these tests: a test names only the fields that matter to it."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -14,7 +14,7 @@ _GROUPS = [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": 
 
 
 def _job_data(changes: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Return a job as plain data; each change is a path in `spec`, with dots, and its value."""
+    """Return a job as plain data. A change maps a dotted path in `spec` to its new value."""
     data: dict[str, Any] = {
         "apiVersion": "palaestra.dev/v1alpha1",
         "kind": "TrainingJob",
@@ -32,13 +32,13 @@ def _job_data(changes: dict[str, Any] | None = None) -> dict[str, Any]:
 
 @pytest.fixture(scope="session")
 def job_data() -> Callable[..., dict[str, Any]]:
-    """`job_data({"trainer.steps": 0})`: the data of a job with that change."""
+    """`job_data({"trainer.steps": 0})` returns the data of a job with that change."""
     return _job_data
 
 
 @pytest.fixture(scope="session")
 def problems() -> Callable[..., list[str]]:
-    """`problems({"trainer.steps": 0})`: the problems of a job with that change."""
+    """`problems({"trainer.steps": 0})` returns the problems of a job with that change."""
 
     def tell(changes: dict[str, Any]) -> list[str]:
         try:

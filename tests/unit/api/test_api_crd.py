@@ -1,4 +1,4 @@
-"""The CustomResourceDefinition: structural, bounded, small, and true to the models."""
+"""The CustomResourceDefinition is structural, bounded and small, and equals the models."""
 
 import re
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def rules_of(path: str) -> list[dict[str, str]]:
 
 
 def frozen(path: str) -> bool:
-    """Return whether the field at `path` must stay: by itself, with what it is in, or in all its parts."""
+    """Return whether the field at `path` cannot change: a rule freezes it, its parent or all its parts."""
     above, _, name = path.rpartition(".")
     if "" in kept(path) or {"", f".{name}"} & kept(above):
         return True
@@ -49,17 +49,17 @@ def frozen(path: str) -> bool:
 
 
 def kept(path: str) -> set[str]:
-    """Return what the rules at `path` keep: fields of the object, or the empty path for all of it."""
+    """Return the paths that the rules at `path` freeze: fields of the object, or "" for the whole object."""
     return {rule.get("fieldPath", "") for rule in rules_of(path) if rule["message"] == FROZEN}
 
 
 def test_no_keyword_is_used_that_a_structural_schema_forbids() -> None:
-    """An API server refuses the whole definition for one of them."""
+    """An API server refuses the whole definition if one of these keywords is in it."""
     assert [path for path, schema in ALL.items() if FORBIDDEN & schema.keys()] == []
 
 
 def test_every_type_is_spelled_out() -> None:
-    """Quantities are either of two, and what is in free objects is anything, with Kubernetes' own marks."""
+    """Only quantities and the values of free objects have no type; marks of Kubernetes replace it."""
     marks = ("x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields")
     untyped = [path for path, schema in ALL.items() if "type" not in schema]
 
@@ -86,7 +86,7 @@ def test_every_text_and_list_is_bounded(kind, bounds) -> None:
 
 
 def test_every_map_is_bounded_and_every_object_has_fields() -> None:
-    """An object is known by its fields, or it is a map with a largest size."""
+    """An object has either named fields or a limit on the number of its keys."""
     loose = [
         path for path, schema in ALL.items()
         if schema.get("type") == "object"
@@ -97,9 +97,9 @@ def test_every_map_is_bounded_and_every_object_has_fields() -> None:
 
 
 def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
-    """Hyperparameters would be pruned to nothing otherwise.
+    """Without that mark the API server would prune all hyperparameters.
 
-    As maps: of two objects with unknown fields an API server overlooks a key that was renamed.
+    They must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
     """
     free = [path for path, schema in ALL.items()
             if schema.get("x-kubernetes-preserve-unknown-fields")]  # fmt: skip
@@ -115,7 +115,7 @@ def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
 
 
 def test_every_field_is_described() -> None:
-    """`kubectl explain` is read by people."""
+    """People read the descriptions with `kubectl explain`."""
     fields = [path for path in ALL if path.startswith(("spec", "status"))
               and not path.endswith(("]", "}"))]  # fmt: skip
 
@@ -123,12 +123,12 @@ def test_every_field_is_described() -> None:
 
 
 def test_the_definition_is_small_enough_to_be_applied() -> None:
-    """`kubectl apply` keeps a copy in an annotation, whose largest size is 262,144 bytes; half is enough."""
+    """The copy that `kubectl apply` keeps in an annotation may have 262,144 bytes; half is enough here."""
     assert len(crd_text().encode()) < 131_072
 
 
 def test_the_defaults_are_those_of_the_models(job_data) -> None:
-    """A job means the same with and without an API server that fills it in."""
+    """A job must mean the same whether an API server fills in its defaults or the models do."""
 
     def filled(schema: dict[str, Any], data: Any) -> Any:
         if "items" in schema:
@@ -150,7 +150,7 @@ def test_the_defaults_are_those_of_the_models(job_data) -> None:
 
 
 def test_rules_stand_where_the_models_have_them() -> None:
-    """One rule in the models is one rule in the definition, word for word."""
+    """Each rule of the models is in the definition once, with the same text."""
     for path, model in walk(TrainingJob):
         at = WHOLE
         for name in path:
@@ -161,7 +161,7 @@ def test_rules_stand_where_the_models_have_them() -> None:
 
 
 def test_a_rule_names_a_field_that_the_object_has() -> None:
-    """An API server refuses a definition whose rule points at nothing."""
+    """An API server refuses a definition whose rule names a missing field."""
     for path, schema in ALL.items():
         for rule in schema.get("x-kubernetes-validations", []):
             assert f"{path}{rule.get('fieldPath', '')}" in ALL
@@ -178,7 +178,7 @@ def test_a_rule_names_a_field_that_the_object_has() -> None:
     ],
 )
 def test_deadlines_ttl_and_suspend_may_change(path) -> None:
-    """They say how long to wait, not what is learned."""
+    """These fields limit the time of a run; they do not change its result."""
     assert not frozen(path)
 
 
@@ -198,12 +198,12 @@ def test_deadlines_ttl_and_suspend_may_change(path) -> None:
     ],
 )  # fmt: skip
 def test_all_else_stays_as_it_was_accepted(path) -> None:
-    """A run that changed half-way could not be explained."""
+    """If a spec could change during a run, nobody could explain the result."""
     assert frozen(path)
 
 
 def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
-    """A new field has to be decided about."""
+    """The author of a new field must decide whether it may change."""
     free = [name for name in ALL["spec"]["properties"] if not frozen(f"spec.{name}")]
 
     assert free == [
@@ -217,21 +217,21 @@ def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
 
 
 def test_a_field_of_a_part_is_kept_by_a_rule_of_its_own() -> None:
-    """The API server's message names the place of the rule: `spec.trainer` is no help."""
+    """The API server's message has the path of the rule; `spec.trainer` would not name the wrong field."""
     alone = ("spec.trainer.steps", "spec.trainer.algorithm.name", "spec.storage.size", "spec.network.egress")
 
     assert [path for path in alone if "" not in kept(path)] == []
 
 
 def test_groups_cannot_be_added_or_removed() -> None:
-    """Rules on items see only items that were there before."""
+    """Rules on items see only items that existed before, so the list needs a rule of its own."""
     assert rules_of("spec.simulators")[-1]["rule"] == (
         "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
     )
 
 
 def test_lists_of_named_things_are_maps_to_the_api_server() -> None:
-    """It refuses a name that is there twice, and finds an item's old self by its name."""
+    """The API server then refuses a duplicate name, and compares an item with its old value by name."""
     named = {path for path, schema in ALL.items() if schema.get("x-kubernetes-list-type") == "map"}
 
     assert named == {
@@ -252,7 +252,7 @@ def test_the_keys_of_such_a_list_are_required() -> None:
 
 
 def test_of_the_metadata_only_the_name_is_bounded() -> None:
-    """An API server admits no more there; the name has to leave room for children's names."""
+    """An API server accepts no other rule there; the name must leave room for suffixes of child objects."""
     assert ALL["metadata"]["properties"].keys() == {"name"}
     assert ALL["metadata.name"]["maxLength"] == 48
 
@@ -265,13 +265,13 @@ def test_columns_show_what_there_is() -> None:
 
 
 def test_a_field_to_select_by_is_a_plain_one() -> None:
-    """An API server refuses the whole definition for a list or an object among them."""
+    """An API server refuses the whole definition if such a field is a list or an object."""
     for field in VERSION["selectableFields"]:
         assert ALL[field["jsonPath"].removeprefix(".")]["type"] == "string"
 
 
 def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
-    """Nobody asks for `-o wide` before there is something to look for: the other columns are for that."""
+    """People use `-o wide` only after they have noticed a problem; the other columns are for that."""
     columns = VERSION["additionalPrinterColumns"]
 
     assert [column["name"] for column in columns if not column.get("priority")] == [
@@ -280,7 +280,7 @@ def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
 
 
 def test_status_is_written_apart_and_the_short_name_is_tj() -> None:
-    """The right to edit a job does not include its status."""
+    """The permission to edit a job must not include its status."""
     assert VERSION["subresources"] == {"status": {}}
     assert crd()["spec"]["names"]["shortNames"] == ["tj"]
     assert crd()["spec"]["names"]["categories"] == ["all", "palaestra"]

@@ -1,4 +1,4 @@
-"""The committed files match the models, and the documented examples are true."""
+"""The committed files match the models, and the documented examples are valid."""
 
 import re
 import subprocess
@@ -33,13 +33,13 @@ EXAMPLES = [
     "name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/reference/trainingjob.md"]
 )
 def test_the_committed_file_is_current(name, repository) -> None:
-    """`make golden` writes them anew."""
+    """`make golden` writes these files again."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
-    """Every example is refused by nobody and found by its name."""
+    """Every example is valid, and its job has the name of its file."""
     path = repository / "manifests/examples" / f"{name}.yaml"
 
     job = load(path.read_text(encoding="utf-8"), path.name)
@@ -48,21 +48,21 @@ def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
 
 
 def test_every_example_is_tested_here(repository) -> None:
-    """A file that nobody reads goes stale."""
+    """An example that no test reads becomes outdated."""
     found = (repository / "manifests/examples").glob("*.yaml")
 
     assert sorted(path.stem for path in found) == EXAMPLES
 
 
 def test_the_smallest_example_is_twelve_lines_at_most(repository) -> None:
-    """Defaults are good enough when little has to be said."""
+    """With good defaults a job needs few lines."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert len(text.splitlines()) <= 12
 
 
 def test_the_examples_show_what_their_names_say(repository) -> None:
-    """Two collectors, a sparse reward, REINFORCE."""
+    """These examples have two collectors, a sparse reward and REINFORCE."""
 
     def job(name: str):
         text = (repository / f"manifests/examples/{name}.yaml").read_text(encoding="utf-8")
@@ -79,7 +79,7 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
 
 
 def test_the_example_for_mujoco_is_the_same_job_with_another_driver(repository) -> None:
-    """`make run SIM=mujoco` changes nothing else; a policy may be compared with the stub's."""
+    """`make run SIM=mujoco` changes only the driver, so that policies can be compared with the stub's."""
     folder = repository / "manifests/examples"
     stub, mujoco = (
         load((folder / f"{name}.yaml").read_text(encoding="utf-8"), name).spec
@@ -96,7 +96,7 @@ def test_the_example_for_mujoco_is_the_same_job_with_another_driver(repository) 
     [([], "move-to-target"), (["SIM=stub"], "move-to-target"), (["SIM=mujoco"], "move-to-target-mujoco")],
 )
 def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository) -> None:
-    """Each has a run directory of its own, so no run is resumed in another simulator."""
+    """Each simulator has its own run directory, so no run is resumed in another simulator."""
     shown = subprocess.run(
         ["make", "--no-print-directory", "--dry-run", "run", *chosen],
         cwd=repository,
@@ -109,7 +109,7 @@ def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository
 
 
 def test_the_page_shows_the_smallest_example(repository) -> None:
-    """An example that is copied from the page works."""
+    """A reader can copy the example from the page, and it works."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
     shown = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)
 
@@ -118,7 +118,7 @@ def test_the_page_shows_the_smallest_example(repository) -> None:
 
 
 def test_the_page_quotes_the_real_messages(repository, problems) -> None:
-    """Examples of messages are messages."""
+    """The example messages on the page must be real messages."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     (role,) = problems({"simulators.1.role": "Eval"})
@@ -128,7 +128,7 @@ def test_the_page_quotes_the_real_messages(repository, problems) -> None:
 
 
 def test_every_field_has_a_row() -> None:
-    """The reference is whole."""
+    """The reference page must be complete."""
     text = tables()
 
     def names(at: dict) -> set[str]:
@@ -148,7 +148,7 @@ def test_every_rule_stands_below_its_table() -> None:
 
 
 def test_a_table_tells_type_default_and_what_is_required() -> None:
-    """One row, four answers."""
+    """Each row of the table has all four."""
     rows = tables().splitlines()
 
     assert any(row.startswith("| `count` | integer, 1 to 16 | `1` |") for row in rows)
@@ -160,7 +160,7 @@ def test_a_table_tells_type_default_and_what_is_required() -> None:
 
 
 def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
-    """The introduction is written by people."""
+    """The introduction is written by people and must stay."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     made = page(text.replace("spec.storage", "spec.tsorage"))
@@ -170,13 +170,13 @@ def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
 
 
 def test_a_page_without_marks_is_refused() -> None:
-    """Otherwise the tables would silently be nowhere."""
+    """Without this error the tables would be missing and nobody would notice."""
     with pytest.raises(ValueError, match="add both"):
         page("# The TrainingJob\n")
 
 
 def test_the_api_version_is_that_of_the_examples(repository) -> None:
-    """One place decides it."""
+    """The API version is defined in one place."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert text.startswith(f"apiVersion: {API_VERSION}\n")
@@ -184,5 +184,5 @@ def test_the_api_version_is_that_of_the_examples(repository) -> None:
 
 @pytest.mark.parametrize("name", list(Builtin))
 def test_every_builtin_world_ships(name) -> None:
-    """A choice that the API offers can be made."""
+    """Every world that the API offers must be in the package."""
     assert builtin(name).startswith(b"#VRML_SIM")

@@ -1,4 +1,4 @@
-"""Guards, the rules about new jobs of a cluster: what breaks each, and what does not."""
+"""Guards, the rules of a cluster for new jobs: some jobs break each guard, and others do not."""
 
 import re
 
@@ -18,7 +18,7 @@ GUARDS = {
     for guard in model.guards
 }
 
-# Where an address may be, and the one line about its password.
+# Where an address may be, and the line that reports its password.
 BROKEN = {
     "a variable of the trainer": (
         {"trainer": {"env": [{"name": "MLFLOW_TRACKING_URI", "value": URI}]}},
@@ -56,7 +56,7 @@ BROKEN = {
 
 
 def job(spec):
-    """Return a job that evaluates nothing."""
+    """Return a job that has no evaluation."""
     trainer = {"evaluation": {"everySteps": 0}, **spec.get("trainer", {})}
     return validate(
         {
@@ -70,7 +70,7 @@ def job(spec):
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_an_address_with_a_password_is_reported_without_it(name):
-    """Field, fact and remedy; the line goes into a status, which more people read."""
+    """The message goes into a status, which more people can read than the spec."""
     spec, line = BROKEN[name]
 
     assert broken_guards(job(spec)) == (line,)
@@ -91,12 +91,12 @@ def test_an_address_with_a_password_is_reported_without_it(name):
     ],
 )
 def test_an_address_without_a_password_is_not_reported(value):
-    """A port, a user's name, a mail address and the variables of a shell are none."""
+    """A port, a user name, a mail address and a shell variable are not passwords."""
     assert broken_guards(job({"trainer": {"env": [{"name": "A", "value": value}]}})) == ()
 
 
 def test_every_guard_is_broken_by_an_example_here():
-    """A guard that nobody has seen refuse is a guess."""
+    """A guard that has never refused a job is not tested."""
     fields = {
         re.sub(r"\[\d+\]", "", line.split(": ")[0]).removeprefix("spec.") for _, line in BROKEN.values()
     }

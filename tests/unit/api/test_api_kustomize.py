@@ -1,4 +1,4 @@
-"""The kustomize files of docs/howto/gitops.md, in the kustomize that kubectl has."""
+"""kubectl's kustomize builds the kustomize files of docs/howto/gitops.md."""
 
 import subprocess
 from pathlib import Path
@@ -35,7 +35,10 @@ MORE = {"secretGenerator": [{"name": "keys", "literals": ["token=x"]}], "namePre
 
 @pytest.fixture
 def built(tmp_path):
-    """Return what kustomize makes of the page's files, by kind; a Secret, a claim and a prefix are added."""
+    """Return the objects that kustomize makes, by kind.
+
+    A Secret, a claim and a prefix are added to the page's files.
+    """
     [references], [kustomization] = (
         blocks(PAGE.read_text(), f"yaml {name}") for name in ("references", "kustomization")
     )
@@ -59,7 +62,10 @@ def built(tmp_path):
 
 
 def test_names_that_kustomize_makes_reach_every_reference_of_a_job(built):
-    """A job that asks for `worlds` waits for ever, as WorldMissing, beside a `worlds-7h4fm2k9t6`."""
+    """If a job still refers to `worlds`, which kustomize renames to `worlds-7h4fm2k9t6`, it waits for ever.
+
+    The reason of its wait is WorldMissing.
+    """
     spec = built["TrainingJob"]["spec"]
     world, secret, claim = (
         built[kind]["metadata"]["name"] for kind in ("ConfigMap", "Secret", "PersistentVolumeClaim")
@@ -75,5 +81,5 @@ def test_names_that_kustomize_makes_reach_every_reference_of_a_job(built):
 
 
 def test_a_world_that_kustomize_makes_is_open_to_jobs(built):
-    """Without the label the job is held next."""
+    """Without the label the operator would hold the job."""
     assert built["ConfigMap"]["metadata"]["labels"] == {"palaestra.dev/for-jobs": "true"}

@@ -1,4 +1,4 @@
-"""All the mistakes of a job file at once: those that are reported, not repeated or hidden."""
+"""All mistakes of a job file are reported at once, each of them once."""
 
 import pytest
 
@@ -21,7 +21,7 @@ spec:
 
 
 def told(text: str) -> tuple[str, ...]:
-    """Return what is said about a wrong job file."""
+    """Return the problems that are reported for a wrong job file."""
     with pytest.raises(SpecErrors) as caught:
         load(text, "job.yaml")
     return caught.value.problems
@@ -55,14 +55,14 @@ def test_the_error_reads_as_its_lines() -> None:
 
 
 def test_a_rule_is_not_judged_on_a_field_that_is_wrong(problems) -> None:
-    """Whether one collects cannot be said while its role is none."""
+    """The group's role is invalid, so the rule about collectors cannot be checked."""
     assert problems({"simulators": [{"name": "a", "role": "collects"}]}) == [
         'spec.simulators[0].role: "collects" is not a role; use Collect or Evaluate'
     ]
 
 
 def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
-    """A wrong count says nothing about the roles."""
+    """A wrong count does not affect the rule about the roles."""
     group = {"name": "a", "role": "Evaluate", "startDeadlineSeconds": 0}
 
     assert problems({"simulators": [group]}) == [
@@ -72,7 +72,7 @@ def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
 
 
 def test_a_rule_keeps_its_place_when_earlier_items_are_wrong(problems) -> None:
-    """Items are counted as their author counts them."""
+    """The message has the index that the author sees in the file."""
     groups = [
         "nonsense",
         {"name": "a", "role": "nonsense"},
@@ -83,7 +83,7 @@ def test_a_rule_keeps_its_place_when_earlier_items_are_wrong(problems) -> None:
 
 
 def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
-    """The metadata has nothing to do with them."""
+    """The rules of the spec do not depend on the metadata."""
     data = job_data({"suspend": True, "scheduling.queueName": "robots"})
     data["metadata"] = {"name": "-"}
 
@@ -97,7 +97,7 @@ def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
 
 
 def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> None:
-    """The error also lists mistakes that only the second pass finds."""
+    """The error also lists mistakes that only the second pass of the validation finds."""
     groups = [
         {"name": "a", "role": "Collect", "count": 0},
         {"name": "a", "role": "Evaluate"},
@@ -110,7 +110,7 @@ def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> No
 
 
 def test_no_simulators_is_not_the_same_as_nothing_said(problems) -> None:
-    """An empty list is somebody's mistake; a missing one is nobody's."""
+    """An empty list is a mistake; a missing list means the default."""
     assert problems({"simulators": []}) == ["spec.simulators: has no entry; give one or remove the line"]
 
 
@@ -125,7 +125,7 @@ def test_what_every_object_needs_is_asked_for(key, job_data) -> None:
 
 
 def test_an_object_of_another_kind_is_reported_only_as_such(job_data) -> None:
-    """A Deployment has a hundred fields that are not ours; none of them is the mistake."""
+    """A Deployment has a hundred fields that a TrainingJob lacks; the only mistake to report is its kind."""
     data = {**job_data(), "apiVersion": "apps/v1", "kind": "Deployment", "spec": {"template": {}}}
 
     with pytest.raises(SpecErrors) as caught:
@@ -138,7 +138,7 @@ def test_an_object_of_another_kind_is_reported_only_as_such(job_data) -> None:
 
 
 def test_a_wrong_version_alone_hides_nothing(job_data) -> None:
-    """Then it is meant as a TrainingJob."""
+    """The author meant a TrainingJob, so its fields are checked too."""
     data = {**job_data({"replicas": 0}), "apiVersion": "palaestra.dev/v1"}
 
     with pytest.raises(SpecErrors) as caught:
@@ -160,19 +160,19 @@ def test_a_wrong_version_alone_hides_nothing(job_data) -> None:
     ],
 )
 def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
-    """The file's own name stands where a field's path would."""
+    """The message begins with the file's name, where a field's path would be."""
     assert told(text) == (f"job.yaml: {fact}; begin it with apiVersion: palaestra.dev/v1alpha1",)
 
 
 def test_the_error_for_a_file_that_is_no_yaml_has_line_and_column() -> None:
-    """Line and column, both from 1."""
+    """The line and the column count from 1."""
     problem = told("spec:\n  trainer: [1, 2\n")[0]
 
     assert problem.startswith("job.yaml:3:1: not YAML: ")
 
 
 def test_snake_case_is_refused_as_in_a_cluster() -> None:
-    """What works on a laptop only is a trap."""
+    """A cluster refuses snake case, so a laptop must refuse it too."""
     text = FIVE_MISTAKES.replace("stepps: 1000", "evaluation: {every_steps: 100}")
 
     assert "spec.trainer.evaluation.every_steps: is not a field; did you mean everySteps?" in told(text)
@@ -191,7 +191,7 @@ spec:
 
 
 def test_a_whole_number_is_one_however_it_is_written() -> None:
-    """An API server stores it so, and a file has one meaning on a laptop and on a cluster."""
+    """An API server stores it as an integer, and a file must mean the same on a laptop and on a cluster."""
     trainer = load(MILLIONS).spec.trainer
     given = trainer.algorithm.hyperparameters
 
@@ -202,5 +202,5 @@ def test_a_whole_number_is_one_however_it_is_written() -> None:
 
 @pytest.mark.parametrize("steps", ["1.5", "1e-3", "1e300"])
 def test_a_number_that_is_not_whole_is_still_refused(steps) -> None:
-    """Nor is one of which a float does not know every digit."""
+    """A float that is too large to be exact is refused, too."""
     assert any("spec.trainer.steps" in each for each in told(MILLIONS.replace("1e6\n", f"{steps}\n")))

@@ -1,4 +1,4 @@
-"""What a TrainingJob is when its author says little: the defaults, and what is absent."""
+"""A minimal TrainingJob: its defaults and its absent fields."""
 
 import pytest
 from pydantic import ValidationError
@@ -11,12 +11,12 @@ NOON = "2026-01-31T12:00:00Z"
 
 @pytest.fixture
 def least(job_data) -> TrainingJob:
-    """A job whose author said nothing but two groups."""
+    """A job that sets only its two groups."""
     return validate(job_data())
 
 
 def test_a_job_without_a_spec_collects_and_evaluates() -> None:
-    """The smallest job that learns anything has one simulator for each."""
+    """The smallest job that can learn has one simulator for each."""
     job = TrainingJob(metadata=Metadata(name="least"), spec=Spec())
 
     assert [(group.name, group.role, group.count) for group in job.spec.simulators] == [
@@ -35,7 +35,10 @@ def test_a_group_is_of_stubs_in_the_arena(least) -> None:
 
 
 def test_simulators_are_expected_to_fail_sometimes(least) -> None:
-    """Restarted ten times in ten minutes, a minute to come up; the plan decides when they are recycled."""
+    """A simulator may restart ten times in ten minutes, and has a minute to start.
+
+    The plan sets when simulators are recycled.
+    """
     group = least.spec.simulators[0]
 
     assert group.recycle is None
@@ -45,7 +48,7 @@ def test_simulators_are_expected_to_fail_sometimes(least) -> None:
 
 
 def test_the_trainer_learns_to_move_to_the_target(least) -> None:
-    """The task that ships, with the algorithm that is shown to solve it."""
+    """This is the bundled task, with the algorithm that is shown to solve it."""
     trainer = least.spec.trainer
 
     assert (trainer.environment.id, trainer.environment.reward) == ("MoveToTargetEnv-v0", "Dense")
@@ -55,7 +58,7 @@ def test_the_trainer_learns_to_move_to_the_target(least) -> None:
 
 
 def test_what_was_not_said_is_absent(least) -> None:
-    """None means that the release, the cluster or nobody decides; it is never a made-up value."""
+    """None is never replaced here: the release or the cluster sets the value, or there is no limit."""
     spec = least.spec
 
     assert (spec.trainer.image, spec.trainer.evaluation.stop_at_success_rate) == (None, None)
@@ -65,7 +68,7 @@ def test_what_was_not_said_is_absent(least) -> None:
 
 
 def test_a_run_is_kept_and_tried_again(least) -> None:
-    """Hours of training outlive the job, and three failures."""
+    """The run directory outlives the job, and three failures are retried."""
     spec = least.spec
 
     assert (spec.storage.size, spec.storage.retain, spec.storage.ephemeral) == (
@@ -80,7 +83,7 @@ def test_a_job_lies_in_the_namespace_default_and_has_no_uid(least) -> None:
 
 
 def test_a_new_job_has_an_empty_status(least) -> None:
-    """A status is what was observed, so a job that was only read has none."""
+    """A status is an observation, so a job that was only read from a file has an empty one."""
     status = least.status
 
     assert (status.phase, status.observed_generation, status.start_time) == (None, None, None)
@@ -88,13 +91,13 @@ def test_a_new_job_has_an_empty_status(least) -> None:
 
 
 def test_a_job_cannot_be_edited(least) -> None:
-    """A plan made from it must stay true."""
+    """A plan is made from the job, so the job must not change afterwards."""
     with pytest.raises(ValidationError, match="frozen"):
         least.spec.replicas = 2
 
 
 def test_names_in_python_are_written_in_snake_case() -> None:
-    """YAML has camelCase, Python its own; both name the same field."""
+    """A field is named in camelCase in YAML and in snake_case in Python."""
     group = SimulatorGroup(name="collect", role=Role.COLLECT, start_deadline_seconds=5)
 
     assert group.model_dump(by_alias=True)["startDeadlineSeconds"] == 5
@@ -141,7 +144,7 @@ def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
 
 @pytest.mark.parametrize("namespace", ["1team", "42", "team-1"])
 def test_a_namespace_may_begin_with_a_digit(namespace, job_data) -> None:
-    """RFC 1123 allows it, so clusters have such."""
+    """RFC 1123 allows it, so such namespaces exist."""
     data = job_data()
     data["metadata"]["namespace"] = namespace
 
@@ -149,7 +152,10 @@ def test_a_namespace_may_begin_with_a_digit(namespace, job_data) -> None:
 
 
 def test_a_name_that_an_api_server_made_is_a_name(job_data) -> None:
-    """`kubectl create` of a file with generateName; the server leaves the field there."""
+    """`kubectl create` of a file with generateName makes such a name.
+
+    The server leaves generateName in the object.
+    """
     data = job_data()
     data["metadata"] = {"name": "try-x2b4q", "generateName": "try-"}
 
@@ -157,7 +163,7 @@ def test_a_name_that_an_api_server_made_is_a_name(job_data) -> None:
 
 
 def test_a_job_whose_name_is_still_to_be_made_is_refused_with_the_remedy(job_data) -> None:
-    """`palaestra run` and `Client.apply` need the name that they start, and start again."""
+    """`palaestra run` and `Client.apply` need the final name, also to restart the job under it."""
     data = job_data({"replicas": 0})
     data["metadata"] = {"generateName": "try-"}
 
@@ -171,7 +177,7 @@ def test_a_job_whose_name_is_still_to_be_made_is_refused_with_the_remedy(job_dat
 
 
 def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> None:
-    """A job read back from a cluster is still a job file."""
+    """A job that was read from a cluster is still a job file."""
     data = job_data()
     data["metadata"] |= {"uid": "5a0c", "generation": 3, "managedFields": [], "finalizers": []}
 
@@ -181,7 +187,7 @@ def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> Non
 NEWER_STATUS = {
     "phase": "Running",
     "ofTomorrow": {"deep": [1]},
-    "release": {"trainer": "t:1", "stub": "s:1", "webots": "w:1", "gazebo": "g:1"},
+    "release": {"trainer": "t:1", "stub": "s:1", "mujoco": "m:1", "webots": "w:1", "gazebo": "g:1"},
     "conditions": [
         {
             "type": type_,
@@ -211,7 +217,7 @@ NEWER_STATUS = {
 
 
 def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
-    """A command line, or an operator during a rollback, reads what it knows."""
+    """An older command line, or an operator after a rollback, reads the fields that it knows."""
     status = validate(job_data() | {"status": NEWER_STATUS}).status
 
     assert status.phase == "Running"
@@ -226,12 +232,12 @@ def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
     [{"phase": "Halted"}, {"replicas": [{"index": 0, "phase": "Halted"}]}, {"replicas": [{"index": "0"}]}],
 )
 def test_a_phase_or_type_that_is_unknown_is_still_refused(wrong, job_data) -> None:
-    """It could mean that a replica has ended, and one that has ended is never started again."""
+    """It could mean that a replica has ended, and an ended replica must never be started again."""
     with pytest.raises(SpecErrors, match=r"^status"):
         validate(job_data() | {"status": wrong})
 
 
 def test_an_unknown_field_of_the_spec_is_refused_as_ever(job_data) -> None:
-    """A person writes it, so it is a mistake."""
+    """A person wrote it, so it is a mistake."""
     with pytest.raises(SpecErrors, match=r"spec.ofTomorrow: is not a field"):
         validate(job_data({"ofTomorrow": 1}))

@@ -1,4 +1,4 @@
-"""Paths of fields, and data with parts taken away."""
+"""Paths of fields, and data from which parts are taken."""
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,7 @@ from palaestra.api.simulators import WorldSource
     ],
 )
 def test_a_path_is_shown_as_a_person_writes_it(path, text) -> None:
-    """Dots between words, numbers in brackets, the rest quoted."""
+    """The path has dots between words, numbers in brackets, and quotes around the rest."""
     assert shown(path) == text
 
 
@@ -30,18 +30,18 @@ PIECES = st.integers(0, 99) | st.text(max_size=4) | st.from_regex(r"[a-z_]{1,4}"
 
 @given(st.lists(PIECES, min_size=1).map(tuple))
 def test_a_path_is_read_as_it_is_shown(path) -> None:
-    """A path from a message can be typed."""
+    """A user can copy a path from a message."""
     assert path_of(shown(path)) == path
 
 
 @pytest.mark.parametrize("text", ["", ".a", "a..b", "a.", "a[", "a[-1]", 'a["b]', 'a["\\x"]', "a-b"])
 def test_a_text_that_is_no_path_is_empty(text) -> None:
-    """So that a typing mistake is not a field."""
+    """A mistyped path is not taken for a field."""
     assert path_of(text) == ()
 
 
 def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
-    """A mistake in the third group stays one in the third."""
+    """A mistake in the third group is reported for the third group, even if the first was taken out."""
     pruned = Pruned({"groups": ["a", "b", {"role": "c"}]})
 
     pruned.take(("groups", 0))
@@ -51,7 +51,7 @@ def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
 
 
 def test_what_is_not_there_cannot_be_taken() -> None:
-    """The caller then takes what it is missing from."""
+    """The caller then takes the object that lacks it."""
     pruned = Pruned({"a": {"b": 1}})
 
     assert not pruned.take(("a", "c"))
@@ -61,7 +61,7 @@ def test_what_is_not_there_cannot_be_taken() -> None:
 
 
 def test_a_stand_in_is_put_once() -> None:
-    """A second time would mean that the stand-in is wrong itself."""
+    """A second replacement would mean that the stand-in itself is wrong."""
     pruned = Pruned({"metadata": 3})
 
     assert pruned.take(("metadata",), {"name": "stand-in"})
@@ -78,12 +78,12 @@ JSON = st.recursive(
 
 @given(JSON)
 def test_nothing_taken_is_everything_left(data) -> None:
-    """Pruning starts from the very same data."""
+    """Without a `take` the data is unchanged."""
     assert Pruned(data).data() == data
 
 
 def test_the_model_at_a_path_is_found_through_lists() -> None:
-    """Nearest names are looked for where the mistake is."""
+    """The nearest names come from the model in which the mistake is."""
     assert model_at(TrainingJob, ("spec", "simulators", 3, "world")) is WorldSource
     assert model_at(TrainingJob, ("spec", "trainer", "env", 0)) is Variable
     assert model_at(TrainingJob, ("spec", "seed")) is None
@@ -91,7 +91,7 @@ def test_the_model_at_a_path_is_found_through_lists() -> None:
 
 
 def test_the_tree_of_models_begins_with_the_job_itself() -> None:
-    """And reaches the smallest part of it."""
+    """The walk reaches the smallest part of the job, too."""
     paths = [path for path, _ in walk(TrainingJob)]
 
     assert paths[0] == ()

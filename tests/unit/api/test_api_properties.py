@@ -1,4 +1,4 @@
-"""Any job survives being written and read; any mutilated job is refused in words."""
+"""Any job stays equal when it is written and read; every mutilated job is refused with a message."""
 
 import re
 from copy import deepcopy
@@ -54,7 +54,7 @@ DRIVERS = st.sampled_from(
 
 
 def groups(role: str) -> st.SearchStrategy[dict]:
-    """Return groups of one role, named after it."""
+    """Return groups of one role; each is named after its role."""
     optional = {
         "count": st.integers(1, 16),
         "world": WORLDS,
@@ -124,11 +124,11 @@ RUBBISH = st.recursive(
     max_leaves=6,
 )  # fmt: skip
 
-LINE = re.compile(r"""(\w+|\[").*?: .+; .+""")  # on one line: `.` is no line break
+LINE = re.compile(r"""(\w+|\[").*?: .+; .+""")  # `.` matches no line break, so each is one line
 
 
 def told(data: object) -> tuple[str, ...] | None:
-    """Return what is said about a wrong job, as text or as data; None when it is right."""
+    """Return the problems of a job, given as text or as data; None if it is valid."""
     try:
         load(data, "job.yaml") if isinstance(data, str) else validate(data)
     except SpecErrors as error:
@@ -137,13 +137,13 @@ def told(data: object) -> tuple[str, ...] | None:
 
 
 def well_told(problems: tuple[str, ...]) -> bool:
-    """Return whether there are lines, and each has a path, a fact and a remedy."""
+    """Return whether there are problems, each a line with a path, a fact and a remedy."""
     return bool(problems) and all(LINE.fullmatch(line) for line in problems)
 
 
 @given(JOBS)
 def test_a_job_is_the_same_after_writing_and_reading(data) -> None:
-    """What `palaestra` writes down is the job that was run."""
+    """The job that `palaestra` records must be the job that it ran."""
     job = validate(data)
 
     assert load(dump(job), "job.yaml") == job
@@ -151,7 +151,7 @@ def test_a_job_is_the_same_after_writing_and_reading(data) -> None:
 
 @given(JOBS)
 def test_defaults_are_resolved_once(data) -> None:
-    """The job with its defaults written out is the same job."""
+    """A job with its defaults written out is the same job."""
     resolved = as_data(validate(data))
 
     assert as_data(validate(resolved)) == resolved
@@ -159,7 +159,7 @@ def test_defaults_are_resolved_once(data) -> None:
 
 @given(JOBS)
 def test_a_job_does_not_change_what_it_was_read_from(data) -> None:
-    """The caller's data is the caller's."""
+    """The data belongs to the caller."""
     before = deepcopy(data)
 
     validate(data)
@@ -178,7 +178,7 @@ def places(data: object) -> list[tuple]:
 
 @given(JOBS, st.data())
 def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
-    """Whatever is put anywhere: path, fact and remedy, and no other error."""
+    """The only error is one with path, fact and remedy, whatever value is put wherever."""
     data = deepcopy(job)
     for _ in range(draw.draw(st.integers(1, 3))):
         holder, key = draw.draw(st.sampled_from(places(data)))
@@ -193,7 +193,7 @@ def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
 
 @given(JOBS, st.data())
 def test_whatever_is_taken_from_a_job_file_the_reader_copes(job, draw) -> None:
-    """Half a file is what an editor leaves after a crash."""
+    """An editor may leave half a file after a crash."""
     text = yaml.safe_dump(job)
     start = draw.draw(st.integers(0, len(text)))
     end = draw.draw(st.integers(start, len(text)))
@@ -205,14 +205,14 @@ def test_whatever_is_taken_from_a_job_file_the_reader_copes(job, draw) -> None:
 
 @given(RUBBISH.filter(lambda data: not isinstance(data, str)))
 def test_rubbish_is_refused(data) -> None:
-    """No value that is not a TrainingJob passes for one."""
+    """A value that is not a TrainingJob is never accepted as one."""
     problems = told(data)
 
     assert problems is not None
     assert well_told(problems), problems
 
 
-# As Kubernetes' own API has it (core/v1, Affinity).
+# The limits are those of Kubernetes' own API (core/v1, Affinity).
 EXPRESSIONS = st.lists(
     st.fixed_dictionaries(
         {"key": NAMES, "operator": st.just("In"), "values": st.lists(NAMES, min_size=1, max_size=2)}
@@ -263,7 +263,7 @@ AFFINITIES = st.fixed_dictionaries(
 
 @given(AFFINITIES)
 def test_any_affinity_of_a_pod_is_accepted(affinity):
-    """The API server takes it, so a refusal by the operator would come after `kubectl apply`."""
+    """The API server accepts it, so the operator would refuse it only after `kubectl apply`."""
     job = validate(
         {
             "apiVersion": "palaestra.dev/v1alpha1",

@@ -1,4 +1,4 @@
-"""Every reason has its sentences, in one file and in one table."""
+"""Every reason has its sentences, which one file and one table hold."""
 
 import re
 import string
@@ -10,19 +10,19 @@ from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason, say
 
 
 def test_every_reason_has_a_row() -> None:
-    """What it means and what to do."""
+    """The row has the meaning of the reason and the remedy."""
     assert set(ROWS) == set(Reason)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_reason_is_one_word_for_programs(reason) -> None:
-    """As Kubernetes asks of the reasons of conditions."""
+    """Kubernetes requires it for the reasons of conditions."""
     assert re.fullmatch("[A-Z][A-Za-z]{2,39}", reason)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_message_is_filled_in_and_stays_within_its_bounds(reason) -> None:
-    """However long the facts are that others tell."""
+    """Facts come from other programs and may have any length."""
     fields = {name for _, name, _, _ in string.Formatter().parse(ROWS[reason].message) if name}
 
     message = say(reason, **{name: f"\n{name}\x00 {'x' * 5000}" for name in fields})
@@ -32,14 +32,14 @@ def test_a_message_is_filled_in_and_stays_within_its_bounds(reason) -> None:
 
 
 def test_a_message_that_lacks_a_fact_is_a_mistake_of_ours() -> None:
-    """It would tell people about braces."""
+    """Without the error the user would read a message with unfilled braces."""
     with pytest.raises(KeyError):
         say(Reason.IMAGE_PULL)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_row_is_one_line_of_a_table(reason) -> None:
-    """A bar or a line break would tear it."""
+    """A bar or a line break would break the table."""
     row = ROWS[reason]
 
     assert row.meaning
@@ -57,6 +57,6 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
 
 
 def test_a_page_without_its_marks_raises_an_error() -> None:
-    """A table that is silently left out would not be noticed."""
+    """Without this error, the missing table would stay unnoticed."""
     with pytest.raises(ValueError, match=r"lacks <!-- generated from the reasons.*; add both"):
         reasons_page("# Operations")

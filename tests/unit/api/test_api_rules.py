@@ -14,7 +14,7 @@ from palaestra.api.model_walk import fields_of, walk
 
 COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
 
-# What breaks each rule, and the one line that is said about it.
+# What breaks each rule, and the one line that reports it.
 BROKEN = {
     "no group collects": (
         {"simulators": [{"name": "evaluate", "role": "Evaluate"}]},
@@ -275,7 +275,7 @@ BROKEN = {
     ),
 }
 
-# Their neighbors that are right: the same fields, in accord.
+# Jobs with the same fields that keep the rules.
 KEPT = {
     "no evaluation at all": {
         "simulators": [{"name": "collect", "role": "Collect"}],
@@ -338,7 +338,7 @@ KEPT = {
 }
 
 
-# Every model with its rules, once, by a readable name.
+# Each rule of each model once, by a readable name.
 RULES = {
     f"{model.__name__}.{rule.field}: {rule.message}": (model, rule)
     for _, model in walk(TrainingJob)
@@ -348,7 +348,7 @@ RULES = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
-    """Path, fact and remedy, and nothing that merely follows from it."""
+    """The line has a path, a fact and a remedy; consequences of the mistake are not reported."""
     changes, line = BROKEN[name]
 
     assert problems(changes) == [line]
@@ -356,12 +356,12 @@ def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
 
 @pytest.mark.parametrize("name", KEPT)
 def test_what_keeps_the_rules_is_accepted(name, problems) -> None:
-    """A rule forbids no more than its sentence says."""
+    """A rule refuses only what its sentence says."""
     assert problems(KEPT[name]) == []
 
 
 def test_every_rule_is_broken_by_an_example_here() -> None:
-    """A rule that nobody has seen fail is a guess."""
+    """A rule that has never failed in a test is not tested."""
     told = {line.split(": ", 1)[1] for _, line in BROKEN.values()}
 
     assert {rule.message for _, rule in RULES.values()} == told
@@ -369,7 +369,7 @@ def test_every_rule_is_broken_by_an_example_here() -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_reads_only_fields_that_there_are(name) -> None:
-    """A renamed field must not leave its old name behind in an expression."""
+    """A renamed field must not stay in an expression under its old name."""
     model, rule = RULES[name]
     known = {field for _, below in walk(model) for field in fields_of(below)}
 
@@ -381,7 +381,7 @@ def test_a_rule_reads_only_fields_that_there_are(name) -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
-    """Two halves, the second told as a thing to do, no full stop."""
+    """The message has two parts, of which the second is an instruction, and no full stop."""
     message = RULES[name][1].message
 
     fact, remedy = message.split("; ")
@@ -392,7 +392,7 @@ def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
 
 
 def test_only_what_lies_in_options_has_no_expression() -> None:
-    """An API server cannot look into free objects; everything else it judges itself."""
+    """An API server cannot check fields of free objects; it checks all other rules itself."""
     without = [rule.message for _, rule in RULES.values() if not rule.cel]
 
     algorithms = {message.split()[0] for message in without}
@@ -400,6 +400,6 @@ def test_only_what_lies_in_options_has_no_expression() -> None:
 
 
 def test_a_job_built_in_python_keeps_the_rules_too() -> None:
-    """The rules belong to the models, not to the reading of files."""
+    """The rules belong to the models, not to the reader of files."""
     with pytest.raises(ValidationError, match="needs exactly one of inline"):
         WorldSource()

@@ -1,4 +1,4 @@
-"""What a served definition lacks of this release's, and what it may have besides."""
+"""The fields of this release's definition that a served one lacks; additional fields are allowed."""
 
 import copy
 
@@ -11,14 +11,14 @@ OURS = schema()
 
 
 def changed(change):
-    """Return what a definition lacks that was changed so."""
+    """Return the missing fields of a definition with this change."""
     served = copy.deepcopy(OURS)
     change(served["properties"]["status"]["properties"])
     return list(lacks(served, OURS))
 
 
 def test_this_release_s_own_definition_lacks_nothing():
-    """An installation as it should be."""
+    """The definition of this release is complete."""
     assert list(lacks(OURS, OURS)) == []
 
 
@@ -43,7 +43,7 @@ def test_what_an_older_definition_lacks_is_named_with_its_path(change, fact):
 
 
 def test_a_map_of_another_type_is_named():
-    """Maps and lists are looked into."""
+    """The comparison includes the items of maps and lists."""
     served = {"type": "object", "additionalProperties": {"type": "string"}}
     ours = {"type": "object", "additionalProperties": {"type": "integer"}}
 
@@ -51,5 +51,5 @@ def test_a_map_of_another_type_is_named():
 
 
 def test_what_a_newer_definition_has_besides_is_no_lack():
-    """An administrator applies it before the operators are upgraded."""
+    """An administrator upgrades the definition before the operators."""
     assert changed(lambda status: status.update(ofTomorrow={"type": "string"})) == []

@@ -1,4 +1,4 @@
-"""Each kind of mistake in a field, and the sentence that its author reads."""
+"""Each kind of mistake in a field has a sentence for its author."""
 
 import json
 
@@ -10,7 +10,7 @@ from palaestra.errors import SpecErrors
 LONG = "x" * 2000
 
 SENTENCES = [
-    # A value outside its choice.
+    # A value outside its choices.
     ({"simulators.1.role": "Eval"},
      'spec.simulators[1].role: "Eval" is not a role; use Collect or Evaluate'),
     ({"simulators.0.driver": "gazebo"},
@@ -80,7 +80,7 @@ SENTENCES = [
     ({"trainer.algorithm.hyperparameters": ["gamma"]},
      ("spec.trainer.algorithm.hyperparameters: a list is not a mapping; "
      "write lines of 'key: value'")),
-    # Nothing where something is needed.
+    # No value where one is required.
     ({"trainer": None}, "spec.trainer: is empty; give a value or remove the line"),
     ({"simulators.0": {"role": "Collect"}}, "spec.simulators[0].name: is missing; add it"),
     ({"simulators.0.name": ""},
@@ -142,7 +142,7 @@ SENTENCES = [
     ({"simulators.0.recycle": {"aboveMemory": "400"}},
      ('spec.simulators[0].recycle.aboveMemory: "400" is not an amount of memory; '
      "write a whole number and a unit, as 400Mi or 2Gi")),
-    # Twice.
+    # Duplicates.
     ({"imagePullSecrets": [{"name": "pull"}, {"name": "pull"}]},
      'spec.imagePullSecrets: "pull" is the name of two entries; make the names unique'),
     # Unknown fields, with the nearest known name.
@@ -151,7 +151,7 @@ SENTENCES = [
      ("spec.simulators[0].start_deadline_seconds: is not a field; "
      "did you mean startDeadlineSeconds?")),
     ({"steps": 1}, "spec.steps: is not a field here; did you mean spec.trainer.steps?"),
-    # Words of other projects, with their places.
+    # Terms of other projects, with the field to use instead.
     ({"trainer.n_timesteps": 1},
      ("spec.trainer.n_timesteps: is not a field; write trainer.steps "
      "(`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo)")),
@@ -172,19 +172,19 @@ SENTENCES = [
 
 @pytest.mark.parametrize(("changes", "line"), SENTENCES, ids=[line[:60] for _, line in SENTENCES])
 def test_an_error_has_path_fact_and_remedy(changes, line, problems) -> None:
-    """One mistake, one line, and all that its author needs to mend it."""
+    """One mistake is one line, with all that its author needs to correct it."""
     assert problems(changes) == [line]
 
 
 def test_a_path_with_a_key_that_is_no_word_shows_it_in_brackets(problems) -> None:
-    """Dots in a label's key are not dots of the path."""
+    """A dot in a label's key does not separate fields."""
     assert problems({"scheduling.podLabels": {"a.b/c": 1}}) == [
         'spec.scheduling.podLabels["a.b/c"]: 1 is a number where text is needed; quote it: "1"'
     ]
 
 
 def test_a_key_that_is_too_long_is_reported_at_its_map(problems) -> None:
-    """The key is the path, so the path says which."""
+    """The path ends in the key, so it shows which key is too long."""
     line = problems({"scheduling.podLabels": {LONG: "a"}})[0]
 
     assert line.startswith("spec.scheduling.podLabels.xxx")
@@ -192,7 +192,7 @@ def test_a_key_that_is_too_long_is_reported_at_its_map(problems) -> None:
 
 
 def test_a_long_value_is_cut_in_the_sentence(problems) -> None:
-    """A line stays a line."""
+    """The message must stay short."""
     (line,) = problems({"simulators.1.role": LONG})
 
     assert len(line) < 150
@@ -200,13 +200,13 @@ def test_a_long_value_is_cut_in_the_sentence(problems) -> None:
 
 
 def test_line_breaks_in_a_value_or_a_key_do_not_break_the_line(problems) -> None:
-    """One mistake is one line, whatever was written."""
+    """One mistake is one line, whatever value was written."""
     (line,) = problems({"trainer.a\nb": 1})
 
     assert "\n" not in line
 
 
 def test_the_error_for_a_wrong_time_has_an_example(job_data) -> None:
-    """A status comes from programs, whose authors read the message too."""
+    """The authors of programs that write a status read the message too."""
     with pytest.raises(SpecErrors, match=r'^status.startTime: "noon" is not a time; write it as'):
         validate(job_data() | {"status": {"startTime": "noon"}})

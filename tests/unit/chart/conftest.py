@@ -1,4 +1,4 @@
-"""The chart's objects in each mode, rendered by Helm; skips where Helm is not built."""
+"""The chart's objects in each mode, rendered by Helm; the tests are skipped where Helm is not built."""
 
 from collections.abc import Callable
 from functools import cache
@@ -15,19 +15,19 @@ Object = dict[str, Any]
 
 @pytest.fixture(scope="session", autouse=True)
 def helm_is_built() -> None:
-    """Nothing here works without it."""
+    """Every test of this folder needs Helm."""
     programs(("helm",))
 
 
 @pytest.fixture(scope="session")
 def made() -> Callable[[str], list[Object]]:
-    """All objects of a mode."""
+    """Return all objects of a mode."""
     return cache(lambda mode: objects(MODES[mode]))
 
 
 @pytest.fixture
 def one(made) -> Callable[..., Object]:
-    """The only object of a kind and a name in a mode."""
+    """Return the only object of a kind and a name in a mode."""
 
     def find(mode: str, kind: str, name: str = "palaestra-operator") -> Object:
         [found] = [each for each in made(mode) if (each["kind"], each["metadata"]["name"]) == (kind, name)]

@@ -1,4 +1,4 @@
-"""What checkov has against the chart, down to the last finding, and why it stays so."""
+"""checkov's findings in the chart are complete here, each with the reason why it stays."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ Objects = tuple[tuple[str, str], ...]
 
 
 class Accepted(NamedTuple):
-    """A check whose findings are no faults, with the objects that it is about."""
+    """The reason why a check's findings are accepted, and the objects that they are about."""
 
     reason: str
     objects: Objects
@@ -43,13 +43,13 @@ EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
 
 @pytest.fixture(scope="module")
 def found():
-    """What it finds, by mode; one run for all, since it takes seconds to begin."""
+    """The findings by mode; checkov runs once for all modes, because it takes seconds to start."""
     return findings({mode: rendered(MODES[mode]) for mode in EXPECTED})
 
 
 @pytest.mark.parametrize("mode", EXPECTED)
 def test_every_finding_has_a_reason_and_every_reason_a_finding(found, mode):
-    """A new one is mended, or somebody says why not; and what was mended loses its excuse."""
+    """A new finding is fixed or gets a reason; the reason of a fixed finding is removed."""
     parts = {OPERATOR, TRIAL} if mode == "default" else {OPERATOR, TENSORBOARD, JUPYTER, TRIAL}
 
     assert found[mode] == {

@@ -1,4 +1,4 @@
-"""What manifests/install.yaml holds, and what it must not; read as it is recorded, so without Helm."""
+"""The content of manifests/install.yaml, read from the recorded file, so these tests run without Helm."""
 
 from importlib.metadata import version
 
@@ -11,7 +11,7 @@ from tests.chart.installation import installed
 
 @pytest.fixture(autouse=True)
 def helm_is_built():
-    """Needed by the other tests of this folder only."""
+    """Only the other tests of this folder need Helm."""
 
 
 @pytest.fixture
@@ -21,12 +21,12 @@ def made():
 
 
 def verbs(role, resource):
-    """Return what a role allows to do with a kind of objects."""
+    """Return the verbs that a role allows for a kind of objects."""
     return {verb for rule in role["rules"] if resource in rule["resources"] for verb in rule["verbs"]}
 
 
 def test_what_others_need_is_made_before_them(made):
-    """`kubectl apply -f` goes from top to bottom, once."""
+    """`kubectl apply -f` creates the objects once, from top to bottom."""
     kinds = [kind for kind, _ in made]
 
     assert kinds[0] == "Namespace"
@@ -34,7 +34,7 @@ def test_what_others_need_is_made_before_them(made):
 
 
 def test_everything_is_in_the_namespace_that_the_operator_takes_for_its_own(made):
-    """Trainers let in the operator of that namespace."""
+    """Trainers accept requests of an operator in that namespace."""
     namespaces = {each["metadata"].get("namespace", DEFAULT_NAMESPACE) for each in made.values()}
 
     assert namespaces == {DEFAULT_NAMESPACE}
@@ -42,14 +42,14 @@ def test_everything_is_in_the_namespace_that_the_operator_takes_for_its_own(made
 
 
 def test_its_namespace_enforces_the_restricted_standard(made):
-    """It refuses everything else."""
+    """The namespace refuses every pod that does not meet the standard."""
     labels = made["Namespace", DEFAULT_NAMESPACE]["metadata"]["labels"]
 
     assert labels["pod-security.kubernetes.io/enforce"] == "restricted"
 
 
 def test_nothing_of_helm_test_is_in_it(made):
-    """Only Helm can run it, so without Helm its account would hold rights that nothing uses."""
+    """Only Helm runs the test, so without Helm its account would hold unused permissions."""
     assert {
         each["metadata"].get("labels", {}).get("app.kubernetes.io/component") for each in made.values()
     } == {
@@ -59,7 +59,7 @@ def test_nothing_of_helm_test_is_in_it(made):
 
 
 def test_the_operator_is_that_of_the_release(made):
-    """Never `latest`: an upgrade is somebody's decision."""
+    """It is never `latest`: an upgrade needs a person's decision."""
     [container] = made["Deployment", NAME]["spec"]["template"]["spec"]["containers"]
 
     assert container["image"] == f"palaestra-operator:{version('palaestra')}"
@@ -71,16 +71,16 @@ def test_the_definition_is_that_of_the_models(made):
 
 
 def test_the_operator_makes_no_pod_itself(made):
-    """Pods are made by Jobs, so that Kubernetes counts, replaces and cleans them up."""
+    """Jobs make the pods, so that Kubernetes counts, replaces and deletes them."""
     assert verbs(made["ClusterRole", NAME], "pods") == {"list", "watch"}
     assert verbs(made["ClusterRole", NAME], "pods/eviction") == {"create"}
 
 
 def test_nothing_needs_what_a_plain_cluster_lacks(made):
-    """Prometheus' kinds come with the Prometheus Operator."""
+    """The kinds of Prometheus come only with the Prometheus Operator."""
     assert [kind for kind, _ in made if kind.endswith(("Monitor", "PrometheusRule"))] == []
 
 
 def test_nothing_of_helm_test_is_left_in_it(made):
-    """A hook without Helm would be an object for ever."""
+    """Without Helm the hook's objects would never be deleted."""
     assert [name for _, name in made if "test" in name] == []

@@ -25,7 +25,7 @@ ROWS = rows()
 
 @pytest.mark.parametrize("row", ROWS, ids=range(len(ROWS)))
 def test_every_object_meets_the_schemas_of_kubernetes(row):
-    """Strictly: an unknown field is a misspelt one, which an API server would drop."""
+    """The check is strict: an API server would silently drop an unknown, misspelled field."""
     made = [each for each in objects(together(row)) if each["kind"] not in FOREIGN]
 
     assert len(made) > len(FOREIGN)
@@ -35,12 +35,12 @@ def test_every_object_meets_the_schemas_of_kubernetes(row):
 
 @cache
 def meets(text, release):
-    """Refuse an object that a release would not take; most are the same in each row, and one is enough."""
+    """Raise an error if a release would refuse the object; the cache checks equal objects once."""
     kubernetes_validate.validate(json.loads(text), release, strict=True)
 
 
 def test_a_misspelt_field_is_found(one):
-    """Otherwise the schemas would prove nothing."""
+    """A check that finds no mistake would prove nothing."""
     deployment = copy.deepcopy(one("default", "Deployment"))
     deployment["spec"]["template"]["spec"]["nodeSelektor"] = {}
 
@@ -50,7 +50,7 @@ def test_a_misspelt_field_is_found(one):
 
 
 def test_each_value_is_chosen_with_and_without_each_other():
-    """A template that relies on another value's default breaks when both are chosen."""
+    """A template that relies on another value's default breaks when both are set."""
     assert OTHERS.keys() == {value.path for value in readme.values(readme.VALUES.read_text())}
     assert ROWS[0] == ()
     for one, another in permutations(OTHERS, 2):

@@ -1,4 +1,4 @@
-"""What the chart installs, in every mode."""
+"""The objects that the chart installs, in every mode."""
 
 import argparse
 import json
@@ -27,7 +27,7 @@ every_mode = pytest.mark.parametrize("mode", MODES)
 
 
 def pods(objects):
-    """Return the spec of every pod, by the name of what makes it."""
+    """Return the spec of every pod, by the name of the object that creates it."""
     return {
         each["metadata"]["name"]: each["spec"]["template"]["spec"]
         if each["kind"] == "Deployment"
@@ -38,7 +38,7 @@ def pods(objects):
 
 
 def options(deployment):
-    """Return the operator's options, as its command line understands them."""
+    """Return the operator's options as its command line parses them."""
     [container] = deployment["spec"]["template"]["spec"]["containers"]
     parser = argparse.ArgumentParser()
     operator.add(parser.add_subparsers())
@@ -46,7 +46,7 @@ def options(deployment):
 
 
 def rules(roles):
-    """Return everything that some roles allow."""
+    """Return all rules of some roles."""
     return {right for role in roles for right in held(role)}
 
 
@@ -57,7 +57,7 @@ def roles(objects):
 
 
 def bound(objects):
-    """Return the roles that a binding comes with."""
+    """Return the roles that a binding refers to."""
     bindings = [each for each in objects if each["kind"].endswith("Binding")]
     names = {(each["roleRef"]["name"], each["metadata"].get("namespace")) for each in bindings}
     return [role for key, role in roles(objects).items() if key in names]
@@ -65,7 +65,7 @@ def bound(objects):
 
 @every_mode
 def test_every_object_has_a_place_and_a_name_of_its_own(made, mode):
-    """`kubectl apply` would let the second take the place of the first."""
+    """Otherwise `kubectl apply` would overwrite the first object with the second."""
     keys = [
         (each["kind"], each["metadata"].get("namespace"), each["metadata"]["name"]) for each in made(mode)
     ]
@@ -77,7 +77,7 @@ def test_every_object_has_a_place_and_a_name_of_its_own(made, mode):
 
 @every_mode
 def test_every_pod_meets_the_restricted_standard(made, mode):
-    """A namespace that enforces it takes them all."""
+    """A namespace that enforces the standard accepts all of them."""
     for pod in pods(made(mode)).values():
         assert pod["securityContext"]["runAsNonRoot"] is True
         assert pod["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
@@ -91,7 +91,7 @@ def test_every_pod_meets_the_restricted_standard(made, mode):
 
 @every_mode
 def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
-    """Nobody else asks the API server."""
+    """No other pod sends requests to the API server."""
     trusted = {
         name for name, pod in pods(made(mode)).items() if pod.get("automountServiceAccountToken", True)
     }
@@ -101,14 +101,14 @@ def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
 
 @every_mode
 def test_the_trial_is_one_hook(made, mode):
-    """Helm reports each hook as a test suite of its own: one training was five of them."""
+    """Helm reports each hook as a separate test suite: one training appeared as five."""
     hooks = [each for each in made(mode) if "helm.sh/hook" in each["metadata"].get("annotations", {})]
 
     assert [(each["kind"], each["metadata"]["name"]) for each in hooks] == [("Pod", "palaestra-test")]
 
 
 def test_the_account_of_the_trial_can_be_left_out(made):
-    """It holds rights as long as the release is there, and not every platform has that."""
+    """It has its permissions as long as the release is installed, and some platforms forbid that."""
     everything, without = made("default"), objects({"test": {"enabled": False}})
 
     left_out = [each for each in everything if each not in without]
@@ -128,7 +128,7 @@ def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode)
 
 
 def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
-    """Without the right to create ClusterRoles all but the CustomResourceDefinition can be installed."""
+    """A user without permission to create ClusterRoles can install all but the CustomResourceDefinition."""
     assert not [each for each in made("namespaced") if each["kind"] in CLUSTER_WIDE]
     assert {key for key in roles(made("namespaced")) if key[1] != NAMESPACE} == {
         (name, namespace)
@@ -138,7 +138,7 @@ def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
 
 
 def test_no_pod_names_a_user_where_the_cluster_chooses_it():
-    """OpenShift refuses a pod whose user is not of the namespace's range."""
+    """OpenShift refuses a pod whose user is outside the namespace's range."""
     all_pods = merged(MODES["everything"], {"podSecurity": {"fixedUser": False}})
     text = json.dumps(objects(all_pods))
 
@@ -147,13 +147,13 @@ def test_no_pod_names_a_user_where_the_cluster_chooses_it():
 
 
 def test_both_modes_hold_the_same_rights(made):
-    """The operator does the same in each."""
+    """The operator does the same work in each mode."""
     assert rules(bound(made("namespaced"))) == rules(bound(made("default")))
 
 
 @every_mode
 def test_the_operator_understands_its_options(one, mode):
-    """A chart of one release and an operator of another would not."""
+    """A chart and an operator of different releases might not agree."""
     chosen = options(one(mode, "Deployment"))
 
     assert chosen.monitoring_namespace == "monitoring"
@@ -162,7 +162,10 @@ def test_the_operator_understands_its_options(one, mode):
 
 
 def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
-    """In the words of its command line; by default nothing is allowed and nothing asked for."""
+    """The values become options of its command line.
+
+    By default no extra field is allowed and no placement is required.
+    """
     closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
 
     allowances = [field for _, field, *_ in ALLOWANCES]
@@ -182,7 +185,7 @@ def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
 
 
 def test_a_pod_has_a_user_namespace_only_where_it_is_asked_for(one):
-    """A node without support for it never starts the pod."""
+    """A node without user namespaces never starts such a pod."""
     closed, default = (one(mode, "Deployment")["spec"]["template"]["spec"] for mode in ("closed", "default"))
 
     assert closed["hostUsers"] is False
@@ -203,7 +206,7 @@ def test_the_operator_s_defaults_are_those_of_its_release(one):
 
 
 def test_every_image_comes_from_the_registry_by_its_digest(made, one):
-    """Off-line, nothing else can be pulled: not by a test, and not by an option."""
+    """In an offline cluster nothing else can be pulled, neither by a test nor through an option."""
     images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
     chosen = options(one("offline", "Deployment"))
     images |= {chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image}
@@ -213,7 +216,7 @@ def test_every_image_comes_from_the_registry_by_its_digest(made, one):
 
 
 def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
-    """Also the job of `helm test`, whose pods the operator makes."""
+    """This includes the job of `helm test`, whose pods the operator makes."""
     job = yaml.safe_load(one("offline", "ConfigMap", "palaestra-trial")["data"]["job.yaml"])
 
     assert {len(pod["imagePullSecrets"]) for pod in pods(made("offline")).values()} == {1}
@@ -221,7 +224,7 @@ def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
 
 
 def test_an_image_is_never_the_latest(made):
-    """An upgrade is somebody's decision."""
+    """An upgrade needs a person's decision."""
     tags = {
         container["image"].partition(":")[2]
         for pod in pods(made("default")).values()
@@ -245,7 +248,7 @@ def test_the_trial_is_a_job_that_the_api_takes(one, mode):
 
 
 def test_the_definition_is_that_of_the_models_and_is_kept(one):
-    """Helm upgrades what is a template, and leaves it at the end."""
+    """Helm upgrades the definition, because it is a template; an annotation keeps it after the release."""
     definition = one("default", "CustomResourceDefinition", "trainingjobs.palaestra.dev")
 
     annotations = definition["metadata"].pop("annotations")
@@ -254,7 +257,7 @@ def test_the_definition_is_that_of_the_models_and_is_kept(one):
 
 
 def test_more_than_one_operator_is_spread_and_survives_a_drain(made, one):
-    """With one, a budget would block every drain."""
+    """With a single operator, a disruption budget would block every drain."""
     spec = one("available", "Deployment")["spec"]
 
     [spread] = spec["template"]["spec"]["topologySpreadConstraints"]
@@ -285,7 +288,7 @@ def test_selectors_find_the_pods_that_they_are_for(made, mode):
 
 
 def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
-    """And reaches, where it is closed, the API server and trainers only."""
+    """Where its egress is restricted, it can reach only the API server and trainers."""
     open_, closed = one("default", "NetworkPolicy")["spec"], one("closed", "NetworkPolicy")["spec"]
 
     [source] = open_["ingress"][0]["from"]
@@ -296,7 +299,7 @@ def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
 
 
 def test_what_has_no_login_is_reached_by_nobody(one):
-    """`kubectl port-forward` comes from the node, which no policy stops."""
+    """`kubectl port-forward` still works: it comes from the node, which no policy blocks."""
     for name in ("palaestra-tensorboard", "palaestra-jupyter"):
         policy = one("offline", "NetworkPolicy", name)["spec"]
         assert "Ingress" in policy["policyTypes"]
@@ -304,7 +307,7 @@ def test_what_has_no_login_is_reached_by_nobody(one):
 
 
 def test_tensorboard_changes_no_run(one):
-    """It looks at volumes that trainings write to."""
+    """TensorBoard only reads the volumes to which trainings write."""
     pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
     mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
 
@@ -314,7 +317,7 @@ def test_tensorboard_changes_no_run(one):
 
 @pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
 def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
-    """It follows links, so with the whole claim it would show each run twice, once by a UID."""
+    """TensorBoard follows links, so with the whole claim it would show each run twice, once by a UID."""
     made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
 
     [server] = pods(made)["palaestra-tensorboard"]["containers"]
@@ -322,7 +325,7 @@ def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """It stays in its Secret, which is mounted as a file; only the server gets the path."""
+    """It stays in its Secret, which is mounted as a file; the server gets only the path."""
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
     [server] = pod["containers"]
 
@@ -335,7 +338,7 @@ def test_the_token_of_the_notebooks_is_in_no_object(one):
 
 
 def test_the_alerts_are_those_of_the_file(one):
-    """The file is what promtool checks."""
+    """The program promtool checks that file."""
     rules_of_file = yaml.safe_load((CHART / "alerts.yaml").read_text())
 
     assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
@@ -369,7 +372,7 @@ def test_every_dashboard_is_mounted_as_it_is(made):
 
 
 def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
-    """The names of the ports are the plan's."""
+    """The plan sets the names of the ports."""
     [endpoint] = one("monitored", "PodMonitor", "palaestra-training")["spec"]["podMetricsEndpoints"]
     [keep] = [each for each in endpoint["relabelings"] if each.get("action") == "keep"]
 
@@ -379,7 +382,7 @@ def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
 
 
 def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
-    """A program of a job's author answers there, and could give Prometheus a million series."""
+    """The program of a job's author serves these metrics and could give Prometheus a million series."""
     bounded = one("monitored", "PodMonitor", "palaestra-training")["spec"]
     [none] = [
         each
@@ -399,7 +402,7 @@ def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
 
 
 def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm
-    """One number, in four places."""
+    """The release number is written in four places."""
     chart = yaml.safe_load((CHART / "Chart.yaml").read_text())
 
     assert {chart["version"], chart["appVersion"]} == {version("palaestra")}
@@ -407,7 +410,7 @@ def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without
 
 @every_mode
 def test_the_notes_tell_what_to_type_next(mode):
-    """They are all that Helm shows."""
+    """Helm shows nothing else after an installation."""
     where = ("palaestra", str(CHART), f"--namespace={NAMESPACE}")
     said = helm("install", *where, "--dry-run=client", "--values=-", sent=yaml.safe_dump(MODES[mode]))
 
@@ -416,7 +419,7 @@ def test_the_notes_tell_what_to_type_next(mode):
 
 
 def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 - skips without Helm
-    """Two numbers for one command made people ask which of them is right."""
+    """People asked which of two different timeouts for one command was right."""
     root = CHART.parents[1]
     pages = [(root / "docs/howto/install.md").read_text(), (CHART / "README.md").read_text()]
     pages.append(helm("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--dry-run=client"))
@@ -427,7 +430,7 @@ def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 
 
 
 def test_the_token_of_the_notebooks_can_stand_in_an_address():
-    """`?token=` ends at a `+`, `/` or `=` of base64: the server refused the link."""
+    """The server refused a link whose token had a `+`, `/` or `=` of base64, because `?token=` ends there."""
     page = (CHART.parents[1] / "docs/howto/install.md").read_text()
     [command] = re.findall(r'--from-literal=token="\$\((.+)\)"', page)
 
@@ -437,6 +440,6 @@ def test_the_token_of_the_notebooks_can_stand_in_an_address():
 
 
 def test_an_old_cluster_is_refused():
-    """Before 1.33 sidecars are no part of Kubernetes that can be relied on."""
+    """Before Kubernetes 1.33 sidecar containers are not stable."""
     with pytest.raises(HelmRefused, match=r"kubeVersion: >=1\.33\.0-0"):
         helm("template", "palaestra", str(CHART), "--kube-version=1.32.0")

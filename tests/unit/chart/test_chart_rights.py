@@ -1,4 +1,4 @@
-"""Rights as they are read from roles and from an audit log: by these two, grants and uses are compared."""
+"""Permissions are read from roles and from an audit log, so that grants and uses can be compared."""
 
 import json
 
@@ -13,7 +13,7 @@ WHY = 'RBAC: allowed by RoleBinding "reader/robots"'
 
 @pytest.fixture(autouse=True)
 def helm_is_built():
-    """Needed by the other tests of this folder only."""
+    """Only the other tests of this folder need Helm."""
 
 
 def role(name, namespace=None, verb="list"):
@@ -53,21 +53,21 @@ def entry(verb, *, user="system:serviceaccount:robots:operator", code=200, decis
 
 
 def test_a_right_is_granted_by_a_binding_and_not_by_a_role_alone():
-    """A role that nobody binds opens nothing."""
+    """A role without a binding grants nothing."""
     bound, alone = role("reads"), role("deletes", verb="delete")
 
     assert granted([bound, alone, binding(bound)], "robots", "operator") == {READ}
 
 
 def test_roles_of_one_name_are_distinguished_by_their_namespaces():
-    """Each list of namespaces has a role of this name in every one of them."""
+    """With a list of namespaces, each namespace has a role of this name."""
     here, there = role("jobs", "robots"), role("jobs", "drones", "delete")
 
     assert granted([here, there, binding(here)], "robots", "operator") == {READ}
 
 
 def test_what_another_account_holds_is_not_granted():
-    """An account is a namespace and a name."""
+    """An account is identified by its namespace and its name."""
     bound = role("reads")
 
     assert granted([bound, binding(bound, "trial")], "robots", "operator") == set()
@@ -75,7 +75,7 @@ def test_what_another_account_holds_is_not_granted():
 
 
 def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
-    """It waits for somebody who binds it."""
+    """The role takes effect only when somebody binds it."""
     rights = granted(installed(), "palaestra-system", "palaestra-operator")
 
     assert rights
@@ -83,7 +83,7 @@ def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
 
 
 def test_a_request_is_the_use_of_a_right():
-    """With the part of the object that it was for, and who allowed it."""
+    """A use includes the subresource and the reason why it was allowed."""
     log = entry("patch", apiGroup="palaestra.dev", resource="trainingjobs", subresource="status")
 
     right = Right("palaestra.dev", "trainingjobs/status", "patch")
@@ -98,14 +98,14 @@ def test_applying_an_object_that_does_not_exist_yet_uses_two_rights():
 
 
 def test_a_refused_request_is_no_right():
-    """It says that one is missing."""
+    """A refused request shows a missing permission."""
     [use] = uses(entry("list", decision="forbid", code=403))
 
     assert not use.allowed
 
 
 def test_people_discovery_the_past_and_half_a_line_are_left_out():
-    """A log that is still written to, of a server that others use too."""
+    """The log is of a server that others use too, and is still being written."""
     discovery = json.loads(entry("get"))
     del discovery["objectRef"]
     lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']

@@ -1,4 +1,4 @@
-"""What may be chosen: every value has a sentence and a rule, and a wrong one is refused with its place."""
+"""Every value has a description and a rule, and a wrong value is refused with its path."""
 
 import json
 from typing import Any
@@ -12,7 +12,7 @@ from tests.chart.modes import MODES
 
 SCHEMA = json.loads((CHART / "values.schema.json").read_text())
 VALUES = list(readme.values(readme.VALUES.read_text()))
-WRONG = [  # the value that is set, to what, and where below it the mistake is
+WRONG = [  # the value that is set, its content, and the path of the mistake below it
     ("operator.replicas", 0, ""),
     ("operator.replicas", 1.5, ""),
     ("operator.replicas", "2", ""),
@@ -66,14 +66,14 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
 
 
 def chosen(path: str, value: Any) -> dict[str, Any]:
-    """Return values with one of them set."""
+    """Return values of which one is set."""
     for step in reversed(path.split(".")):
         value = {step: value}
     return value
 
 
 def refusal(values: dict[str, Any]) -> str:
-    """Return what Helm says against some values."""
+    """Return the error with which Helm refuses some values."""
     with pytest.raises(HelmRefused) as refused:
         objects(values)
     return str(refused.value)
@@ -81,7 +81,7 @@ def refusal(values: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize(("path", "value", "below"), WRONG, ids=str)
 def test_a_wrong_value_is_refused_with_its_place(path, value, below):
-    """Before anything is sent to the cluster."""
+    """Helm refuses it before anything is sent to the cluster."""
     assert f"at '/{path.replace('.', '/')}{below}'" in refusal(chosen(path, value))
 
 
@@ -100,7 +100,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):
-    """Misspelled values, and values that need another one, are refused as well."""
+    """Misspelled values are refused, and so are values that need another one."""
     assert told in refusal(values)
 
 
@@ -119,7 +119,7 @@ def _definition(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_the_schema_knows_every_value_and_no_other():
-    """A value that only one of them has is a mistake in either."""
+    """A value that is only in the schema, or only in values.yaml, is a mistake."""
     assert properties(SCHEMA) == {value.path for value in VALUES} | {"enabled", "global"}
 
 
@@ -131,7 +131,7 @@ def test_every_value_has_a_sentence(value):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_helm_finds_nothing_wrong(mode):
-    """Its linter, with warnings as errors."""
+    """Helm's linter passes, with warnings as errors."""
     values = yaml.safe_dump(MODES[mode])
 
     assert "0 chart(s) failed" in helm("lint", str(CHART), "--strict", "--values=-", sent=values)
@@ -148,7 +148,7 @@ dependencies:
 
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_parent_chart_switches_the_chart_on_and_off(tmp_path, enabled):
-    """Helm's condition is a value of the chart itself, which the schema refused."""
+    """Helm's condition is a value of the chart itself, and the schema refused it."""
     (tmp_path / "charts").mkdir()
     (tmp_path / "charts" / "palaestra").symlink_to(CHART)
     (tmp_path / "Chart.yaml").write_text(PARENT)

@@ -1,4 +1,4 @@
-"""The command line: what each command reads, prints, and returns."""
+"""The commands: their input, their output and their exit codes."""
 
 import re
 
@@ -42,7 +42,7 @@ def job(tmp_path):
 
 @pytest.fixture
 def fails(capsys):
-    """Run a command that fails and return its lines on standard error."""
+    """Run a command that fails, and return its lines on standard error."""
 
     def run(*arguments):
         code = main([str(each) for each in arguments])
@@ -57,7 +57,7 @@ def fails(capsys):
 @pytest.mark.parametrize("command", [["plan"], ["run"], ["sweep"], ["world", "--check"]])
 @pytest.mark.parametrize("endless", [False, True], ids=["a disk image", "a device without end"])
 def test_a_file_too_large_for_what_it_should_be_is_refused_by_its_size(fails, tmp_path, command, endless):
-    """It filled the memory of a laptop before anybody looked at it."""
+    """Before this limit, such a file filled the memory of a laptop before its content was checked."""
     file = tmp_path / "disk.img"
     if endless:
         file.symlink_to("/dev/zero")
@@ -80,7 +80,7 @@ def test_text_of_others_gives_a_terminal_no_orders(fails, tmp_path):
 
 
 def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
-    """`palaestra plan FILE | kubectl apply -f -` is what the operator does."""
+    """`palaestra plan FILE | kubectl apply -f -` does what the operator does."""
     assert main(["plan", str(job)]) == 0
 
     kinds = [each["kind"] for each in yaml.safe_load_all(capsys.readouterr().out)]
@@ -88,14 +88,14 @@ def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
 
 
 def test_plan_can_print_what_run_would_do_here(job, tmp_path, capsys):
-    """The same function with another layout."""
+    """`run` uses the same function with another layout."""
     main(["plan", str(job), "--layout", "local", "--dir", str(tmp_path)])
 
     assert f"value: {tmp_path}/a/1" in capsys.readouterr().out
 
 
 def test_plan_quotes_text_that_kubectl_would_take_for_a_number(tmp_path, capsys):
-    """YAML readers differ over 5e-4."""
+    """YAML readers differ on 5e-4."""
     path = tmp_path / "job.yaml"
     path.write_text(JOB + "  trainer: {env: [{name: RATE, value: '5e-4'}]}\n")
 
@@ -105,7 +105,7 @@ def test_plan_quotes_text_that_kubectl_would_take_for_a_number(tmp_path, capsys)
 
 
 def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
-    """A world builder sees what becomes of the file that was saved in Webots."""
+    """The author of a world sees how the file from Webots is changed."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
 
@@ -116,7 +116,7 @@ def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
 
 
 def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
-    """Most worlds that were made for the ros controller have neither option; nothing else may change."""
+    """Most worlds for the ros controller lack both options; nothing else may change."""
     path = tmp_path / "plain.wbt"
     path.write_text('#VRML_SIM R2023b utf8\nE-puck {\n  controller "ros"\n}\n')
 
@@ -131,7 +131,7 @@ def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
 
 
 def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
-    """Line and column, as a compiler does."""
+    """The message has line and column, as a compiler's has."""
     path = tmp_path / "broken.wbt"
     path.write_text("#VRML_SIM R2023b utf8\nRobot { name [ }\n")
 
@@ -141,7 +141,7 @@ def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
 
 
 def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
-    """Nothing in it would change, and no trainer could drive it."""
+    """The command would change nothing in it, and no trainer could drive it."""
     path = tmp_path / "silent.wbt"
     path.write_bytes(builtin("arena").replace(b'controller "ros"', b'controller "void"'))
 
@@ -152,7 +152,7 @@ def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
 
 
 def test_world_without_a_job_is_refused(tmp_path, fails):
-    """The names come from the job; a check needs none."""
+    """The names come from the job; only a check works without one."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
 
@@ -162,7 +162,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
-    """The simulators answer for themselves; nothing is started."""
+    """Each simulator reports its own result; nothing is started."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     assert main(["world", str(path), "--check"]) == 0
@@ -179,7 +179,7 @@ def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
 
 
 def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatch):
-    """It is an extra; a world for the stub is right without it."""
+    """MuJoCo is an extra; a world for the stub can be checked without it."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
@@ -189,7 +189,7 @@ def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatc
 
 
 def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch):
-    """An operator's image has none."""
+    """An operator's image has no simulator."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     for module in ("simulators", "world_check"):
@@ -200,7 +200,7 @@ def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch
 
 
 def test_world_s_help_names_all_that_changes(capsys):
-    """A world builder compares the two files, and must find no other difference."""
+    """The author of a world compares the two files, and must find only the changes that the help lists."""
     with pytest.raises(SystemExit) as ended:
         main(["world", "--help"])
 
@@ -211,7 +211,7 @@ def test_world_s_help_names_all_that_changes(capsys):
 
 
 def test_crd_prints_a_custom_resource_definition(capsys):
-    """Of the version that is installed."""
+    """The definition is that of the installed version."""
     assert main(["crd"]) == 0
 
     crd = yaml.safe_load(capsys.readouterr().out)
@@ -220,7 +220,7 @@ def test_crd_prints_a_custom_resource_definition(capsys):
 
 @pytest.mark.parametrize("command", ["run", "plan"])
 def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monkeypatch):
-    """Five mistakes, five lines, and nothing is started or written."""
+    """Five mistakes are five lines, and nothing is started or written."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "wrong.yaml"
     path.write_text(WRONG)
@@ -243,7 +243,7 @@ def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monke
 def test_what_is_not_done_here_is_refused_before_anything_is_written(
     spec, line, tmp_path, fails, monkeypatch
 ):
-    """No run directory, no lock, and with --fresh the old run stays where it is."""
+    """There is no run directory and no lock, and with --fresh the old run stays in its folder."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "job.yaml"
     path.write_text(f"{JOB}  {spec}\n")
@@ -257,14 +257,14 @@ def test_what_is_not_done_here_is_refused_before_anything_is_written(
 
 
 def test_a_file_that_is_not_there_is_one_line(tmp_path, fails):
-    """No traceback for a typing error."""
+    """A typing error must not cause a traceback."""
     assert fails("run", tmp_path / "no.yaml") == [
         f"{tmp_path}/no.yaml: No such file or directory; name a readable file"
     ]
 
 
 def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
-    """A checkpoint instead of a job, perhaps."""
+    """The file may be a checkpoint that was named instead of a job."""
     path = tmp_path / "model.zip"
     path.write_bytes(b"PK\xff\xfe")
 
@@ -272,14 +272,14 @@ def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
 
 
 def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
-    """With the numbers that it has."""
+    """The message lists the replicas that the job has."""
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
 
 
 def test_an_operator_that_cannot_be_is_not_started(fails):
-    """Before anything is connected to."""
+    """The command ends before it connects to anything."""
     told = "--metrics-address: '8080' is no address; write it as 0.0.0.0:8080"
     assert fails("operator", "--metrics-address=8080") == [told]
 
@@ -311,7 +311,7 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
     ],
 )
 def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
-    """Before a file is read or a cluster asked: FILE does not exist."""
+    """FILE does not exist, so the error comes before a file is read or a request is sent."""
     with pytest.raises(SystemExit) as ended:
         main(command.split())
 
@@ -320,7 +320,7 @@ def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsy
 
 
 def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
-    """Not a traceback of a library."""
+    """The error is not a traceback of a library."""
     [line] = fails("operator", f"--kubeconfig={tmp_path}/none", "--metrics-address=127.0.0.1:0")
 
     assert line.startswith(f"{tmp_path}/none: ")
@@ -328,7 +328,7 @@ def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
 
 
 def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
-    """It had those of `run` alone, which are not what `palaestra get` ends with."""
+    """The help listed only the exit codes of `run`, but `palaestra get` has others."""
     with pytest.raises(SystemExit):
         main(["--help"])
 
@@ -352,7 +352,7 @@ def test_help_and_version_say_what_they_are(arguments, capsys):
 
 
 def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
-    """The command has no PyTorch of its own; the program's refusal is the command's."""
+    """The command has no PyTorch of its own; its exit code and message are those of the trainer's program."""
     assert main(["export", str(tmp_path / "none"), "--to", "onnx"]) == 2
 
     out, err = capfd.readouterr()
@@ -361,7 +361,7 @@ def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
 
 
 def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
-    """An operator's image has the command and no trainer."""
+    """An operator's image has the command but no trainer."""
     monkeypatch.setattr("palaestra.local.export.PROGRAM", "palaestra-none")
 
     assert main(["export", str(tmp_path), "--to", "onnx"]) == 2

@@ -1,4 +1,4 @@
-"""The commands on a cluster, as far as they go without one."""
+"""The commands on a cluster, as far as they can be tested without one."""
 
 import pytest
 
@@ -12,7 +12,7 @@ COMMANDS = [
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_says_what_is_read_and_how_it_ends(name, capsys):
-    """Every command takes kubectl's options for which cluster."""
+    """Every command accepts the options with which kubectl selects a cluster."""
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
 
@@ -25,7 +25,7 @@ def test_help_says_what_is_read_and_how_it_ends(name, capsys):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_without_a_cluster_a_line_says_how_to_name_one(name, tmp_path, capsys):
-    """Not a traceback of a library, and nothing is written."""
+    """The error is not a traceback of a library, and nothing is written."""
     job = [] if name in {"get", "doctor"} else ["job"]
 
     code = main([name, *job, f"--kubeconfig={tmp_path}/none"])
@@ -37,7 +37,7 @@ def test_without_a_cluster_a_line_says_how_to_name_one(name, tmp_path, capsys):
 
 
 def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
-    """With the file in which it was looked for."""
+    """The message has the file in which it was looked up."""
     kubeconfig = tmp_path / "kubeconfig"
     kubeconfig.write_text(
         "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
@@ -50,7 +50,7 @@ def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
 
 @pytest.mark.parametrize("option", ["-n", "--namespace=lab", "--context", "--kubeconfig"])
 def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, monkeypatch, capsys):
-    """As people type it for kubectl; argparse took the namespace for a command that does not exist."""
+    """Users of kubectl write it there; argparse took the namespace for an unknown command."""
     monkeypatch.setattr("sys.argv", ["/usr/bin/kubectl-palaestra"])
 
     with pytest.raises(SystemExit) as ended:
@@ -67,7 +67,7 @@ def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, 
     [("kubectl-palaestra", "usage: kubectl palaestra"), ("palaestra", "usage: palaestra")],
 )
 def test_help_is_typed_as_it_was_called(program, shown, monkeypatch, capsys):
-    """As kubectl's plugin its examples can be pasted."""
+    """Called as kubectl's plugin, the command shows examples that can be pasted."""
     monkeypatch.setattr("sys.argv", [f"/usr/bin/{program}"])
 
     with pytest.raises(SystemExit):

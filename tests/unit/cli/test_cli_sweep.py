@@ -1,4 +1,4 @@
-"""`palaestra sweep`, as far as it goes without a run."""
+"""`palaestra sweep`, as far as it can be tested without a run."""
 
 import sys
 
@@ -18,14 +18,14 @@ JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata"
 
 @pytest.fixture
 def file(tmp_path):
-    """A file with a sweep; the file of its job is missing."""
+    """A sweep file whose job file is missing."""
     path = tmp_path / "sweep.yaml"
     path.write_text(yaml.safe_dump(SWEEP))
     return path
 
 
 def test_help_has_its_own_exit_codes(capsys):
-    """75 means for a sweep what it means for a run."""
+    """Exit code 75 has the same meaning for a sweep as for a run."""
     with pytest.raises(SystemExit):
         main(["sweep", "--help"])
 
@@ -36,21 +36,21 @@ def test_help_has_its_own_exit_codes(capsys):
 
 @pytest.mark.parametrize("option", ["--namespace=lab", "--context=c", "--kubeconfig=k"])
 def test_an_option_for_a_cluster_without_one_is_refused(file, option, capsys):
-    """Training here, while a cluster was meant, is found hours later."""
+    """A user who meant a cluster would notice hours later that the training runs here."""
     assert main(["sweep", str(file), option]) == 2
 
     assert capsys.readouterr().err.startswith("--cluster: is missing; give it too")
 
 
 def test_a_job_that_cannot_be_read_is_named(file, capsys):
-    """Its path is relative to the sweep, not to where the command is typed."""
+    """The job's path is relative to the sweep file, not to the current folder."""
     assert main(["sweep", str(file)]) == 2
 
     assert capsys.readouterr().err.startswith(f"{file.parent}/job.yaml: No such file or directory; name a")
 
 
 def test_a_search_without_optuna_names_the_extra(file, tmp_path, monkeypatch, capsys):
-    """Before anything is started or written."""
+    """The error comes before anything is started or written."""
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     monkeypatch.setitem(sys.modules, "optuna", None)
     monkeypatch.delitem(sys.modules, "palaestra.sweeps.optuna_search", raising=False)

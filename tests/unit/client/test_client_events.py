@@ -1,4 +1,4 @@
-"""Which events are about a job: those of its children too, and of no other job."""
+"""An event is about a job if it names the job or a child of it, and no other job."""
 
 import pytest
 
@@ -21,7 +21,7 @@ def event(kind, name, uid=None):
     ],
 )
 def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
-    """A pod that cannot be scheduled is the job's affair."""
+    """If a pod cannot be scheduled, that concerns its job."""
     assert concerns(event(kind, name, uid), make_job())
 
 
@@ -37,5 +37,5 @@ def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
     ],
 )
 def test_what_only_looks_like_it_does_not(kind, name, uid):
-    """There may be a job `job-0` beside `job`."""
+    """A job `job-0` may exist next to `job`."""
     assert not concerns(event(kind, name, uid), make_job())

@@ -1,4 +1,4 @@
-"""What runs in the container, and what unpacks it here: all of it arrives, and nothing lands elsewhere."""
+"""The tar stream from the container: everything arrives, and nothing is written outside the target folder."""
 
 import io
 import re
@@ -17,7 +17,7 @@ PROGRAM = Path(palaestra.client.tar_stream.__file__).read_text()
 
 
 def packed(folder, *names):
-    """Return the chunks that the program writes, run as a container runs it."""
+    """Return the chunks that the program writes when it runs as in a container."""
     command = [sys.executable, "-I", "-c", PROGRAM, str(folder), *names]
     done = subprocess.run(command, capture_output=True, timeout=60, check=True)
     return iter([done.stdout[i : i + 1000] for i in range(0, len(done.stdout), 1000)])
@@ -28,13 +28,13 @@ def archive(*members):
     file = io.BytesIO()
     with tarfile.open(fileobj=file, mode="w") as tar:
         for member in members:
-            hole = b"0\n".ljust(member.size, b"\0")  # the map of a file that is all hole
+            hole = b"0\n".ljust(member.size, b"\0")  # the map of a file that is one hole
             tar.addfile(member, io.BytesIO(hole if member.pax_headers else b"x" * member.size))
     return iter([file.getvalue()])
 
 
 def test_files_and_folders_arrive_as_they_were(tmp_path):
-    """Also empty ones, and those below a folder."""
+    """Empty files and folders, and those in subfolders, are copied too."""
     run, there = tmp_path / "run", tmp_path / "there"
     (run / "tensorboard" / "deep").mkdir(parents=True)
     there.mkdir()
@@ -49,7 +49,7 @@ def test_files_and_folders_arrive_as_they_were(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_an_empty_archive(tmp_path):
-    """A run that has written nothing yet is no failure of the program."""
+    """A run that has written nothing yet is not an error of the program."""
     unpack(packed(tmp_path / "none", "model.zip"), tmp_path, WANTED, 10**6)
 
     assert list(tmp_path.iterdir()) == []
@@ -95,7 +95,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize(("members", "fact"), HOSTILE.values(), ids=HOSTILE)
 def test_what_was_not_asked_for_is_refused(tmp_path, members, fact):
-    """The image is the job's author's: its word is not trusted."""
+    """The image is chosen by the job's author, so its output is not trusted."""
     inside = tmp_path / "inside"
     inside.mkdir()
 
@@ -105,7 +105,7 @@ def test_what_was_not_asked_for_is_refused(tmp_path, members, fact):
 
 
 def header(kind, size):
-    """Return the first block of a member that says something about the next one."""
+    """Return the first block of a member whose data describes the next member."""
     return member("././@PaxHeader", size, kind).tobuf(tarfile.GNU_FORMAT)
 
 
@@ -118,7 +118,7 @@ ENDLESS = {
 
 @pytest.mark.parametrize("begun", ENDLESS.values(), ids=ENDLESS)
 def test_an_endless_member_is_not_kept_in_memory(tmp_path, begun):
-    """Only as much is read as the bounds allow."""
+    """The reader stops at the limits of size."""
     sent = []
 
     def chunks():
@@ -133,7 +133,7 @@ def test_an_endless_member_is_not_kept_in_memory(tmp_path, begun):
 
 
 def test_files_without_end_are_refused(tmp_path, monkeypatch):
-    """Empty ones cost an entry of the disk each."""
+    """Each empty file still takes an entry of the disk."""
     monkeypatch.setattr("palaestra.client.tar_extraction.MOST_FILES", 3)
     empty = [member(f"tensorboard/{number}", 0) for number in range(4)]
 
@@ -143,13 +143,13 @@ def test_files_without_end_are_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sent", [b"x" * 2000, bytes(range(256)) * 8], ids=["letters", "bytes"])
 def test_what_is_no_tar_is_damaged(tmp_path, sent):
-    """A proxy may answer for the pod."""
+    """A proxy may send a page of its own instead of the pod's data."""
     with pytest.raises(WrongArchive, match="it is damaged"):
         unpack(iter([sent]), tmp_path, WANTED, 1000)
 
 
 def test_what_was_cut_off_is_no_archive(tmp_path):
-    """A connection that ends early must not look like a short run."""
+    """A truncated archive must not look like a short run."""
     [whole] = archive(member("model.zip", 5000))
 
     with pytest.raises(WrongArchive, match="it is damaged"):
@@ -157,7 +157,7 @@ def test_what_was_cut_off_is_no_archive(tmp_path):
 
 
 def test_the_word_at_the_end_is_waited_for(tmp_path):
-    """A tar ends before its command does: the exit code comes last."""
+    """The tar ends before its command does, and the exit code comes last."""
 
     def chunks():
         yield from archive(member("model.zip", 0))

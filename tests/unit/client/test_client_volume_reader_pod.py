@@ -1,4 +1,4 @@
-"""The pod that reads a volume: as secure as the run's own, able to read one folder, ending by itself."""
+"""The pod that reads a volume is as restricted as the run's own, reads one folder and ends by itself."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def pod(job, template):
 
 
 def test_it_mounts_the_run_and_nothing_else_for_reading_only(pod):
-    """A fetch can damage no run."""
+    """A fetch cannot damage a run."""
     [container] = pod["spec"]["containers"]
 
     assert [each["name"] for each in pod["spec"]["volumes"]] == ["run"]
@@ -39,7 +39,7 @@ def test_it_mounts_the_run_and_nothing_else_for_reading_only(pod):
 
 
 def test_it_meets_restricted_and_holds_no_token(pod, template):
-    """It is admitted wherever the run was."""
+    """It is admitted in every namespace in which the run was."""
     [container] = pod["spec"]["containers"]
 
     assert pod["spec"]["securityContext"] == template["spec"]["securityContext"]
@@ -50,14 +50,14 @@ def test_it_meets_restricted_and_holds_no_token(pod, template):
 
 
 def test_it_has_the_trainers_image_and_its_nodes(pod):
-    """The image is there already, and the volume can be reached."""
+    """The node has this image already, and the volume can be mounted there."""
     assert pod["spec"]["containers"][0]["image"] == "trainer:1"
     assert pod["spec"]["nodeSelector"] == SCHEDULING["nodeSelector"]
     assert pod["spec"]["tolerations"][0]["key"] == "robots"
 
 
 def test_it_ends_by_itself_and_goes_with_the_job(pod):
-    """The client that made it may be killed before it deletes it."""
+    """The client that created it may be killed before it deletes it."""
     [owner] = pod["metadata"]["ownerReferences"]
 
     assert pod["spec"]["activeDeadlineSeconds"] == 600
@@ -66,14 +66,14 @@ def test_it_ends_by_itself_and_goes_with_the_job(pod):
 
 
 def test_it_is_not_taken_for_a_pod_of_the_job(pod):
-    """Neither by the operator, which counts pods by their label, nor by a Job that would adopt it."""
+    """Neither the operator, which counts pods by their label, nor a Job that adopts pods may take it."""
     assert not {"palaestra.dev/job", "palaestra.dev/replica", "batch.kubernetes.io/job-name"} & set(
         pod["metadata"]["labels"]
     )
 
 
 def test_the_template_is_left_as_it_was(job, template):
-    """Planning is pure, and so is this."""
+    """Like planning, this function does not change its arguments."""
     before = repr(template)
 
     reading_pod(job, template, "a", lives_s=1)
@@ -82,5 +82,5 @@ def test_the_template_is_left_as_it_was(job, template):
 
 
 def test_the_run_directory_is_the_trainers(template):
-    """The path is read from the trainer's own configuration and not passed a second time."""
+    """The path comes from the trainer's own configuration and is not passed a second time."""
     assert run_directory(template) == f"/var/lib/palaestra/{UID}/0"

@@ -1,4 +1,4 @@
-"""What a person who waits for a job reads meanwhile."""
+"""The lines for a person who waits for a job."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def news():
 
 
 def test_a_reason_to_wait_is_reported_with_since_when_and_the_words_of_the_kubelet(news):
-    """A typo in an image kept a job waiting for hours behind the word Pending."""
+    """A typo in an image kept a job waiting for hours, and only the word Pending was shown."""
     assert news(WAITS) == ["lab/job: Pending", LINE]
 
 
@@ -42,7 +42,7 @@ def test_what_did_not_change_is_reported_once(news):
 
 
 def test_phrases_that_alternate_are_reported_once_each(news):
-    """A kubelet tries, then backs off, then tries, and counts on."""
+    """A kubelet alternates between a try and a wait, and the wait grows each time."""
     other = WAITS | {"message": "container trainer: image a:1 cannot be pulled (back-off 10s)"}
     longer = WAITS | {"message": "container trainer: image a:1 cannot be pulled (back-off 20s)"}
 
@@ -52,7 +52,7 @@ def test_phrases_that_alternate_are_reported_once_each(news):
 
 
 def test_a_reason_that_comes_back_is_reported_again(news):
-    """The wait began anew."""
+    """The reason applies again from now on."""
     news(WAITS)
     news(WAITS | {"phase": "Running", "reason": "Training"}, phase="Running")
 
@@ -64,7 +64,7 @@ def test_a_reason_that_comes_back_is_reported_again(news):
 
 @pytest.mark.parametrize("reason", ["Queued", "SecretMissing", "Unschedulable", "OfANewerRelease"])
 def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
-    """Also one that another release has named."""
+    """A reason of another release is included."""
     [_, line] = news(WAITS | {"reason": reason})
 
     assert f": {reason} since" in line
@@ -80,12 +80,12 @@ def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
     ],
 )
 def test_steps_on_the_way_and_ends_are_no_reason_to_wait(news, replica):
-    """The phases report those."""
+    """The job's phases report those steps."""
     assert news(replica) == ["lab/job: Pending"]
 
 
 def test_each_replica_is_reported(news):
-    """Two replicas may wait for different things."""
+    """Two replicas may wait for different reasons."""
     lines = news(WAITS, WAITS | {"index": 1, "reason": "Unschedulable"})
 
     assert [line.split(": ")[1:3] for line in lines[1:]] == [

@@ -1,4 +1,4 @@
-"""The job that `palaestra try` makes of its author's, and what it reports of its end."""
+"""The job that `palaestra try` makes of a user's job, and its report of the end."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from palaestra.smoke_test import TrialFailed, attempt
 
 
 class Server:
-    """An API server in which every job comes to a status at once; it keeps what was created."""
+    """An API server that gives every job its status at once, and keeps the created object."""
 
     def __init__(self, **status):
         self.status = {"phase": "Succeeded", **status}
@@ -22,7 +22,7 @@ class Server:
         return {"status": self.status}
 
     def delete(self, *_, **__):
-        """Find that somebody else was faster."""
+        """Raise NotFound, as if somebody else had deleted the object."""
         raise NotFound(404, "NotFound", "gone")
 
 
@@ -36,7 +36,10 @@ class Server:
     ],
 )
 def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, created):
-    """A claim that was there before is refused with `Delete`; what the author has set stays."""
+    """A trial sets `Delete` unless its author has set something.
+
+    `Delete` is refused with an existing claim.
+    """
     server = Server()
     spec = {"storage": written} if written else {}
 
@@ -50,7 +53,7 @@ def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, 
     [("Pending", "True", "Running"), ("Pending", "False", "Accepted"), ("Failed", "True", "Failed")],
 )
 def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted, subject, monkeypatch):
-    """The others only refer to it."""
+    """The other conditions only refer to that one."""
     conditions = [
         {
             "type": kind,

@@ -1,4 +1,4 @@
-"""The tenure of a leader, and its end: a given clock, no API server."""
+"""The tenure of a leader and its end, with a given clock and no API server."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,16 +10,16 @@ durations = st.floats(min_value=1, max_value=3600)
 
 
 def claim(**changes):
-    """A lease that somebody holds."""
+    """A lease that a replica of the operator holds."""
     return LeaseSpec(**{"holder": "a", "duration_s": 15.0, "renewed": "1", "transitions": 0} | changes)
 
 
 @given(duration_s=durations, offset=seconds, sent=seconds, travel=seconds, looked=seconds, now=seconds)
 def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent, travel, looked, now):
-    """Two clocks that agree on nothing but the length of a second: `offset` lies between them."""
+    """The two clocks differ by `offset`, and agree only on the length of a second."""
     tenure = Tenure(sent=sent, duration_s=duration_s)
     follower = ObservedLease()
-    seen = sent + travel + looked + offset  # it was written after it was sent, and seen after that
+    seen = sent + travel + looked + offset  # written after it was sent, seen after it was written
     follower.see(claim(duration_s=duration_s), seen)
 
     assert not (tenure.holds(now) and now + offset >= seen and follower.free(now + offset))
@@ -27,7 +27,7 @@ def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent,
 
 @given(duration_s=durations)
 def test_a_leader_stops_while_a_third_of_the_lease_is_left(duration_s):
-    """Time for the writes that are on their way."""
+    """The leader's requests that are already sent must arrive before the lease ends."""
     tenure = Tenure(sent=100.0, duration_s=duration_s)
 
     assert tenure.holds(100.0)
@@ -35,7 +35,7 @@ def test_a_leader_stops_while_a_third_of_the_lease_is_left(duration_s):
 
 
 def test_a_renewal_starts_the_count_anew():
-    """A leader that renews is never overtaken."""
+    """No other operator replaces a leader that renews its lease."""
     sighting = ObservedLease()
     sighting.see(claim(renewed="1"), 0.0)
     sighting.see(claim(renewed="2"), 14.0)
@@ -45,7 +45,7 @@ def test_a_renewal_starts_the_count_anew():
 
 
 def test_seeing_the_same_again_does_not_start_the_count_anew():
-    """A leader that died is followed, however often one looks."""
+    """A leader that died is replaced, however often the others read its lease."""
     sighting = ObservedLease()
     for moment in range(15):
         sighting.see(claim(), float(moment))
@@ -54,7 +54,7 @@ def test_seeing_the_same_again_does_not_start_the_count_anew():
 
 
 def test_a_lease_that_was_given_back_is_free_at_once():
-    """An operator that ends hands over without a pause."""
+    """An operator that stops hands over without a pause."""
     sighting = ObservedLease()
     sighting.see(claim(), 0.0)
     sighting.see(claim(holder="", duration_s=1), 0.1)
@@ -63,7 +63,7 @@ def test_a_lease_that_was_given_back_is_free_at_once():
 
 
 def test_the_times_in_a_lease_are_never_compared_with_a_clock():
-    """A renewal from the year 2000 or 3000 holds as long as any."""
+    """A renewal that is dated in the year 2000 or 3000 holds as long as any other."""
     sighting = ObservedLease()
     sighting.see(claim(renewed="2000-01-01T00:00:00.000000Z"), 50.0)
 
@@ -71,6 +71,6 @@ def test_the_times_in_a_lease_are_never_compared_with_a_clock():
 
 
 def test_a_lease_without_a_spec_is_nobodys():
-    """Anything may stand in the cluster; it must not stop us."""
+    """Anything may be stored in the cluster; it must not stop the operator."""
     assert LeaseSpec.read({"metadata": {"name": "x"}}) == LeaseSpec()
     assert ObservedLease().free(0.0)

@@ -1,4 +1,4 @@
-"""Which proxy a server is reached through, as Go reads the variables of the environment."""
+"""The proxy for a server comes from the environment, by the rules of Go."""
 
 import pytest
 
@@ -43,7 +43,7 @@ from palaestra.cluster.proxies import Proxy, connects_directly, proxy_named, pro
     ],
 )
 def test_no_proxy_is_read_as_go_does(exceptions, host, direct):
-    """Networks, ports and subdomains; this machine itself never needs a proxy."""
+    """NO_PROXY has networks, ports and subdomains; this machine itself never needs a proxy."""
     assert connects_directly(host, 6443, exceptions) is direct
 
 
@@ -68,7 +68,7 @@ def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
     "text", ["ftp://me:secret@proxy", "me:secret@", "http://", "http://me:secret@proxy:port"]
 )
 def test_what_is_no_proxy_is_refused_without_its_password(text):
-    """Where it was named, and what to write."""
+    """The message has the name of the variable and the remedy."""
     with pytest.raises(NotConfigured, match=r"^HTTPS_PROXY: .* is no proxy; write http://") as refused:
         proxy_named(text, "HTTPS_PROXY")
 
@@ -88,7 +88,7 @@ def test_what_is_no_proxy_is_refused_without_its_password(text):
     ],
 )
 def test_the_variables_are_those_of_go(environment, server, address):
-    """The capital ones come first, an empty one counts as none, and ALL_PROXY is not among them."""
+    """The upper-case variables win, an empty one counts as unset, and ALL_PROXY is not used."""
     found = proxy_of_environment(server, environment | {"ALL_PROXY": "http://never"})
 
     assert (found.address if found else None) == address

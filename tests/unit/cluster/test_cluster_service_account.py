@@ -1,4 +1,4 @@
-"""A pod's service account: where the API server is, and a token that kubelets replace."""
+"""A pod's service account: the address of the API server, and a token that kubelets replace."""
 
 import pytest
 from urllib3 import ProxyManager
@@ -11,13 +11,13 @@ from tests.control_plane.certificates import Authority
 
 @pytest.fixture(scope="module")
 def authority(tmp_path_factory):
-    """The certificate of an authority."""
+    """The certificate of a certificate authority."""
     return Authority.create(tmp_path_factory.mktemp("authority")).pair.certificate.read_bytes()
 
 
 @pytest.fixture
 def files(tmp_path, monkeypatch, authority):
-    """The files and the environment of a pod; returns the folder."""
+    """Set the files and the environment of a pod, and return the folder."""
     (tmp_path / "ca.crt").write_bytes(authority)
     (tmp_path / "token").write_text("first\n")
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "10.96.0.1")
@@ -41,14 +41,14 @@ class Clock:
     ("host", "address"), [("10.96.0.1", "https://10.96.0.1:443"), ("fd00::1", "https://[fd00::1]:443")]
 )
 def test_the_environment_names_the_api_server(files, monkeypatch, host, address):
-    """Of either family of addresses."""
+    """The address may be IPv4 or IPv6."""
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", host)
 
     assert account(files).host == address
 
 
 def test_a_token_that_was_replaced_is_sent_within_a_minute(files):
-    """Kubelets replace it at four fifths of its life, and an API server refuses the old one at its end."""
+    """Kubelets replace it after four fifths of its lifetime, and an API server refuses an expired one."""
     clock = Clock()
     header = account(files, clock).authorization
     before = header()
@@ -61,7 +61,7 @@ def test_a_token_that_was_replaced_is_sent_within_a_minute(files):
 
 
 def test_a_token_that_cannot_be_read_is_no_end(files):
-    """Requests fail and are tried again; when it is back they succeed."""
+    """Requests fail and are retried; they succeed when the token is readable again."""
     clock = Clock()
     header = account(files, clock).authorization
     (files / "token").rename(files / "elsewhere")
@@ -75,7 +75,7 @@ def test_a_token_that_cannot_be_read_is_no_end(files):
 
 @pytest.mark.parametrize("lost", ["ca.crt", "token"])
 def test_a_pod_without_an_account_is_refused(files, lost):
-    """`automountServiceAccountToken: false` leaves the variables and no files."""
+    """With `automountServiceAccountToken: false` a pod has the variables but not the files."""
     (files / lost).unlink()
 
     with pytest.raises(NotConfigured, match=f"{lost} is missing"):
@@ -83,7 +83,7 @@ def test_a_pod_without_an_account_is_refused(files, lost):
 
 
 def test_an_authority_that_is_none_is_refused(files):
-    """An error of ssl would end the operator without a word about the file."""
+    """An error of ssl would end the operator without the name of the file."""
     (files / "ca.crt").write_text("nothing")
 
     with pytest.raises(NotConfigured, match="is no certificate"):
@@ -91,7 +91,7 @@ def test_an_authority_that_is_none_is_refused(files):
 
 
 def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_path):
-    """Clusters renew theirs, and the operator runs on."""
+    """Clusters renew their authorities while the operator runs."""
     clock = Clock()
     access_of = account(files, clock)
     other = tmp_path / "other"
@@ -108,7 +108,7 @@ def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_pa
 
 
 def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
-    """On a laptop, whatever files lie there."""
+    """On a laptop there is no account, whatever files exist."""
     monkeypatch.delenv("KUBERNETES_SERVICE_HOST")
 
     with pytest.raises(NotConfigured, match="KUBERNETES_SERVICE_HOST"):
@@ -121,7 +121,7 @@ def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
     ids=["none", "for all", "not for the cluster's network"],
 )
 def test_a_proxy_of_the_environment_is_used_but_where_it_says_not(files, monkeypatch, proxy, direct, proxied):
-    """As kubectl does it, networks in NO_PROXY included."""
+    """The program kubectl does the same, also with networks in NO_PROXY."""
     if proxy:
         monkeypatch.setenv("HTTPS_PROXY", proxy)
     monkeypatch.setenv("NO_PROXY", direct)

@@ -1,4 +1,4 @@
-"""Waits between attempts: doubling, capped, spread."""
+"""Waits between attempts double up to a cap, and are spread by chance."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +11,7 @@ chances = st.floats(min_value=0, max_value=1, exclude_max=True)
 
 @given(failures=st.integers(min_value=-1, max_value=10**9), chance=chances)
 def test_a_wait_is_never_shorter_than_half_the_first_nor_longer_than_the_cap(failures, chance):
-    """A thousand failures in a row neither overflow nor wait for ever."""
+    """A thousand failures in a row cause neither an overflow nor an endless wait."""
     backoff = Backoff(first_s=0.5, cap_s=30, chance=lambda: chance)
 
     assert 0.25 <= backoff.wait_s(failures) <= 30
@@ -19,14 +19,14 @@ def test_a_wait_is_never_shorter_than_half_the_first_nor_longer_than_the_cap(fai
 
 @given(failures=st.integers(min_value=1, max_value=100))
 def test_without_chance_each_wait_is_twice_the_one_before_until_the_cap(failures):
-    """A trouble that lasts costs the API server less and less."""
+    """A lasting problem must cost the API server fewer and fewer requests."""
     backoff = Backoff(first_s=0.5, cap_s=30, chance=lambda: 0.0)
 
     assert backoff.wait_s(failures + 1) == min(2 * backoff.wait_s(failures), 30)
 
 
 def test_two_clients_that_fail_together_do_not_come_back_together():
-    """Chance cuts a wait by up to half."""
+    """The random part shortens a wait by up to half."""
     early = Backoff(first_s=1, cap_s=60, chance=lambda: 0.99)
     late = Backoff(first_s=1, cap_s=60, chance=lambda: 0.0)
 
@@ -34,7 +34,7 @@ def test_two_clients_that_fail_together_do_not_come_back_together():
 
 
 def test_work_that_fails_is_tried_again_after_a_twentieth_of_a_second_to_a_minute():
-    """The bounds that docs/reference/operator.md names."""
+    """docs/reference/operator.md names these bounds."""
     waits = [RETRY.wait_s(failures) for failures in range(1, 30)]
 
     assert min(waits) >= 0.05

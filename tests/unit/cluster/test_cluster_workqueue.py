@@ -1,4 +1,4 @@
-"""The work queue: each name once, one worker a name, nothing lost."""
+"""The work queue holds each name once, gives it to one worker at a time, and loses none."""
 
 import threading
 import time
@@ -15,36 +15,36 @@ KEYS = st.sampled_from("abc")
 
 
 class Workers(RuleBasedStateMachine):
-    """Any order of adding, working, failing and waiting, against the promises in plain sets."""
+    """Adding, working, failing and waiting in any order, compared with a model of plain sets."""
 
     def __init__(self):
         super().__init__()
         self.now = 0.0
         self.queue = WorkQueue(again=Backoff(first_s=2, cap_s=8, chance=lambda: 0.0), clock=lambda: self.now)
         self.working: set[str] = set()
-        self.owed: set[str] = set()  # asked for, and no worker has taken it since
+        self.owed: set[str] = set()  # added, and not taken by a worker since
         self.due: dict[str, float] = {}
 
     @rule(key=KEYS)
     def add(self, key):
-        """Something changed."""
+        """Add a key at once."""
         self.queue.add(key)
         self.owed.add(key)
 
     @rule(key=KEYS, seconds=st.floats(min_value=0, max_value=20))
     def add_after(self, key, seconds):
-        """Something will change."""
+        """Add a key after some seconds."""
         self.queue.add_after(key, seconds)
         self.due[key] = min(self.due.get(key, float("inf")), self.now + seconds)
 
     @rule(seconds=st.floats(min_value=0, max_value=10))
     def time_passes(self, seconds):
-        """A key whose time has come is owed."""
+        """Let time pass; keys that are due become owed."""
         self.now += seconds
 
     @rule()
     def take(self):
-        """A worker asks for work."""
+        """Let a worker take a key."""
         self._fall_due()
         key = self.queue.get(0)
 
@@ -59,7 +59,7 @@ class Workers(RuleBasedStateMachine):
     @precondition(lambda self: self.working)
     @rule(data=st.data(), failed=st.booleans())
     def finish(self, data, failed):
-        """A worker is done, or failed and asks to be asked again."""
+        """Let a worker finish its key, or fail and retry it."""
         key = data.draw(st.sampled_from(sorted(self.working)))
         if failed:
             wait_s = self.queue.retry(key)
@@ -71,7 +71,7 @@ class Workers(RuleBasedStateMachine):
 
     @invariant()
     def the_depth_is_what_a_worker_could_take(self):
-        """The metric says what waits, not what is being worked on."""
+        """The metric counts waiting keys, not those in work."""
         self._fall_due()
         assert self.queue.depth == len(self.owed - self.working)
 
@@ -86,7 +86,7 @@ TestWorkers = Workers.TestCase
 
 
 def test_names_are_handed_out_in_the_order_in_which_they_came():
-    """No job waits for another that changes all the time."""
+    """A job that changes all the time must not delay the others."""
     queue = WorkQueue()
     for key in "abab":
         queue.add(key)
@@ -95,7 +95,7 @@ def test_names_are_handed_out_in_the_order_in_which_they_came():
 
 
 def test_a_crowd_in_one_lane_delays_no_other_lane():
-    """A tenant with a thousand jobs has one turn, as every other tenant has."""
+    """A tenant with a thousand jobs gets one turn per round, as every other tenant does."""
     queue = WorkQueue(lane=lambda key: key[0])
     for key in ("a1", "a2", "a3", "b1", "b2", "c1"):
         queue.add(key)
@@ -120,7 +120,7 @@ def test_a_worker_that_waits_is_woken_by_work_that_falls_due():
 
 
 def test_closing_sends_every_worker_home_at_once():
-    """The operator ends in two seconds, however long its workers would wait."""
+    """The operator must stop within two seconds, however long its workers would wait."""
     queue = WorkQueue()
     workers = [threading.Thread(target=queue.get, args=(60,)) for _ in range(4)]
     for worker in workers:
@@ -145,7 +145,7 @@ def test_nothing_is_handed_out_after_closing():
 
 
 def test_success_makes_the_next_failure_the_first():
-    """A job that failed yesterday does not wait a minute today."""
+    """A job that failed yesterday must not wait a minute today."""
     queue = WorkQueue(again=Backoff(first_s=1, cap_s=60, chance=lambda: 0.0))
     assert [queue.retry("a"), queue.retry("a")] == [1, 2]
 
@@ -155,7 +155,7 @@ def test_success_makes_the_next_failure_the_first():
 
 
 def test_the_time_that_a_name_waited_is_reported():
-    """Latency of the queue is a metric."""
+    """The latency of the queue is a metric."""
     now, waited = [0.0], []
     queue = WorkQueue(waited=waited.append, clock=lambda: now[0])
     queue.add("a")
@@ -167,7 +167,7 @@ def test_the_time_that_a_name_waited_is_reported():
 
 
 def test_four_threads_do_every_change_and_never_one_name_together():
-    """The promise of the state machine, with real threads."""
+    """The state machine shows the same for one thread; this test uses real ones."""
     queue, busy, done, together = WorkQueue(), set(), [], []
     lock = threading.Lock()
 

@@ -1,4 +1,4 @@
-"""The images that a node brings along are archives which any engine can read."""
+"""The images that come with a node are archives that every container engine can read."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ def contents(path):
 
 
 def blob(files, descriptor):
-    """Return what a descriptor points to."""
+    """Return the target of a descriptor."""
     return files["blobs/sha256/" + descriptor["digest"].removeprefix("sha256:")]
 
 
@@ -81,7 +81,7 @@ def test_the_layer_holds_files_links_and_each_folder_once(image, tmp_path):
 
 
 def test_same_files_give_the_same_bytes(image, tmp_path):
-    """So an archive can be kept under the key of its content: no clock and no owner enters."""
+    """An archive is cached under a key of its content, so no time and no owner may be in it."""
     write_archive(image, tmp_path / "first.tar")
     write_archive(image, tmp_path / "second.tar")
 

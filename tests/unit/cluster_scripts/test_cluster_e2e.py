@@ -1,4 +1,4 @@
-"""What `make e2e` leaves behind: its own script, among programs that write down that they were called."""
+"""The state that `make e2e` leaves: its own script runs with programs that record their calls."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ from tests.waiting import eventually
 
 CLUSTER = Path(__file__).parents[2] / "cluster"
 END_S = 30
-CLEANING_S = 0.3  # of tests that are interrupted, in which nothing else may be removed
+CLEANING_S = 0.3  # time in which interrupted tests clean up; nothing else may be removed meanwhile
 INTERRUPTED = 130
 TOLD = 'echo "$(basename "$0")" >>"$CALLS"\n'
 PROGRAMS = {
@@ -25,8 +25,8 @@ PROGRAMS = {
     "tools/images.sh": "echo stub=stub.tar",
     "bin/kubectl": "",
 }
-# The interpreter itself: the first line of a script may have no space, and a checkout's path may have one.
-# As pytest, it is interrupted by Ctrl-C only where that was not shut off, and then cleans up.
+# The shebang line names the interpreter itself, because a checkout's path may have a space and the line may
+# not. As with pytest, Ctrl-C interrupts the tests only where that was not disabled, and they then clean up.
 TESTS = f"""#!{os.path.realpath(sys.executable)} -IS
 import os, signal, sys, time
 
@@ -47,7 +47,7 @@ except KeyboardInterrupt:
 
 
 class E2e:
-    """A copy of the script, in a folder of its own; `calls` are what it called, in order."""
+    """A copy of the script in its own folder; `calls` are the calls that it made, in order."""
 
     def __init__(self, folder):
         self.cache = folder / "cache"
@@ -61,7 +61,10 @@ class E2e:
 
     @contextmanager
     def started(self, tests_end, **environment):
-        """Have it run; the tests end with this code, or go on where it is empty. Nothing of it stays."""
+        """Run the script and kill all its processes at the end.
+
+        The tests exit with `tests_end`, or run on if it is empty.
+        """
         kept = {name: value for name, value in os.environ.items() if name in {"PATH", "HOME", "LANG"}}
         own = {"PALAESTRA_CACHE": str(self.cache), "CALLS": str(self._calls), "TESTS_END": tests_end}
         with subprocess.Popen(
@@ -77,7 +80,7 @@ class E2e:
                     os.killpg(process.pid, signal.SIGKILL)
 
     def run(self, tests_end="0", **environment):
-        """Return its exit code."""
+        """Run the script to its end and return its exit code."""
         with self.started(tests_end, **environment) as process:
             return process.wait(END_S)
 
@@ -87,7 +90,7 @@ class E2e:
         return self._calls.read_text().split() if self._calls.exists() else []
 
     def stands(self, *, by_e2e):
-        """Let a cluster stand, of a person or of a run of the script that was killed."""
+        """Create the files of a running cluster, which a person or a killed run of the script has started."""
         state = self.cache / "kind"
         state.mkdir(parents=True)
         (state / "way").touch()
@@ -103,13 +106,13 @@ class E2e:
 
 @pytest.fixture
 def e2e(tmp_path):
-    """The script, with nothing there yet."""
+    """The script, with no cluster yet."""
     return E2e(tmp_path)
 
 
 @pytest.mark.parametrize("code", ["0", "1"])
 def test_the_cluster_goes_however_the_tests_end(e2e, code):
-    """And the caller gets the exit code of the tests."""
+    """The caller gets the exit code of the tests."""
     assert e2e.run(code) == int(code)
 
     assert e2e.calls == ["up.sh", "tests", "down.sh"]
@@ -117,18 +120,18 @@ def test_the_cluster_goes_however_the_tests_end(e2e, code):
 
 
 def ctrl_c(process):
-    """Interrupt all that a terminal has in its foreground."""
+    """Interrupt every process in the foreground of the terminal."""
     os.killpg(process.pid, signal.SIGINT)
 
 
 def terminate(process):
-    """Ask the script alone to end, as a machine does that shuts down."""
+    """Terminate only the script, as a shutdown of the machine does."""
     process.terminate()
 
 
 @pytest.mark.parametrize("stop", [ctrl_c, terminate])
 def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop):
-    """Once: a second interruption of the tests would cut their own cleaning up short."""
+    """The tests are interrupted only once: a second interruption would cut their cleanup short."""
     with e2e.started(tests_end="") as process:
         eventually(lambda: "tests" in e2e.calls)
         stop(process)
@@ -138,7 +141,10 @@ def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop
 
 
 def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
-    """On a busy machine the tests may have ended before it hears of Ctrl-C: it did not end as they did."""
+    """On a busy machine the tests may end before the script receives Ctrl-C.
+
+    It must still report the interruption.
+    """
     with e2e.started(tests_end="") as process:
         eventually(lambda: "tests" in e2e.calls)
         process.send_signal(signal.SIGSTOP)
@@ -151,7 +157,7 @@ def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
 
 
 def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
-    """The cluster that was started meanwhile is removed, too."""
+    """The cluster, which was started meanwhile, is removed too."""
     (tmp_path / "tools/images.sh").write_text("#!/bin/sh\nexit 1\n")
 
     assert e2e.run() == 1
@@ -160,7 +166,7 @@ def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
 
 
 def test_what_a_killed_run_left_behind_goes_first(e2e):
-    """Its mark says that nobody wanted that cluster for longer."""
+    """A mark shows that the killed run had started the cluster, so nobody needs it."""
     e2e.stands(by_e2e=True)
 
     assert e2e.run() == 0
@@ -169,7 +175,7 @@ def test_what_a_killed_run_left_behind_goes_first(e2e):
 
 
 def test_a_cluster_that_stood_before_is_left(e2e):
-    """A person has made it."""
+    """A person has started it."""
     e2e.stands(by_e2e=False)
 
     assert e2e.run("1") == 1
@@ -178,7 +184,7 @@ def test_a_cluster_that_stood_before_is_left(e2e):
 
 
 def test_a_cluster_that_is_to_be_kept_is_not_taken_by_the_next_run(e2e):
-    """KEEP=1 makes it the person's own."""
+    """With KEEP=1 the cluster belongs to the person."""
     assert e2e.run(KEEP="1") == 0
     assert e2e.run() == 0
 

@@ -1,4 +1,4 @@
-"""The scripts of the cluster find what a killed run left behind, and say what is missing."""
+"""The scripts of the cluster find the remains of a killed run, and report missing programs."""
 
 import os
 import shutil
@@ -39,14 +39,14 @@ def shell(run):
 
 @pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")
 def test_shellcheck_finds_nothing(run):
-    """It knows the traps of quoting better than people do."""
+    """The program shellcheck knows the pitfalls of quoting better than people do."""
     result = run("shellcheck", "-x", *SCRIPTS)
 
     assert result.stdout == ""
 
 
 def test_a_recorded_process_is_found_while_it_runs(shell):
-    """The record keeps its truth over exec: that is how the engine is found again."""
+    """The record stays valid after exec, so the engine can be found again."""
     result = shell("""
         (record_process "$CACHE.pid"; exec sleep 60) & started=$!
         wait_until 10 test -f "$CACHE.pid"
@@ -59,7 +59,7 @@ def test_a_recorded_process_is_found_while_it_runs(shell):
 
 
 def test_another_process_with_the_recorded_id_is_left_alone(shell):
-    """Ids are given again: without the start time a stranger would be killed."""
+    """The kernel reuses process ids; without the start time an unrelated process would be killed."""
     result = shell("""
         echo "$$ 1 $(cat /proc/sys/kernel/random/boot_id)" >"$CACHE.pid"
         recorded_process "$CACHE.pid" || echo stranger
@@ -74,7 +74,7 @@ def test_waiting_ends_at_its_deadline(shell):
 
 
 def test_a_lock_is_not_passed_on_to_what_is_started(shell):
-    """A daemon that inherited it would block the next call for ever."""
+    """A daemon that inherited the lock would block the next call for ever."""
     result = shell("""
         start() { sleep 60 & echo $! >"$CACHE.pid"; }
         locked name start
@@ -86,7 +86,7 @@ def test_a_lock_is_not_passed_on_to_what_is_started(shell):
 
 
 def test_the_remains_of_a_cluster_are_an_error(run, tmp_path):
-    """Removing a cluster ends with this check: a process or a folder that stays is an error."""
+    """The removal of a cluster ends with this check: a remaining process or folder is an error."""
     state = tmp_path / "cache/kind"
     state.mkdir(parents=True)
     (state / "way").touch()
@@ -103,7 +103,7 @@ def test_the_remains_of_a_cluster_are_an_error(run, tmp_path):
 
 
 def test_the_key_of_a_folder_changes_with_its_content_only(shell):
-    """Else a stale node image would be used, or a good one made again."""
+    """Otherwise an outdated node image would be used, or a good one built again."""
     result = shell(
         """
         mkdir -p "$CACHE"; HERE=$CACHE; mkdir a; echo 1 >a/x; echo 2 >a/y
@@ -116,7 +116,7 @@ def test_the_key_of_a_folder_changes_with_its_content_only(shell):
 
 
 def test_asking_for_built_programs_builds_nothing(run):
-    """Tests that need them are skipped where they were never built."""
+    """Tests that need the programs are skipped if they were never built."""
     result = run("./programs.sh", "--built", "etcd")
 
     assert (result.returncode, result.stdout, result.stderr) == (3, "", "")
@@ -133,7 +133,7 @@ def test_asking_for_built_programs_builds_nothing(run):
     ],
 )
 def test_an_error_has_a_remedy(run, command, environment, message):
-    """The thing, the fact, the remedy."""
+    """The message names the object, the fact and the remedy."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
         pytest.skip("Go is installed beside the system's programs")
 
@@ -145,7 +145,7 @@ def test_an_error_has_a_remedy(run, command, environment, message):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
 def test_missing_packages_are_one_line_to_type_for_who_is_not_root(run):
-    """Nothing is installed behind the back of a person, and nothing is half done."""
+    """Nothing is installed without consent, and nothing is half done."""
     nobody = ("setpriv", "--reuid", "65534", "--clear-groups")
     if run(*nobody, "test", "-r", CLUSTER / "settings.sh").returncode:
         pytest.skip("another user can't read this checkout")

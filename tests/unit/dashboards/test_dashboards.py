@@ -1,4 +1,4 @@
-"""The dashboards and alerts, as far as they can be read without a Prometheus."""
+"""The dashboards and alerts, as far as they can be tested without Prometheus."""
 
 import json
 import re
@@ -17,12 +17,12 @@ COLUMNS = 24
 
 @pytest.fixture(params=DASHBOARDS, ids=lambda path: path.stem)
 def dashboard(request):
-    """Each dashboard, as Grafana gets it."""
+    """Each dashboard as Grafana loads it."""
     return json.loads(request.param.read_text())
 
 
 def test_a_panel_asks_a_question_and_says_what_to_do(dashboard):
-    """A person on call at night has not built the dashboard."""
+    """The person on call at night has not built the dashboard."""
     for panel in panels(dashboard):
         assert panel["title"].endswith("?")
         assert len(panel["description"]) > 60, panel["title"]
@@ -30,7 +30,7 @@ def test_a_panel_asks_a_question_and_says_what_to_do(dashboard):
 
 
 def test_panels_stand_beside_each_other_and_have_numbers_of_their_own(dashboard):
-    """Grafana shows panels on top of each other without a word."""
+    """Grafana shows overlapping panels without an error."""
     taken = [
         (x, y)
         for place in (panel["gridPos"] for panel in dashboard["panels"])
@@ -45,7 +45,7 @@ def test_panels_stand_beside_each_other_and_have_numbers_of_their_own(dashboard)
 
 
 def test_a_row_is_filled(dashboard):
-    """A gap is what a forgotten panel looks like."""
+    """A gap means that a panel was forgotten."""
     width = {}
     for panel in panels(dashboard):
         width[panel["gridPos"]["y"]] = width.get(panel["gridPos"]["y"], 0) + panel["gridPos"]["w"]
@@ -54,7 +54,7 @@ def test_a_row_is_filled(dashboard):
 
 
 def test_a_query_uses_no_variable_that_its_dashboard_lacks(dashboard):
-    """Grafana sends what it can't replace as it is, and the panel stays empty."""
+    """Grafana sends a variable that it cannot replace unchanged, and the panel stays empty."""
     values = values_of(dashboard, "30s", "1h")
 
     for panel in panels(dashboard):
@@ -63,7 +63,7 @@ def test_a_query_uses_no_variable_that_its_dashboard_lacks(dashboard):
 
 
 def test_every_metric_that_is_queried_is_documented():
-    """A metric that was renamed leaves an empty panel and an alert that never fires."""
+    """If a metric is renamed, its panel stays empty and its alert never fires."""
     told = set(OURS.findall(METRICS.read_text()))
     asked = [question.expr for question in questions("30s", "1h")] + [rule["expr"] for rule in alerts()]
     suffixes = re.compile("_(bucket|sum|count)$")
@@ -74,7 +74,7 @@ def test_every_metric_that_is_queried_is_documented():
 
 
 def test_a_query_keeps_no_label_that_its_metrics_lack_and_names_none_that_it_drops():
-    """Prometheus groups by a label that nobody has, and Grafana writes nothing in its place."""
+    """Prometheus accepts a missing label, and Grafana shows nothing in its place."""
     labels = labels_told()
     suffixes = re.compile("_(bucket|sum|count)$")
 
@@ -88,13 +88,13 @@ def test_a_query_keeps_no_label_that_its_metrics_lack_and_names_none_that_it_dro
 
 
 def labels_told():
-    """Return the labels of each metric, as docs/reference/metrics.md has them."""
+    """Return the labels of each metric in docs/reference/metrics.md."""
     rows = re.findall(r"^\| `(palaestra_\w+)` \|[^|]*\|([^|]*)\|", METRICS.read_text(), re.MULTILINE)
     return {name: re.findall(r"`(\w+)`:", labels) for name, labels in rows}
 
 
 def test_an_alert_leads_to_what_to_do_about_it():
-    """The link in the notification is all that its reader has."""
+    """The reader of a notification has only its link."""
     headings = re.findall(r"^## (\w+)$", (ROOT / "docs/howto/alerts.md").read_text(), re.MULTILINE)
 
     for rule in alerts():

@@ -1,7 +1,7 @@
-"""A scene: one TrainingJob, what an API server holds of it, and clocks that only tests move.
+"""A scene holds a TrainingJob, its objects in an API server, and clocks that only tests move.
 
-`scene.step()` is one pass of the loop. It carries out decisions on the scene's own objects, as an API server
-would. A test plays Kubernetes' own part (pods, ends of Jobs) with the scene's verbs.
+`scene.step()` is one reconcile: it applies the decisions to the scene's own objects, as an API server would.
+A test plays the part of Kubernetes (pods, ends of Jobs) with the scene's methods.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ from palaestra_protocol.pod.status import SimulatorStatus, Termination, TrainerS
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
-# As small as can be: no decision depends on a world's content, and each makes the worlds of what is missing.
+# The world is minimal: no decision depends on its content, and each one generates the missing worlds.
 WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
 GROUPS = (
     {"name": "collect", "role": "Collect", "world": WORLD},
@@ -58,10 +58,10 @@ class Scene:
             "spec": {"simulators": list(GROUPS), **spec},
         }
         self.now = START  # the operator's wall clock, which somebody may set
-        self.clock_s = 1000.0  # its monotonic clock
+        self.clock_s = 1000.0  # the operator's monotonic clock
         self.record = ReconcileRecord()
-        self.behind_s = 0.0  # the node's clock, against that of the API server
-        self.server_s = 0.0  # the API server's clock, against START
+        self.behind_s = 0.0  # how far the node's clock is behind the API server's
+        self.server_s = 0.0  # the API server's clock, minus START
         self.layout = ClusterLayout(
             images=Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
         )
@@ -76,7 +76,7 @@ class Scene:
         self.switchers: dict[str, str] = {}
         self.unadmitted: dict[str, str] = {}
         self.deleted = False
-        self.budget = False  # a disruption budget that allows no eviction
+        self.budget = False  # whether a disruption budget allows no eviction
         self.pods_made = 0
 
     @property
@@ -85,7 +85,7 @@ class Scene:
         return accept(self.raw).status
 
     def replica(self, index: int = 0) -> ReplicaStatus:
-        """Return what the status says of a replica."""
+        """Return the status of a replica."""
         return self.status.replicas[index]
 
     def job(self, index: int = 0) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class Scene:
         return next(each for each in self.objects["jobs"] if each["metadata"]["name"] == f"job-{index}")
 
     def decide(self) -> Decision:
-        """Return the decision as things are; nothing is changed."""
+        """Return the decision on the current state; nothing is changed."""
         job = accept(deepcopy(self.raw))
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
         known = {"polled": self.polled, "denied": self.denied, "switchers": self.switchers}
@@ -114,7 +114,7 @@ class Scene:
         return decision
 
     def settle(self, seconds: float = 0) -> Decision:
-        """Let time pass and decide until nothing is left to do; return all of it as one decision."""
+        """Let time pass, decide until no action is left, and return all decisions as one."""
         all_ = self.step(seconds)
         for _ in range(10):
             before = deepcopy(self.raw["status"])
@@ -131,27 +131,27 @@ class Scene:
         self.server_s += seconds
 
     def set_clock(self, seconds: float) -> None:
-        """Set the operator's wall clock forward, or back; no other clock knows."""
+        """Move the operator's wall clock; no other clock changes."""
         self.now += timedelta(seconds=seconds)
 
     def restart(self) -> None:
-        """Let another process go on: it remembers nothing, and its monotonic clock is another."""
+        """Replace the operator's process: the new one has an empty memory and another monotonic clock."""
         self.record, self.clock_s, self.polled = ReconcileRecord(), 5.0, {}
 
     def stamp(self, seconds: float = 0) -> str:
-        """Return a moment, by default now, as an API server writes it."""
+        """Return a time, by default the current one, in the format of an API server."""
         return (START + timedelta(seconds=self.server_s + seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
 
     def node_stamp(self) -> str:
-        """Return now, as a kubelet or a pod writes it."""
+        """Return the current time as a kubelet or a pod writes it."""
         return self.stamp(-self.behind_s)
 
     def delete(self, pod: dict[str, Any], grace_s: int = 60) -> None:
-        """Delete a pod, as somebody does: it is to be gone after its grace."""
+        """Delete a pod as a person does; it must be gone after its grace period."""
         pod["metadata"] |= {"deletionTimestamp": self.stamp(grace_s), "deletionGracePeriodSeconds": grace_s}
 
     def new_pod(self, index: int = 0, uid: str | None = None) -> dict[str, Any]:
-        """Make the next pod of a replica, which a node has taken."""
+        """Create the next pod of a replica, scheduled to a node."""
         number, self.pods_made = self.pods_made, self.pods_made + 1
         template = deepcopy(self.job(index)["spec"]["template"])
         pod = {
@@ -170,7 +170,7 @@ class Scene:
         return pod
 
     def running_pod(self, index: int = 0) -> dict[str, Any]:
-        """Make the next pod of a replica, of which every container runs."""
+        """Create the next pod of a replica, with every container running."""
         pod = self.new_pod(index)
         pod["status"] |= {"phase": "Running", "initContainerStatuses": [], "containerStatuses": []}
         for container in pod["spec"]["initContainers"]:
@@ -201,30 +201,30 @@ class Scene:
         pod["status"][field] = [*others, entry]
 
     def end(self, pod: dict[str, Any], code: int, message: str = "", **state: Any) -> None:
-        """End a pod by the exit of its trainer."""
+        """End a pod with its trainer's exit code."""
         self.container(pod, "trainer", code=code, message=message, **state)
         pod["status"]["phase"] = "Failed" if code else "Succeeded"
 
     def take(self, pod: dict[str, Any], words: str = "preempted") -> None:
-        """Let the cluster take a pod: its trainer was interrupted."""
+        """Let the cluster evict a pod, which interrupts its trainer."""
         self.end(pod, 75)
         pod["status"]["conditions"] = [
             {"type": "DisruptionTarget", "status": "True", "reason": "Preempted", "message": words}
         ]
 
     def end_job(self, kind: str, index: int = 0, reason: str = "", message: str = "") -> None:
-        """Let the Job of a replica end: kind is Complete or Failed."""
+        """Let the Job of a replica end; `kind` is Complete or Failed."""
         self.job(index).setdefault("status", {})["conditions"] = [
             {"type": kind, "status": "True", "reason": reason, "message": message,
              "lastTransitionTime": self.stamp()}
         ]  # fmt: skip
 
     def count_failures(self, number: int, index: int = 0) -> None:
-        """Let the Job of a replica book failures."""
+        """Set the number of failures in the status of a replica's Job."""
         self.job(index).setdefault("status", {})["failed"] = number
 
     def poll(self, pod: dict[str, Any], **status: Any) -> None:
-        """Let the trainer of a pod answer, now."""
+        """Record a status of a pod's trainer, as polled now."""
         told = {"step": 0, "target": 100, "episodes": 0, "phase": "training", "attempt": 1} | status
         self.polled[pod["metadata"]["uid"]] = Polled(status=TrainerStatus(**told), at_s=self.clock_s)
 
@@ -267,13 +267,16 @@ def _merge(target: dict[str, Any], patch: dict[str, Any]) -> None:
 
 @pytest.fixture(scope="session")
 def make_scene() -> Callable[..., Scene]:
-    """`make_scene(replicas=2)`: a job that nobody has looked at; keywords are fields of its spec."""
+    """`make_scene(replicas=2)` returns a job that no operator has reconciled.
+
+    Keywords are fields of its spec.
+    """
     return Scene
 
 
 @pytest.fixture(scope="session")
 def accepted() -> Callable[..., Scene]:
-    """`accepted(replicas=2)`: a job whose objects were created; it has no pod yet."""
+    """`accepted(replicas=2)` returns a job whose objects were created; it has no pod yet."""
 
     def make(**spec: Any) -> Scene:
         scene = Scene(**spec)
@@ -285,7 +288,7 @@ def accepted() -> Callable[..., Scene]:
 
 @pytest.fixture(scope="session")
 def training() -> Callable[..., tuple[Scene, dict[str, Any]]]:
-    """`training()`: a job that trains in its first pod, and that pod."""
+    """`training()` returns a job that trains in its first pod, and that pod."""
 
     def make(**spec: Any) -> tuple[Scene, dict[str, Any]]:
         scene = Scene(**spec)
@@ -299,7 +302,7 @@ def training() -> Callable[..., tuple[Scene, dict[str, Any]]]:
 
 @pytest.fixture(scope="session")
 def last_word() -> Callable[..., str]:
-    """`last_word(step=5)`: a termination message."""
+    """`last_word(step=5)` returns a termination message."""
 
     def write(**word: Any) -> str:
         return Termination(**({"step": 0, "reason": "Unexpected: it"} | word)).to_message()
@@ -309,7 +312,7 @@ def last_word() -> Callable[..., str]:
 
 @pytest.fixture(scope="session")
 def simulator() -> Callable[..., SimulatorStatus]:
-    """`simulator(state="failed")`: what a trainer says of collect-0."""
+    """`simulator(state="failed")` returns a trainer's status of collect-0."""
 
     def make(**told: Any) -> SimulatorStatus:
         return SimulatorStatus(**({"name": "collect-0", "role": "Collect", "state": "ready"} | told))
@@ -319,12 +322,12 @@ def simulator() -> Callable[..., SimulatorStatus]:
 
 @pytest.fixture(scope="session")
 def command_groups() -> list[dict[str, Any]]:
-    """Return simulators of which one is a program of the user's own."""
+    """Return two groups of simulators; the first runs a program of the user's own."""
     own = {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim"]}
     return [own, {"name": "evaluate", "role": "Evaluate"}]
 
 
 @pytest.fixture(scope="session")
 def reasons() -> Callable[[Decision], list[Reason]]:
-    """`reasons(decision)`: of its events."""
+    """`reasons(decision)` returns the reasons of its events."""
     return lambda decision: [each.reason for each in decision.events]

@@ -1,4 +1,7 @@
-"""What a job asks of the cluster for itself is free; what affects pods of other people has to be allowed."""
+"""A job may freely set fields that affect only itself.
+
+Fields that affect other people's pods must be allowed.
+"""
 
 from dataclasses import replace
 
@@ -43,11 +46,11 @@ def expressions(key, operator, *values):
 
 
 def allow(value):
-    """Return the remedy that a value of the chart is."""
+    """Return the remedy that names a value of the chart."""
     return f"allow it with the chart's value jobs.{value}, or create a new TrainingJob without it"
 
 
-# What a job may not ask for by itself: scheduling, what allows it, field, fact and remedy.
+# Fields that a job may not set by itself: scheduling, the value that allows it, field, fact and remedy.
 REFUSED = {
     "a priority": (
         {"priorityClassName": "urgent"},
@@ -134,7 +137,7 @@ FREE = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it(make_scene, name):
-    """Its author may be somebody who may create no pod; nothing of the job is created."""
+    """The author may be somebody who may not create pods; no object of the job is created."""
     scheduling, _, fact, remedy = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
 
@@ -148,7 +151,7 @@ def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it
 
 @pytest.mark.parametrize("name", [name for name, (_, allowed, *_) in REFUSED.items() if allowed])
 def test_what_the_installation_allows_starts_the_job(make_scene, name):
-    """The operator is started anew with the value."""
+    """The administrator restarts the operator with the value."""
     scheduling, allowed, *_ = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
     scene.settle()
@@ -161,7 +164,7 @@ def test_what_the_installation_allows_starts_the_job(make_scene, name):
 
 @pytest.mark.parametrize("name", FREE)
 def test_what_a_job_asks_for_itself_is_free(make_scene, name):
-    """Kubernetes' own documentation shows it."""
+    """Kubernetes' own documentation shows these fields."""
     scene = make_scene(scheduling=FREE[name])
 
     decision = scene.settle()
@@ -180,7 +183,7 @@ def test_what_a_job_asks_for_itself_is_free(make_scene, name):
     ],
 )
 def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_scene, resources, free):
-    """Kubernetes' ExtendedResourceToleration does the same, where a cluster has it switched on."""
+    """Kubernetes' ExtendedResourceToleration does the same in clusters that enable it."""
     scene = make_scene(scheduling={"tolerations": [GPU]}, trainer={"resources": resources})
 
     scene.settle()
@@ -190,7 +193,7 @@ def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_s
 
 @pytest.mark.parametrize("key", ["node.kubernetes.io/unschedulable", "memory"])
 def test_a_resource_of_every_node_opens_no_taint(make_scene, key):
-    """A scheduler ignores resources of kubernetes.io that it does not know."""
+    """A scheduler ignores unknown resources of kubernetes.io."""
     asks = {"resources": {"requests": {key: "1"}}}
     scene = make_scene(scheduling={"tolerations": [{"key": key, "operator": "Exists"}]}, trainer=asks)
 
@@ -211,7 +214,7 @@ def test_a_resource_of_every_node_opens_no_taint(make_scene, key):
     ],
 )
 def test_a_selector_of_pods_of_others_is_refused(make_scene, selector):
-    """The installation allows example.com/team, which the selector has to demand and not to exclude."""
+    """The installation allows example.com/team; the selector must require that label, not exclude it."""
     scene = make_scene(scheduling=required("podAntiAffinity", labelSelector=selector))
     scene.layout = replace(scene.layout, allowed=Allowed(anti_affinity_labels=("example.com/team",)))
 
@@ -254,7 +257,7 @@ VALUES = st.recursive(
 
 @given(st.dictionaries(st.sampled_from(["podAffinity", "podAntiAffinity"]), VALUES, max_size=2))
 def test_no_affinity_breaks_the_check(affinity):
-    """An affinity is a free object, so its author chooses the types of its values."""
+    """An affinity is a free object, so its values may have any type."""
     job = validate(
         {
             "apiVersion": "palaestra.dev/v1alpha1",

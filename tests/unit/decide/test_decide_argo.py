@@ -1,4 +1,4 @@
-"""The health check for Argo CD in docs/howto/gitops.md, run as it stands by the Lua that Argo CD speaks."""
+"""The health check for Argo CD in docs/howto/gitops.md, run unchanged in the Lua version of Argo CD."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.pages import blocks
 
 @pytest.fixture
 def health():
-    """`health(scene)`: return status and message that Argo CD shows of a scene's job."""
+    """`health(scene)` returns the status and the message that Argo CD shows for a scene's job."""
     lua = lua51.LuaRuntime(unpack_returned_tuples=True)
     check = lua.eval(f"function(obj)\n{CHECK}\nend")
 
@@ -24,7 +24,7 @@ def health():
 
 
 def test_a_job_that_no_operator_has_seen_is_progressing(make_scene, health):
-    """Otherwise each new job would be healthy for a moment, and a sync wave would go on."""
+    """Otherwise each new job would be healthy for a moment, and a sync wave would continue."""
     scene = make_scene()
 
     assert health(scene) == ("Progressing", "the operator has not seen this generation yet")
@@ -44,7 +44,7 @@ def test_a_job_that_starts_is_progressing_with_its_reason(accepted, health):
 
 
 def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, health):
-    """The page of the application shows it without a look at the TrainingJob."""
+    """The application page then shows the remedy, and nobody has to open the TrainingJob."""
     scene = make_scene(storage={"existingClaim": "runs"})
     scene.settle()
 
@@ -52,14 +52,14 @@ def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, heal
 
 
 def test_a_job_that_trains_is_healthy(training, health):
-    """As for `helm --wait`."""
+    """`helm --wait` has the same rule."""
     scene, _ = training()
 
     assert health(scene) == ("Healthy", "Running")
 
 
 def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
-    """Argo CD has a health of its own for it, and a sync wave waits no longer."""
+    """Argo CD has the status Suspended for it, and a sync wave waits no longer."""
     scene = make_scene(suspend=True)
     scene.settle()
 
@@ -67,7 +67,7 @@ def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
 
 
 def test_a_job_that_failed_is_degraded_also_without_the_condition(training, last_word, health):
-    """A definition of an earlier release does not take it."""
+    """A definition that lacks it does not take it."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

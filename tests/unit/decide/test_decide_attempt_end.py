@@ -1,4 +1,4 @@
-"""The record of the last attempt: why it ended, its last lines and its faults, when its pod is gone."""
+"""The record of the last attempt keeps its reason, last lines and faults after its pod is gone."""
 
 import pytest
 
@@ -54,7 +54,10 @@ def test_the_last_lines_and_the_faults_outlive_the_pod(training, last_word):
 
 
 def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(training):
-    """Kubernetes puts it into the termination message; the last ten lines are kept, each cut."""
+    """Kubernetes puts that into the termination message.
+
+    The last ten lines are kept, each of them shortened.
+    """
     scene, pod = training()
     lines = [f"line {i}" for i in range(30)] + ["", "x" * 500]
     scene.end(pod, 137, "\n".join(lines))
@@ -68,7 +71,10 @@ def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(train
 
 
 def test_restarts_that_only_a_poll_reported_are_kept_at_once(accepted, simulator):
-    """Also where the trainer had ended when its pod was first seen; a second look finds nothing new."""
+    """They are kept even if the trainer had ended before its pod was first seen.
+
+    A second reconcile adds nothing.
+    """
     scene = accepted(backoffLimit=5)
     pod = scene.running_pod()
     scene.end(pod, 1)
@@ -84,7 +90,7 @@ def test_restarts_that_only_a_poll_reported_are_kept_at_once(accepted, simulator
 
 
 def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_groups):
-    """The trainer never started and has none."""
+    """The trainer never started, so it has no log."""
     scene = accepted(simulators=command_groups)
     pod = scene.new_pod()
     scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
@@ -102,16 +108,15 @@ def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_gro
         (2, "ConfigurationWrong: it", "ConfigurationRefused"),
         (70, "Unexpected: it", "TrainerFailed"),
         (75, "MasterLost: it", "Interrupted"),
-        (80, "FaultBudgetSpent: it", "SimulatorBudgetSpent"),
+        (80, "SimulatorBudgetSpent: it", "SimulatorBudgetSpent"),
         (81, "Diverged: loss is NaN at step 5", "Diverged"),
         (82, "SimulatorHung: it", "SimulatorHung"),
         (82, "Stalled: it", "Stalled"),
         (1, "StorageFull: it", "StorageFull"),
-        (1, "DiskFull: it", "StorageFull"),
     ],
 )
 def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
-    """By exit code and last word, those of an older release too."""
+    """By exit code and last word."""
     scene, pod = training()
     scene.end(pod, code, last_word(reason=word))
 
@@ -121,7 +126,7 @@ def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, w
 
 
 def test_a_trainer_that_was_killed_for_its_memory_did_not_just_end_with_137(training):
-    """The remedy is another one."""
+    """The remedy for too little memory differs from that for other ends with 137."""
     scene, pod = training()
     scene.end(pod, 137, reason="OOMKilled")
 
@@ -131,18 +136,18 @@ def test_a_trainer_that_was_killed_for_its_memory_did_not_just_end_with_137(trai
 
 
 def evict(scene, pod):
-    """Let a drain take the pod: its trainer saves and stops."""
+    """Let a drain evict the pod; its trainer saves and stops."""
     scene.take(pod, "Eviction API: evicting")
 
 
 def preempt(scene, pod):
-    """Let the scheduler take the pod: its trainer is too slow."""
+    """Let the scheduler preempt the pod; its trainer is too slow to save."""
     scene.take(pod, "preempted")
     scene.end(pod, 137)
 
 
 def lose_with_its_node(scene, pod):  # noqa: ARG001 - all are called alike
-    """Delete the Node object of a node that is off: the garbage collector takes the pod as it was."""
+    """Delete the Node object of a node that is off: the garbage collector deletes the pod as it was."""
     pod["status"]["phase"] = "Failed"
     pod["status"]["conditions"] = [
         {"type": "DisruptionTarget", "status": "True", "reason": "DeletionByPodGC", "message": "node is gone"}
@@ -150,7 +155,7 @@ def lose_with_its_node(scene, pod):  # noqa: ARG001 - all are called alike
 
 
 def remove(scene, pod):
-    """Let the pod be gone before anybody sees how it ended."""
+    """Remove the pod before an operator sees how it ended."""
     scene.objects["pods"].remove(pod)
 
 
@@ -163,7 +168,7 @@ def delete(scene, pod):
 @pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
 @pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
 def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, take, looks):
-    """For every cause, and also if the operator does not look until the next pod is there."""
+    """This holds for every cause, and also if the operator sees only the next pod."""
     scene, pod = training(backoffLimit=0)
     take(scene, pod)
     told = disrupted(scene.settle(5)) if looks else []
@@ -181,7 +186,7 @@ def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, t
 
 
 def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
-    """Kubernetes counts it as one: nobody but a person has deleted it."""
+    """Kubernetes counts it as a failure, because only a person has deleted the pod."""
     scene, pod = training()
     pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
     scene.end(pod, 137)
@@ -198,7 +203,7 @@ def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
 
 
 def test_two_disruptions_in_a_row_are_two_events(training):
-    """Though the replica never got beyond waiting for a pod in between."""
+    """They are two although the replica only waited for a pod in between."""
     scene, pod = training()
     evict(scene, pod)
     told = disrupted(scene.settle(5))
@@ -211,7 +216,7 @@ def test_two_disruptions_in_a_row_are_two_events(training):
 
 
 def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
-    """An operator was away for two of them."""
+    """The operator was away for the other attempts."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: first"))
     scene.pass_(15)
@@ -226,7 +231,7 @@ def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
 
 
 def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, last_word):
-    """The one that the status names was deleted; a failed one before it was not."""
+    """The pod that the status names was deleted; a failed one before it was not."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -244,7 +249,7 @@ def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, la
 
 
 def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
-    """The Job has booked its failure, so that is what it is counted as."""
+    """The Job has counted its failure, so it is reported as a failure."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.count_failures(1)
@@ -257,7 +262,7 @@ def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
 
 
 def test_a_suspended_attempt_ended_by_suspension(training):
-    """Its pod was deleted because somebody asked for it."""
+    """The pod was deleted because a user suspended the job."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -270,7 +275,7 @@ def test_a_suspended_attempt_ended_by_suspension(training):
 
 
 def test_an_attempt_that_kueue_took_back_says_so(make_scene):
-    """Kueue suspends the Job that has to make room; the trainer has saved."""
+    """Kueue suspends a Job to make room for another; the trainer has saved."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -290,7 +295,7 @@ def test_an_attempt_that_kueue_took_back_says_so(make_scene):
 
 
 def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(training, last_word):
-    """A replica has failed once its Job is stopped; what its trainer still says is kept all the same."""
+    """A replica has failed as soon as its Job is stopped; the last lines of its trainer are still kept."""
     scene, pod = training(activeDeadlineSeconds=60)
     scene.step(60)
     scene.settle()
@@ -310,7 +315,7 @@ def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(trainin
 
 
 def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(training):
-    """Somebody has tidied up; the Job's words are left."""
+    """If somebody has deleted the pod, only the Job still has a message."""
     scene, _ = training()
     scene.objects["pods"].clear()
     words = "Container trainer for pod default/x failed with exit code 81 matching FailJob rule at index 2"
@@ -322,7 +327,7 @@ def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(traini
 
 
 def test_the_end_of_an_attempt_is_kept_where_its_pod_goes_after_the_job_has_failed(training):
-    """Which cache hears first, that of Jobs or that of pods, is chance; what is kept is not."""
+    """The caches of Jobs and pods are updated in any order; the result must be the same."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
     scene.settle()

@@ -1,4 +1,4 @@
-"""What heals by itself is waited for, what no kubelet heals gets a new pod, and little is final."""
+"""Some problems end by themselves, some need a new pod, and few are final."""
 
 import pytest
 
@@ -14,12 +14,12 @@ def stops(decision):
 
 
 def replacements(decision):
-    """Return the replacements of pods that a decision asks for."""
+    """Return the replacements of pods in a decision."""
     return [each for each in decision.actions if isinstance(each, Replace)]
 
 
 def forget(scene):
-    """Make the next pod, whose trainer its node forgets, and let it be found out."""
+    """Create the next pod, let its node forget the trainer, and decide until the operator finds that out."""
     pod = scene.running_pod()
     scene.container(pod, "trainer", waiting="PodInitializing")
     scene.settle()
@@ -27,7 +27,7 @@ def forget(scene):
 
 
 def end(scene, pod):
-    """Let an evicted pod end and be gone."""
+    """Let an evicted pod end and disappear."""
     pod["status"]["phase"] = "Failed"
     scene.settle(5)
     scene.objects["pods"].remove(pod)
@@ -50,7 +50,7 @@ def end(scene, pod):
 def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
     training, last_word, container, state, reason
 ):
-    """On the second pod of a run at step 3,000,000 a registry is away for a day."""
+    """The run is in its second pod and at step 3,000,000, and a registry is unavailable for a day."""
     scene, pod = training()
     scene.end(pod, 75, last_word(step=3_000_000))
     scene.settle(5)
@@ -61,11 +61,11 @@ def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
     assert found == []
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, reason)
     assert scene.replica().message.startswith("container sim-collect-0")
-    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (0, None)
+    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (0, 0)
 
 
 def test_a_name_that_no_image_can_have_is_final(accepted):
-    """No registry will ever have it."""
+    """No registry will ever have such a name."""
     scene = accepted()
     scene.container(scene.new_pod(), "sim-collect-0", waiting="InvalidImageName: bad")
 
@@ -73,7 +73,7 @@ def test_a_name_that_no_image_can_have_is_final(accepted):
 
 
 def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(training, simulator):
-    """It has a restart budget; the operator ends nothing by its own clock."""
+    """The trainer has a restart budget; the operator does not end the job by a clock of its own."""
     scene, pod = training()
     told = {"phase": "starting", "simulators": (simulator(state="failed", last_fault="did not come up"),)}
     scene.poll(pod, **told)
@@ -91,7 +91,7 @@ def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(tra
 
 @pytest.mark.parametrize("seconds", [None, 100])
 def test_the_wait_for_a_first_step_is_bounded_and_names_what_it_waits_for(accepted, seconds):
-    """A typo in an image must not hold a quota for ever."""
+    """A typo in an image must not hold quota for ever."""
     spec = {} if seconds is None else {"startTimeoutSeconds": seconds}
     scene = accepted(**spec)
     scene.container(scene.new_pod(), "trainer", waiting="ErrImagePull: not found")
@@ -106,7 +106,7 @@ def test_the_wait_for_a_first_step_is_bounded_and_names_what_it_waits_for(accept
 
 
 def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
-    """As when nobody makes a pod for the Job."""
+    """For example, no pod may ever be made for the Job."""
     scene = accepted(startTimeoutSeconds=100)
 
     assert stops(scene.step(100)) == ["StartTimeout"]
@@ -114,7 +114,7 @@ def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
 
 @pytest.mark.parametrize("before_s", [0, 1, 59])
 def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_the_same(accepted, before_s):
-    """A restarted kubelet has forgotten it for a moment; the user still has to fix the image."""
+    """A restarted kubelet has lost the reason for a moment; the user still has to fix the image."""
     scene = accepted(startTimeoutSeconds=100)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
@@ -129,7 +129,7 @@ def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_th
 
 
 def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
-    """What keeps the replica from its first step by now has no name."""
+    """The replica now waits for its first step without a known reason."""
     scene = accepted(startTimeoutSeconds=1000)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
@@ -142,7 +142,7 @@ def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
 
 
 def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
-    """A queue may take the week."""
+    """A job may wait in a queue for a week."""
     scene = make_scene(scheduling={"queueName": "robots"}, startTimeoutSeconds=100)
     scene.kueue = True
     scene.settle()
@@ -155,7 +155,10 @@ def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
 
 
 def test_a_trainer_that_runs_and_reports_nothing_waits_for_no_step(training):
-    """A program of one's own may answer nobody; nothing is known, so nothing is ended."""
+    """A program of the user's own may serve no status.
+
+    The operator knows nothing of it, so it ends nothing.
+    """
     scene, _ = training(startTimeoutSeconds=100)
 
     assert stops(scene.settle(100)) == []
@@ -163,7 +166,7 @@ def test_a_trainer_that_runs_and_reports_nothing_waits_for_no_step(training):
 
 
 def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
-    """Mark first, eviction then; the attempt's number adds up, and nothing counts against the Job."""
+    """The mark comes before the eviction. It counts as an attempt of the replica, but not against the Job."""
     scene = accepted()
     pod, decision = forget(scene)
 
@@ -181,7 +184,10 @@ def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
 
 
 def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
-    """The operator may have been killed between the mark and the eviction; it is counted once."""
+    """The operator may have been killed between the mark and the eviction.
+
+    The replacement is counted once.
+    """
     scene = accepted()
     scene.budget = True
     forget(scene)
@@ -194,7 +200,7 @@ def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
 
 
 def test_a_disruption_budget_that_allows_no_eviction_is_reported(accepted):
-    """It is tried again; nothing is deleted past a budget."""
+    """The eviction is retried; no pod is deleted against a budget."""
     scene = accepted()
     scene.budget = True
     forget(scene)
@@ -217,7 +223,7 @@ def test_a_pod_that_is_being_deleted_is_not_replaced_again(accepted):
 
 @pytest.mark.parametrize("limit", [0, 2])
 def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
-    """Then the replica fails with the reason."""
+    """After that, the replica fails with the reason."""
     scene = accepted(backoffLimit=limit)
     for _ in range(limit):
         pod, decision = forget(scene)
@@ -229,7 +235,7 @@ def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
 
 
 def test_dropped_restart_policies_are_found_out_at_once(accepted):
-    """Such a pod hangs in Init for ever; a webhook may be mended before the last try."""
+    """Such a pod stays in Init for ever; a person may fix the webhook before the last retry."""
     scene = accepted()
     pod = scene.new_pod()
     del pod["spec"]["initContainers"][1]["restartPolicy"]
@@ -244,7 +250,7 @@ def test_dropped_restart_policies_are_found_out_at_once(accepted):
     ["", "x", "1", "1 pod-0", "-1 pod-0 Stalled: it", "1 pod-0 Stalled", "9999999999 pod-0 Stalled: it", 3],
 )
 def test_a_mark_that_is_not_ours_is_none(accepted, mark):
-    """An annotation may be written by others."""
+    """Other programs may write that annotation too."""
     scene = accepted()
     scene.running_pod()
     scene.job()["metadata"]["annotations"] = {"palaestra.dev/replaced": mark}
@@ -254,14 +260,14 @@ def test_a_mark_that_is_not_ours_is_none(accepted, mark):
 
 
 def take(scene, pod, seconds=5):
-    """Let the cluster take a pod, which is gone soon."""
+    """Let the cluster evict a pod, which is gone soon."""
     scene.take(pod)
     scene.settle(seconds)
 
 
 @pytest.mark.parametrize(("limit", "pods"), [(None, 6), (2, 2), (0, None)])
 def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, limit, pods):
-    """Counted from the first step that was reported; 0: any number."""
+    """The limit counts from the first reported step; 0 means no limit."""
     spec = {} if limit is None else {"noProgressLimit": limit}
     scene, pod = training(**spec)
     scene.poll(pod, step=7)
@@ -278,7 +284,7 @@ def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, l
 
 
 def test_a_program_that_reports_nothing_is_never_without_progress(training):
-    """Nobody knows what it has done."""
+    """The operator does not know the progress of such a program."""
     scene, pod = training()
     for _ in range(20):
         take(scene, pod)
@@ -290,7 +296,7 @@ def test_a_program_that_reports_nothing_is_never_without_progress(training):
 
 
 def test_pods_whose_trainer_did_not_start_are_not_without_progress(training):
-    """A cluster that is full preempts them while they pull."""
+    """A full cluster preempts pods while they pull their images."""
     scene, pod = training()
     scene.poll(pod, step=7)
     scene.settle()

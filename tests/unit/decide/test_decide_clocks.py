@@ -1,6 +1,6 @@
-"""No two clocks agree, so nothing is ended by a difference of two of them.
+"""The clocks of the machines differ, so no difference between two of them ends anything.
 
-`scene.behind_s` puts a node's clock behind that of the API server, `scene.set_clock` sets the operator's.
+`scene.behind_s` sets a node's clock back against the API server's; `scene.set_clock` moves the operator's.
 """
 
 import pytest
@@ -12,14 +12,17 @@ HOUR_S = 3600
 
 
 def stops(decision):
-    """Return the reasons of the replicas that a decision stops, or gives a new pod."""
+    """Return the reasons of the replicas that a decision stops or gives a new pod."""
     return [each.reason.value for each in decision.actions if isinstance(each, Stop | Replace)]
 
 
 @pytest.mark.parametrize("tells_ages", [True, False])
 @pytest.mark.parametrize("behind_s", [721, -721, 86_400])
 def test_a_node_whose_clock_is_off_does_not_end_a_trainer_that_steps(accepted, behind_s, tells_ages):
-    """Its answers would be twelve minutes old by a clock of ours; a trainer's age of a step is not."""
+    """Its times differ by minutes from the operator's clock.
+
+    The age of a step, measured by the trainer, does not.
+    """
     scene = accepted(stallDeadlineSeconds=600)
     scene.behind_s = behind_s
     pod = scene.running_pod()
@@ -36,7 +39,7 @@ def test_a_node_whose_clock_is_off_does_not_end_a_trainer_that_steps(accepted, b
 
 @pytest.mark.parametrize("behind_s", [115, 721])
 def test_a_node_whose_clock_is_behind_does_not_end_a_trainer_that_starts(accepted, simulator, behind_s):
-    """A container that was started a moment ago would have started minutes ago."""
+    """By the operator's clock, the container would have started minutes ago."""
     scene = accepted()
     scene.behind_s = behind_s
     pod = scene.running_pod()
@@ -47,7 +50,7 @@ def test_a_node_whose_clock_is_behind_does_not_end_a_trainer_that_starts(accepte
 
 
 def test_a_node_whose_clock_is_behind_has_its_time_to_start_the_trainer(accepted):
-    """All its sidecars seem to run for ten minutes."""
+    """By their times, all sidecars have run for ten minutes."""
     scene = accepted()
     scene.behind_s = 600
     scene.container(scene.running_pod(), "trainer", waiting="PodInitializing")
@@ -59,7 +62,7 @@ def test_a_node_whose_clock_is_behind_has_its_time_to_start_the_trainer(accepted
 
 @pytest.mark.parametrize("seconds", [900, -HOUR_S, 30 * 86_400])
 def test_setting_the_operators_clock_ends_nothing(training, seconds):
-    """Somebody mends its time, or a virtual machine wakes up."""
+    """A person may correct the clock, or a virtual machine may resume."""
     scene, pod = training(stallDeadlineSeconds=600, activeDeadlineSeconds=HOUR_S)
     scene.poll(pod, step=1, last_progress_age_s=1.0)
     scene.settle(10)
@@ -73,7 +76,7 @@ def test_setting_the_operators_clock_ends_nothing(training, seconds):
 
 
 def test_setting_the_operators_clock_back_ends_what_is_over_all_the_same(training):
-    """A deadline would be an hour longer."""
+    """Otherwise the deadline would be an hour longer."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.set_clock(-HOUR_S)
 
@@ -81,7 +84,7 @@ def test_setting_the_operators_clock_back_ends_what_is_over_all_the_same(trainin
 
 
 def test_a_new_process_begins_every_wait_anew(training):
-    """It may get longer by that, never shorter; nothing of the old one's clock is left."""
+    """A wait may get longer by that, but never shorter; the new process has another monotonic clock."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=50)
     scene.settle()
@@ -97,7 +100,10 @@ def test_a_new_process_begins_every_wait_anew(training):
 
 
 def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training):
-    """That was counted by the trainer's own monotonic clock, which no restart of ours sets back."""
+    """The trainer measured that age with its own monotonic clock.
+
+    A restart of the operator does not reset it.
+    """
     scene, pod = training(stallDeadlineSeconds=60)
     scene.restart()
     scene.poll(pod, step=50, last_progress_age_s=180.0)
@@ -106,7 +112,7 @@ def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training
 
 
 def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training):
-    """Time that was not written yet is lost, which extends the deadline."""
+    """Only the time that was not written yet is lost, which extends the deadline."""
     scene, pod = training(activeDeadlineSeconds=100)
     scene.poll(pod, step=1)
     scene.settle(60)
@@ -121,7 +127,10 @@ def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training
 
 @pytest.mark.parametrize("ago_s", [0, HOUR_S])
 def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, ago_s):
-    """The API server's clock may be an hour behind ours; the pod's grace period is given in seconds."""
+    """The API server's clock may be an hour behind the operator's.
+
+    Only the length of the grace period is used.
+    """
     scene, pod = training()
     scene.server_s -= ago_s
     scene.delete(pod, 60)
@@ -135,7 +144,7 @@ def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, 
 
 
 def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(training, last_word):
-    """The time of a Job's end is the control plane's."""
+    """The time of a Job's end comes from the control plane's clock, so it is not compared."""
     scene, pod = training()
     scene.server_s -= HOUR_S
     scene.end_job("Complete")
@@ -150,7 +159,7 @@ def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(trainin
 
 @pytest.mark.parametrize("server_s", [-HOUR_S, HOUR_S])
 def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
-    """The time to live is counted from it, by the clock that has stamped it."""
+    """The time to live is counted from it, by the same clock."""
     scene, pod = training(ttlSecondsAfterFinished=60)
     scene.server_s += server_s
     scene.end(pod, 0, last_word(step=100))
@@ -163,7 +172,7 @@ def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
 
 
 def kill(scene, pod, run):
-    """Let the kernel kill the trainer's neighbor in a run of its container; it runs again."""
+    """Let the kernel kill the simulator in a run of its container, which is running again."""
     scene.container(pod, "sim-collect-0", running=True, restarts=run + 1)
     ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.node_stamp()}
     for each in pod["status"]["initContainerStatuses"]:
@@ -172,12 +181,12 @@ def kill(scene, pod, run):
 
 
 def kills(scene):
-    """Return how often a container was killed for its memory."""
+    """Return the number of memory kills of each container."""
     return [each.times for each in scene.replica().memory_kills]
 
 
 def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(training):
-    """The second node's clock is behind: its kill would be older than the last one."""
+    """The second node's clock is behind, so its kill seems to be older than the last one."""
     scene, pod = training()
     kill(scene, pod, 0)
     scene.settle(5)
@@ -196,8 +205,8 @@ def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(t
     assert kills(scene) == [3]
 
 
-def test_a_kill_is_counted_once_though_the_definition_of_before_drops_its_run(training):
-    """An older definition keeps neither pod nor run; the count must not grow with each look."""
+def test_a_kill_is_counted_once_though_the_status_has_no_room_for_its_run(training):
+    """A large status keeps neither pod nor run; the count must not grow with each look."""
     scene, pod = training()
     kill(scene, pod, 0)
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""How long a replica has time; then it is stopped, or its pod replaced, by a patch that says why."""
+"""When a deadline of a replica has passed, one patch with the reason stops it or replaces its pod."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def replaced(decision):
 
 
 def test_a_stop_is_one_patch_that_outlives_its_writer(training):
-    """Annotation and deadline together: half of it would be lost with the operator."""
+    """The annotation and the deadline are in one patch, because an operator may be killed between two."""
     scene, _ = training(activeDeadlineSeconds=60)
 
     (stop,) = scene.step(60).actions
@@ -29,7 +29,7 @@ def test_a_stop_is_one_patch_that_outlives_its_writer(training):
 
 
 def test_a_replica_has_failed_once_its_job_carries_the_mark(training):
-    """And not before: the patch may have failed."""
+    """It has not failed before that, because the patch may fail."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
     assert scene.status.phase is Phase.RUNNING
@@ -41,7 +41,7 @@ def test_a_replica_has_failed_once_its_job_carries_the_mark(training):
 
 
 def test_suspended_time_does_not_count_for_the_active_deadline(training):
-    """Of ten minutes, one was active."""
+    """The job was active for one of ten minutes."""
     scene, _ = training(activeDeadlineSeconds=120)
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
@@ -57,7 +57,7 @@ def test_suspended_time_does_not_count_for_the_active_deadline(training):
 
 
 def test_time_in_which_a_hold_keeps_a_job_from_being_planned_does_not_count(make_scene):
-    """Nothing of it trains: who creates the Secret an hour later finds the job as it was."""
+    """The job does not train then, so a Secret that is created an hour later finds it with its whole time."""
     secret = {"env": [{"name": "TOKEN", "secretKeyRef": {"name": "keys", "key": "token"}}]}
     scene = make_scene(activeDeadlineSeconds=60, trainer=secret)
     scene.settle()
@@ -74,7 +74,7 @@ def test_time_in_which_a_hold_keeps_a_job_from_being_planned_does_not_count(make
 
 
 def test_the_active_deadline_may_be_raised_and_is_woken_for(training):
-    """It is one of the fields that may change."""
+    """This field may change."""
     scene, _ = training(activeDeadlineSeconds=60)
     assert scene.step(10).wake_after_s == 50
 
@@ -84,7 +84,7 @@ def test_the_active_deadline_may_be_raised_and_is_woken_for(training):
 
 
 def test_a_stalled_trainer_gets_a_new_pod_when_its_watchdog_has_not_ended_it(training):
-    """By its own word, with a grace in which it ends itself (exit code 82)."""
+    """The stall time is the trainer's own; it first gets a grace period to end itself (exit code 82)."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, last_progress_age_s=179.0)
 
@@ -93,7 +93,7 @@ def test_a_stalled_trainer_gets_a_new_pod_when_its_watchdog_has_not_ended_it(tra
 
 
 def test_a_trainer_that_cannot_be_reached_is_not_stalled(training):
-    """It is unknown; it may well train."""
+    """Its state is unknown; it may well train."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, last_progress_age_s=0.0)
 
@@ -101,7 +101,10 @@ def test_a_trainer_that_cannot_be_reached_is_not_stalled(training):
 
 
 def test_an_environment_that_steps_and_teaches_nothing_is_stalled(training):
-    """It answers, and the step count does not move: the deadline measures progress, not liveness."""
+    """The trainer responds, but its step count does not change.
+
+    The deadline measures progress, not liveness.
+    """
     scene, pod = training(stallDeadlineSeconds=60)
     found = []
     for _ in range(19):
@@ -114,7 +117,7 @@ def test_an_environment_that_steps_and_teaches_nothing_is_stalled(training):
 
 
 def test_an_environment_that_never_stepped_is_stalled_too(training):
-    """Its trainer says that it trains, and has nothing to show for it."""
+    """The trainer reports that it trains, but has no step."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=0)
     scene.settle()
@@ -136,7 +139,7 @@ def test_a_run_that_comes_forward_slowly_is_not_stalled(training):
 
 @pytest.mark.parametrize("tells_ages", [True, False])
 def test_an_evaluation_that_steps_is_progress(training, tells_ages):
-    """Nothing is learned from it, by intention; one that does not step is none."""
+    """An evaluation does not train by intention, but one without steps makes no progress."""
     scene, pod = training(stallDeadlineSeconds=60)
     for _ in range(30):
         scene.pass_(60)
@@ -153,7 +156,7 @@ def test_an_evaluation_that_steps_is_progress(training, tells_ages):
 
 
 def test_the_next_attempt_has_the_whole_time_again(training, last_word):
-    """It goes on at the step at which the last one ended."""
+    """The next attempt continues at the step at which the last one ended."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=50, last_progress_age_s=0.5)
     scene.settle()
@@ -169,9 +172,9 @@ def test_the_next_attempt_has_the_whole_time_again(training, last_word):
 
 
 def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
-    """A trainer that always exits 75 would be tried for ever: Kubernetes has no bound for it.
+    """A trainer that always exits with 75 would be retried for ever, because Kubernetes has no limit for it.
 
-    The last one is not waited for: by then Kubernetes waits five minutes before each new pod.
+    The operator does not wait for the last retry: Kubernetes waits five minutes before each new pod by then.
     """
     scene = accepted()
     pods = 0
@@ -187,7 +190,7 @@ def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
 
 
 def test_pods_that_fill_their_storage_again_and_again_are_reported_with_the_cause(accepted):
-    """An eviction is no failure to Kubernetes, whatever its cause."""
+    """Kubernetes does not count an eviction as a failure, whatever its cause is."""
     scene = accepted()
     while scene.status.phase is not Phase.FAILED:
         pod = scene.running_pod()
@@ -214,7 +217,7 @@ def test_pods_that_are_taken_while_they_come_forward_are_not_capped(accepted, la
 
 
 def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_scene):
-    """It was created just before the status was written, and not seen yet."""
+    """The Job was created just before the status was written, and the operator had not seen it yet."""
     scene = make_scene(activeDeadlineSeconds=60)
     scene.settle()
     jobs, scene.objects["jobs"] = scene.objects["jobs"], []
@@ -229,7 +232,7 @@ def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_sc
 
 @pytest.mark.parametrize("how", ["unreachable", "deleted", "ended"])
 def test_a_crash_loop_of_before_is_not_held_against_a_pod_that_trained(training, how):
-    """An operator that has just started has heard nothing yet, and sidecars end with their pod."""
+    """A new operator has no poll of the trainer yet, and sidecars end with their pod."""
     scene, pod = training()
     scene.poll(pod, phase="training", step=50)
     scene.settle(5)

@@ -1,4 +1,4 @@
-"""A replica that is stopped while its Job is suspended: no queue may admit it later and preempt others."""
+"""A suspended Job of a stopped replica is deleted, so that no queue can admit it later and preempt others."""
 
 import pytest
 
@@ -11,7 +11,7 @@ DISCARD = Discard(job="job-1", replica=1)
 
 @pytest.fixture
 def over(make_scene):
-    """A job whose time is over: replica 0 trains, replica 1 waits to be admitted."""
+    """A job whose deadline has passed: replica 0 trains, replica 1 waits to be admitted."""
     scene = make_scene(replicas=2, activeDeadlineSeconds=DEADLINE_S)
     scene.settle()
     scene.running_pod(0)
@@ -22,7 +22,7 @@ def over(make_scene):
 
 
 def test_it_is_marked_then_reported_then_deleted(over):
-    """Each step stands in the cluster before the next, whatever happens to the operator in between."""
+    """Each step is stored in the cluster before the next, so the operator may be killed between them."""
     marked, told, deleted = (over.step().actions for _ in range(3))
 
     assert [(type(each), each.replica) for each in marked] == [(Stop, 0), (Stop, 1)]
@@ -33,10 +33,10 @@ def test_it_is_marked_then_reported_then_deleted(over):
 
 
 def test_an_operator_that_was_killed_after_the_mark_goes_on(over):
-    """The mark on the Job says why; the status is written before the Job is deleted."""
+    """The mark on the Job has the reason; the status is written before the Job is deleted."""
     before = over.raw["status"]
     over.step()
-    over.raw["status"] = before  # it was never written
+    over.raw["status"] = before  # the status was never written
 
     told = over.step()
 
@@ -46,7 +46,7 @@ def test_an_operator_that_was_killed_after_the_mark_goes_on(over):
 
 
 def test_what_was_deleted_is_never_planned_again(over):
-    """The status is the memory: the replica has ended."""
+    """The status records that the replica has ended."""
     over.settle()
 
     assert [each["metadata"]["name"] for each in over.objects["jobs"]] == ["job-0"]
@@ -55,7 +55,7 @@ def test_what_was_deleted_is_never_planned_again(over):
 
 
 def test_a_job_that_runs_is_only_stopped(over):
-    """Its pods get their time to save, and its deadline runs."""
+    """Its pods get time to save, and its deadline applies."""
     over.settle()
 
     assert over.job(0)["spec"]["activeDeadlineSeconds"] == 1
@@ -63,7 +63,7 @@ def test_a_job_that_runs_is_only_stopped(over):
 
 
 def test_a_job_that_was_admitted_after_its_mark_is_not_deleted(over):
-    """It ends by its deadline, as any other."""
+    """It ends by its deadline, as any other Job does."""
     over.step()
     over.job(1)["spec"]["suspend"] = False
 
@@ -71,7 +71,7 @@ def test_a_job_that_was_admitted_after_its_mark_is_not_deleted(over):
 
 
 def test_a_job_that_is_suspended_after_its_mark_is_deleted(over):
-    """A queue may take it back in the second that it has left."""
+    """A queue may suspend it again in the second that it has left."""
     over.settle()
     over.job(0)["spec"]["suspend"] = True
 

@@ -1,4 +1,4 @@
-"""Others edit objects of ours: it is said once for each edit, and nothing is put back."""
+"""Edits of the operator's objects by others are reported once each, and not reverted."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def edited(decision):
 
 
 def test_what_is_as_it_was_made_is_no_edit(training):
-    """Defaults of the API server, and what the operator writes itself."""
+    """Defaults of the API server and writes of the operator itself are not edits."""
     scene, _ = training()
     scene.job()["spec"] |= {"parallelism": 1, "completions": 1}
     scene.objects["policies"][0]["metadata"]["generation"] = 1
@@ -29,7 +29,7 @@ def test_what_is_as_it_was_made_is_no_edit(training):
     ],
 )
 def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
-    """A Job with parallelism 0 makes no pod, and nobody would know why."""
+    """A Job with parallelism 0 makes no pod, and nobody would know the reason."""
     scene, _ = training()
     scene.job()["spec"] |= change
 
@@ -40,7 +40,7 @@ def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
 
 
 def test_an_edit_of_the_network_policy_is_said_and_left_alone(training):
-    """It is the second layer that keeps others from the pods."""
+    """The network policy is the second layer that protects the pods from others."""
     scene, _ = training()
     scene.objects["policies"][0]["metadata"]["generation"] = 2
 
@@ -53,7 +53,7 @@ def test_an_edit_of_the_network_policy_is_said_and_left_alone(training):
 
 
 def test_an_edit_is_to_be_written_once(training):
-    """A look follows upon each change of anything."""
+    """Every change of any object causes a reconcile."""
     scene, _ = training()
     scene.job()["spec"]["parallelism"] = 0
 
@@ -63,7 +63,7 @@ def test_an_edit_is_to_be_written_once(training):
 
 
 def test_our_own_stop_is_no_edit(training):
-    """It sets the deadline by which the Job ends."""
+    """The operator sets the deadline by which the Job ends."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
 

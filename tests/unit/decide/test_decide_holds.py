@@ -1,4 +1,4 @@
-"""What keeps a job from starting, each with its reason; most of it somebody can mend, and then it starts."""
+"""Each hold keeps a job from starting for a reason; a person can remove most of them, and then it starts."""
 
 import re
 from dataclasses import replace
@@ -118,7 +118,7 @@ def held(scene):
     ],
 )
 def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there, reason, message):
-    """Field, fact and remedy; the job pends and may start later."""
+    """The message has field, fact and remedy; the job stays Pending and may start later."""
     scene = make_scene(**spec)
     scene.there = there
 
@@ -149,7 +149,7 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
 def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next(
     make_scene, spec, kind, name
 ):
-    """A person who follows the message has one round, not a second one about a label."""
+    """A person who follows the message must not get a second message about a label."""
     scene = make_scene(**spec)
     scene.settle()
     label = re.search(r'with the label (\S+): "(\S+)"', held(scene)[1])
@@ -162,7 +162,7 @@ def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next
 
 
 def test_a_job_starts_when_its_world_appears(make_scene):
-    """Nobody has to touch the job."""
+    """The job needs no change."""
     scene = make_scene(simulators=WORLD)
     scene.settle()
 
@@ -180,7 +180,7 @@ Robot { name "one" supervisor TRUE controller "ros" }
 
 
 def test_a_world_that_is_none_can_be_mended_in_its_config_map(make_scene):
-    """It is read again until the job was accepted."""
+    """The world is read again until the job is accepted."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": "no world"})
     scene.settle()
@@ -205,7 +205,7 @@ def test_what_nobody_can_mend_fails_at_once(make_scene):
 
 
 def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
-    """It is compromised: everybody who may read TrainingJobs has seen it."""
+    """The password is compromised, because everybody who may read TrainingJobs has seen it."""
     option = {"name": "my:Tracker", "options": {"uri": "http://me:secret@tracking.example.com"}}
     scene = make_scene(trainer={"algorithm": {"callbacks": [option]}})
 
@@ -221,7 +221,7 @@ def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
 
 
 def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scene):
-    """Its copy is in the job's own ConfigMap."""
+    """The job's own ConfigMap has a copy."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()
@@ -235,7 +235,7 @@ def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scen
 
 
 def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
-    """Objects that do not exist yet are held as before; running replicas go on."""
+    """Missing objects are held as before; running replicas continue."""
     scene = make_scene(simulators=WORLD, replicas=2)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()
@@ -252,7 +252,7 @@ def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
 
 @pytest.mark.parametrize("attempt", METADATA, ids=[each.name for each in METADATA])
 def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scene, attempt):
-    """Its author may be somebody who may create no pod."""
+    """The author may be somebody who may not create pods."""
     scene = make_scene(scheduling={attempt.path.rpartition(".")[2]: attempt.value})
 
     decision = scene.settle()
@@ -282,7 +282,7 @@ def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scen
     ],
 )
 def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, key, holds):
-    """A part of a domain may be somebody else's."""
+    """A part of a domain may belong to somebody else."""
     scene = make_scene(scheduling={"podAnnotations": {key: "x"}})
     scene.layout = replace(scene.layout, allowed=Allowed(pod_annotations=allowed))
 
@@ -292,7 +292,7 @@ def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, 
 
 
 def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_longer_are(make_scene):
-    """The operator is started anew with the value; what was accepted is not judged again."""
+    """The administrator restarts the operator with the value; an accepted job is not checked again."""
     scene = make_scene(scheduling={"podLabels": {"example.com/team": "robots"}})
     scene.settle()
     assert held(scene)[0] == "PodMetadataNotAllowed"
@@ -312,7 +312,7 @@ def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_lo
 
 @pytest.mark.parametrize("deleting", [False, True])
 def test_a_job_of_somebody_else_is_left_alone(make_scene, deleting):
-    """It has our name: perhaps of a TrainingJob that was there before, and is being collected."""
+    """A Job has the expected name, but may be of an earlier TrainingJob whose objects are being deleted."""
     scene = make_scene()
     scene.step()
     metadata = {"name": "job-0", "uid": "x", "ownerReferences": [{"uid": "other"}]}
@@ -332,14 +332,14 @@ def test_a_job_of_somebody_else_is_left_alone(make_scene, deleting):
 
 
 def observed(scene):
-    """Return the job of a scene, what is observed of it, and the layout."""
+    """Return the job of a scene, its observed state, and the layout."""
     job = accept(scene.raw)
     sources = {each: scene.there.get((each.kind.value, each.name)) for each in references(job)}
     return job, replace(observe(job, Objects(**scene.objects)), sources=sources), scene.layout
 
 
 def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accepted):
-    """A cache holds digests; each reading moves a megabyte."""
+    """A cache holds only digests, and each full read transfers a megabyte."""
     to_plan, planned, waits = make_scene(), accepted(), make_scene(simulators=WORLD)
 
     assert wants_whole(*observed(to_plan), Lacking.TEXTS)
@@ -349,12 +349,12 @@ def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accep
 
 
 def test_a_job_that_lacks_references_is_read_whole_even_while_it_waits(make_scene):
-    """What it waits for may be among what it lacks."""
+    """The object that it waits for may be among the missing references."""
     assert wants_whole(*observed(make_scene(simulators=WORLD)), Lacking.FIELDS)
 
 
 def test_a_job_that_has_failed_is_not_read_again(make_scene):
-    """Of a refused job nothing was ever made, and nothing ever will be."""
+    """A refused job never gets an object."""
     scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "no world"}}, GROUPS[1]])
     scene.settle()
 
@@ -362,7 +362,7 @@ def test_a_job_that_has_failed_is_not_read_again(make_scene):
 
 
 def test_a_claim_that_only_the_initial_policy_names_counts_as_there(make_scene):
-    """The operator does not create it, so a Job that mounts it lacks nothing."""
+    """The operator does not create that claim, so a Job that mounts it is complete."""
     scene = make_scene(trainer=INITIAL)
     scene.there[("PersistentVolumeClaim", "runs")] = {"metadata": {"name": "runs", "labels": OPEN}}
     scene.settle()
@@ -385,7 +385,7 @@ COSTLY = "spec.simulators[0].world.inline: its check takes more than its budget"
     ],
 )
 def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
-    """It was checked elsewhere, so the bytes of the world do not matter here."""
+    """Another process has checked the world, so its bytes are not read here."""
     scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "not read"}}, GROUPS[1]])
     job = accept(scene.raw)
     [world] = worlds_to_check(job, observe(job, Objects()), scene.layout)
@@ -399,7 +399,7 @@ def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
 
 
 def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
-    """Its owner could have the operator check another one as often as the ConfigMap changes."""
+    """The owner of the ConfigMap could otherwise cause a costly check with every change of it."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     job = accept(scene.raw)
@@ -414,7 +414,7 @@ def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
 
 
 def test_a_job_whose_worlds_wait_is_not_read_again(make_scene):
-    """It may be large, and nothing else is decided before its worlds are checked."""
+    """The job may be large, and nothing else is decided before its worlds are checked."""
     scene = make_scene(simulators=WORLD)
     job = accept(scene.raw)
     observed = replace(observe(job, Objects()), worlds_wait=True)

@@ -1,4 +1,4 @@
-"""Pods to which a mesh or an agent has added a container, before or beside the trainer."""
+"""A mesh or an agent adds a container to a pod, before the trainer or next to it."""
 
 import pytest
 
@@ -10,7 +10,7 @@ PROXY = {"name": "istio-proxy", "image": "proxy"}
 
 
 def add_proxy(scene, pod):
-    """Put a running proxy before the trainer, as Istio does without native sidecars."""
+    """Add a running proxy before the trainer, as Istio does without native sidecars."""
     pod["spec"]["containers"].insert(0, PROXY)
     running = {"running": {"startedAt": scene.node_stamp()}}
     pod["status"]["containerStatuses"].insert(0, {"name": "istio-proxy", "ready": True, "state": running})
@@ -18,7 +18,7 @@ def add_proxy(scene, pod):
 
 @pytest.fixture
 def with_proxy(training):
-    """`with_proxy()`: a job that trains in a pod with a proxy, and that pod."""
+    """`with_proxy()` returns a job that trains in a pod with a proxy, and that pod."""
 
     def make(**spec):
         scene, pod = training(**spec)
@@ -31,7 +31,7 @@ def with_proxy(training):
 
 
 def end_trainer(scene, pod, code, message=""):
-    """End the trainer; the proxy, and so the pod, goes on."""
+    """End the trainer; the proxy, and so the pod, keeps running."""
     proxy = pod["status"]["containerStatuses"][0]
     scene.container(pod, "trainer", code=code, message=message)
     others = [each for each in pod["status"]["containerStatuses"] if each is not proxy]
@@ -39,7 +39,7 @@ def end_trainer(scene, pod, code, message=""):
 
 
 def test_a_pod_that_a_proxy_keeps_alive_says_so(with_proxy, last_word):
-    """Its simulators run on, and no Job ends."""
+    """Its simulators keep running, and no Job ends."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
 
@@ -51,7 +51,7 @@ def test_a_pod_that_a_proxy_keeps_alive_says_so(with_proxy, last_word):
 
 
 def test_a_job_ends_with_its_trainer_and_its_pod_is_ended_after_a_bound(with_proxy, last_word):
-    """The result is the trainer's, though the API server calls the Job failed."""
+    """The trainer determines the result, although the API server reports the Job as failed."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
     scene.settle()
@@ -70,7 +70,7 @@ def test_a_job_ends_with_its_trainer_and_its_pod_is_ended_after_a_bound(with_pro
 
 @pytest.mark.parametrize(("code", "reason"), [(80, "SimulatorBudgetSpent"), (2, "ConfigurationRefused")])
 def test_an_end_that_is_not_retried_is_the_trainers_too(with_proxy, last_word, code, reason):
-    """The Job's own rule applies only once all containers have ended."""
+    """The Job's own rule applies only after all containers have ended."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, code, last_word(reason=f"{reason}: it"))
     scene.settle()
@@ -81,7 +81,7 @@ def test_an_end_that_is_not_retried_is_the_trainers_too(with_proxy, last_word, c
 
 
 def test_a_trainer_that_is_retried_gets_a_new_pod_and_counts_once(with_proxy):
-    """An eviction ends the proxy."""
+    """The eviction of the pod ends the proxy."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 1)
     scene.settle()
@@ -93,7 +93,7 @@ def test_a_trainer_that_is_retried_gets_a_new_pod_and_counts_once(with_proxy):
 
 
 def test_a_proxy_that_fails_after_the_trainer_was_done_fails_no_training(with_proxy, last_word):
-    """A proxy that is stopped by a signal makes the whole pod fail, and its Job would try again."""
+    """A proxy that a signal stops makes the whole pod fail, and its Job would retry."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
     pod["status"]["phase"] = "Failed"
@@ -116,7 +116,7 @@ def test_a_job_that_failed_because_of_a_proxy_has_succeeded(with_proxy, last_wor
 
 
 def test_the_memory_of_a_proxy_is_not_that_of_a_simulator(training):
-    """The remedy of a simulator would raise the wrong limit."""
+    """A simulator's remedy would raise the wrong limit."""
     scene, pod = training()
     pod["spec"]["initContainers"].insert(0, {**PROXY, "restartPolicy": "Always"})
     scene.container(pod, "istio-proxy", waiting="CrashLoopBackOff", code=137, reason="OOMKilled", restarts=3)

@@ -1,4 +1,4 @@
-"""From the first look at a job to its end: what is created, in which order, and what is said."""
+"""The life of a job: which objects are created, in which order, and what the status and the events report."""
 
 from datetime import UTC, datetime
 
@@ -16,7 +16,7 @@ def kinds(decision):
 
 
 def test_nothing_is_created_before_the_status_holds_the_images(make_scene):
-    """An operator of another release may carry on after any write, and must plan the same."""
+    """After any write, an operator of another release may take over and must plan the same objects."""
     scene = make_scene()
 
     first = scene.step()
@@ -33,16 +33,8 @@ MUJOCO = [
 ]
 
 
-def test_only_a_job_with_mujoco_holds_its_image(make_scene):
-    """A release that does not know the driver refuses a status with that field."""
-    held, without = make_scene(simulators=MUJOCO).step(), make_scene().step()
-
-    assert held.status.release.mujoco == "mujoco:1"
-    assert without.status.release.mujoco is None
-
-
 def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
-    """As every other image of the job."""
+    """This is the rule for every other image of the job."""
     scene = make_scene(simulators=MUJOCO)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -54,7 +46,7 @@ def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
 
 
 def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
-    """The job was accepted with them; they are fixed for its whole life."""
+    """The job was accepted with these images, and keeps them for its whole life."""
     scene = make_scene(replicas=2)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -66,7 +58,7 @@ def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
 
 
 def test_a_newer_release_leaves_what_is_there_alone(training):
-    """Whatever it would call its ConfigMaps, the running pods mount the old ones."""
+    """The running pods mount the old ConfigMaps, even if the new release would name them otherwise."""
     scene, _ = training()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
     scene.objects["config_maps"][0]["metadata"]["name"] = "named-by-an-older-release"
@@ -84,26 +76,6 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
     assert kinds(scene.step()) == ["ConfigMap"]
 
 
-def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
-    """It held each simulator's own world; its name, which the Job mounts, has a hash of them."""
-    world = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
-    stored = {"world": world, "recycle": {"afterResets": 24}}  # the default then, written out
-    scene, _ = training(
-        simulators=[
-            {"name": "collect", "role": "Collect", **stored},
-            {"name": "evaluate", "role": "Evaluate", **stored},
-        ]
-    )
-    scene.objects["config_maps"].clear()
-    volume = scene.job()["spec"]["template"]["spec"]["volumes"][0]
-    volume["configMap"]["name"] = "job-0-6311dc3b59"  # what a5276f3 called it
-
-    [made] = [each.object for each in scene.step().actions]
-
-    assert made["metadata"]["name"] == "job-0-6311dc3b59"
-    assert made["data"].keys() == {"training.yaml", "collect-0.wbt", "evaluate-0.wbt"}
-
-
 def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
     """Planning a complete replica again would take time from other jobs."""
     scene = accepted(replicas=3)
@@ -116,7 +88,7 @@ def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
 
 
 def test_a_job_that_trains_says_so(training):
-    """In its phase, its columns and its conditions."""
+    """The phase, the columns and the conditions show it."""
     scene, _ = training()
 
     held = {each.type.value: each.status.value for each in scene.status.conditions}
@@ -128,7 +100,7 @@ def test_a_job_that_trains_says_so(training):
 
 
 def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
-    """With what the trainers said last."""
+    """The status has the last report of each trainer."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -145,7 +117,7 @@ def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
 
 
 def test_the_last_word_is_waited_for(training, last_word):
-    """The Job's end may be seen before the pod's: they come by two watches."""
+    """Two watches report the Job's end and the pod's, in any order."""
     scene, pod = training()
     scene.end_job("Complete")
     decision = scene.step(1)
@@ -159,7 +131,7 @@ def test_the_last_word_is_waited_for(training, last_word):
 
 
 def test_the_last_word_is_not_waited_for_for_ever(training):
-    """A pod may be gone, or stuck on a lost node."""
+    """The pod may be gone, or remain on a lost node."""
     scene, _ = training()
     scene.end_job("Complete")
     scene.step()
@@ -170,7 +142,7 @@ def test_the_last_word_is_not_waited_for_for_ever(training):
 
 
 def test_a_replica_that_failed_does_not_stop_the_others(accepted):
-    """They are trainings of their own."""
+    """Each replica is a training of its own."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -185,7 +157,7 @@ def test_a_replica_that_failed_does_not_stop_the_others(accepted):
 
 
 def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, last_word):
-    """And says how many, and why the first."""
+    """The message has the number of failed replicas and the reason of the first."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.end(pods[0], 81, last_word(reason="Diverged: NaN"))
@@ -201,7 +173,7 @@ def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, las
 
 
 def test_a_replica_that_has_ended_is_never_planned_again(training, last_word):
-    """Deleting its Job, or waiting for something to clean it up, must not train anew."""
+    """A replica must not train again because its Job was deleted, by a person or by a cleanup."""
     scene, pod = training(replicas=1)
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -226,7 +198,7 @@ def test_a_job_that_somebody_deleted_is_made_again_once_its_pods_are_gone(traini
 
 
 def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
-    """Kubernetes deletes the pods; their time is not counted from then on."""
+    """Kubernetes deletes the pods, and their time counts no longer."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
 
@@ -241,7 +213,7 @@ def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
 
 
 def test_resuming_goes_on_and_counts_on(training):
-    """The pod that follows is no disruption."""
+    """The next pod is not counted as a disruption."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
@@ -265,7 +237,7 @@ def test_resuming_goes_on_and_counts_on(training):
 
 
 def test_a_job_that_is_born_suspended_is_planned_suspended(accepted):
-    """Its objects are there to be read; no pod is."""
+    """Its objects exist and can be read, but it has no pod."""
     scene = accepted(suspend=True)
 
     assert scene.job()["spec"]["suspend"] is True
@@ -274,7 +246,7 @@ def test_a_job_that_is_born_suspended_is_planned_suspended(accepted):
 
 
 def test_with_a_queue_suspension_is_left_to_kueue(make_scene):
-    """Whatever it does to the Job, nothing is written back."""
+    """Whatever Kueue does to the Job, the operator writes nothing back."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -288,7 +260,10 @@ def test_with_a_queue_suspension_is_left_to_kueue(make_scene):
 
 
 def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
-    """A namespace may have a default queue: what Kueue suspends then is not resumed, or they would fight."""
+    """A namespace may have a default queue.
+
+    If Kueue suspends a Job there, resuming it would start a fight.
+    """
     scene = accepted()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
     scene.job()["spec"]["suspend"] = True
@@ -298,7 +273,7 @@ def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
 
 
 def test_a_suspension_that_kueue_ignores_is_reported(training):
-    """In a queue Kueue decides, also if the queue is only the namespace's default."""
+    """In a queue only Kueue decides, even if it is the default queue of the namespace."""
     scene, _ = training()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
     scene.raw["spec"]["suspend"] = True
@@ -310,7 +285,7 @@ def test_a_suspension_that_kueue_ignores_is_reported(training):
 
 
 def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
-    """And woken for it: nothing else may happen until then."""
+    """The job is scheduled for that time, because no other change may cause a reconcile."""
     scene, pod = training(ttlSecondsAfterFinished=60)
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -323,7 +298,7 @@ def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
 
 
 def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
-    """It may change; the status says which generation it has seen."""
+    """The field may change; the status has the generation that the operator has seen."""
     scene, pod = training()
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -338,7 +313,7 @@ def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
 
 
 def test_a_pod_that_only_says_to_be_the_replicas_is_waited_for(accepted, last_word):
-    """It may write to the volume; what it tells is not believed."""
+    """It may write to the volume, so it must end first; its report is ignored."""
     scene = accepted()
     pod = scene.running_pod()
     scene.end(pod, 0, last_word(step=9, success_rate=1.0))

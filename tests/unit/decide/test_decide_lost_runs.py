@@ -13,7 +13,7 @@ WORD = "palaestra.dev/restart-lost-runs"
 
 
 def trained(training, **spec):
-    """Return a scene whose replica has trained 21,812 steps and was suspended then."""
+    """Return a scene whose replica has trained 21,812 steps and was then suspended."""
     scene, pod = training(**spec)
     scene.poll(pod, step=21812, last_checkpoint=SAVED)
     scene.settle()
@@ -34,7 +34,7 @@ def resume(scene):
 
 
 def emptied(training):
-    """Return a scene whose second attempt found an empty run directory, and its pod."""
+    """Return a scene whose second attempt found an empty run directory, and the pod of that attempt."""
     scene = trained(training)
     resume(scene)
     pod = scene.running_pod()
@@ -44,7 +44,7 @@ def emptied(training):
 
 
 def test_a_trained_replica_without_its_claim_is_held(training):
-    """A new claim would be empty, and the training would begin at step 0 without a word."""
+    """A new claim would be empty, and the training would silently begin at step 0."""
     scene = trained(training)
     scene.objects["claims"].clear()
 
@@ -72,7 +72,7 @@ def test_a_job_with_a_lost_run_needs_a_person(training):
 
 
 def test_a_claim_that_is_lost_between_two_pods_suspends_the_job(training):
-    """The Job's next pod would wait for the claim, and train from step 0 once it is there."""
+    """The Job's next pod would wait for the claim, and train from step 0 as soon as it exists."""
     scene, pod = training()
     scene.poll(pod, step=500)
     scene.settle()
@@ -87,7 +87,7 @@ def test_a_claim_that_is_lost_between_two_pods_suspends_the_job(training):
 
 
 def test_a_restored_claim_ends_the_hold(training):
-    """The run is there again."""
+    """The run is available again."""
     scene = trained(training)
     claims = list(scene.objects["claims"])
     scene.objects["claims"].clear()
@@ -102,7 +102,7 @@ def test_a_restored_claim_ends_the_hold(training):
 
 
 def test_a_person_s_word_begins_at_step_zero_again(training):
-    """The status and an event report it; the steps before count for nothing."""
+    """The status and an event report it; the earlier steps no longer count."""
     scene = trained(training)
     scene.objects["claims"].clear()
     resume(scene)
@@ -134,7 +134,7 @@ def test_reports_of_the_pods_before_do_not_count_after_a_restart(training, last_
 
 
 def test_a_word_has_one_effect(training):
-    """The annotation stays on the job, and another loss needs another word."""
+    """The annotation stays on the job; another loss needs a new value."""
     scene = trained(training)
     scene.raw["metadata"]["annotations"] = {WORD: "before the loss"}
     scene.settle()
@@ -147,7 +147,7 @@ def test_a_word_has_one_effect(training):
 
 
 def test_an_emptied_run_directory_is_noticed(training):
-    """The trainer finds no record of earlier attempts, and so calls its attempt the first."""
+    """The trainer finds no record of earlier attempts, so it reports attempt 1."""
     scene, _ = emptied(training)
 
     decision = scene.step()
@@ -160,7 +160,7 @@ def test_an_emptied_run_directory_is_noticed(training):
 
 
 def test_an_emptied_run_waits_after_its_pod_has_saved(training, last_word):
-    """The suspension makes the trainer save a few steps, which do not replace the lost ones."""
+    """On suspension the trainer saves its few steps, which do not replace the lost ones."""
     scene, pod = emptied(training)
     scene.settle()
     saved = CheckpointStatus(step=120, time="2026-01-31T12:00:00Z")
@@ -174,7 +174,7 @@ def test_an_emptied_run_waits_after_its_pod_has_saved(training, last_word):
 
 
 def test_a_restart_continues_with_what_an_emptied_run_directory_holds_then(training):
-    """So a person may restore the files before."""
+    """A person may restore the files before the restart."""
     scene, _ = emptied(training)
     scene.settle()
     scene.objects["pods"].clear()
@@ -195,7 +195,7 @@ def test_a_restart_continues_with_what_an_emptied_run_directory_holds_then(train
     ],
 )
 def test_a_job_without_claims_of_its_own_lacks_none(make_scene, storage):
-    """An ephemeral run goes with its pod, and an existing claim is checked by its name."""
+    """An ephemeral run is deleted with its pod, and an existing claim is checked by its name."""
     scene = make_scene(storage=storage)
     scene.there["PersistentVolumeClaim", "runs"] = {
         "metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}
@@ -210,7 +210,7 @@ def test_a_job_without_claims_of_its_own_lacks_none(make_scene, storage):
 
 
 def test_a_replica_that_has_not_trained_gets_a_new_claim(training):
-    """Nothing is lost with an empty claim."""
+    """An empty claim loses nothing."""
     scene, _ = training()
     scene.objects["claims"].clear()
 

@@ -1,4 +1,4 @@
-"""A TrainingJob that is made again under its name while a pod of the one before still terminates."""
+"""A TrainingJob is created again under its name while a pod of the old one still terminates."""
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
@@ -9,7 +9,7 @@ CLAIM = {"kind": "PersistentVolumeClaim", "metadata": {"labels": {"palaestra.dev
 
 
 def made_again(make_scene, *, replica=0, **spec):
-    """Return a job whose replicas are to be created, with a pod of its forerunner on a lost node."""
+    """Return a job whose replicas are to be created; a pod of its predecessor is on a lost node."""
     scene = make_scene(**spec)
     scene.there[("PersistentVolumeClaim", "shared")] = CLAIM
     old = make_scene(**spec)
@@ -29,21 +29,21 @@ def jobs(decision):
 
 
 def test_a_pod_of_an_earlier_job_holds_up_nothing(make_scene):
-    """Its claim has the earlier uid in its name: the two never write to one volume."""
+    """The claim's name has the uid of its job, so the two never write to one volume."""
     scene, _ = made_again(make_scene, replicas=2)
 
     assert jobs(scene.settle()) == ["job-0", "job-1"]
 
 
 def test_a_pod_on_the_claim_that_both_name_holds_up_its_own_replica_only(make_scene):
-    """Two pods of one replica would write to one run; the others are trainings of their own."""
+    """Two pods of one replica would write to one run; the other replicas are separate trainings."""
     scene, _ = made_again(make_scene, replicas=2, **SHARED)
 
     assert jobs(scene.settle()) == ["job-1"]
 
 
 def test_a_replica_that_waits_for_an_old_pod_says_so(make_scene):
-    """With pod, claim and node, and as a warning: a lost node is a person's to look after."""
+    """A warning has pod, claim and node, because only a person can repair a lost node."""
     scene, pod = made_again(make_scene, **SHARED)
 
     decision = scene.settle()
@@ -56,24 +56,9 @@ def test_a_replica_that_waits_for_an_old_pod_says_so(make_scene):
 
 
 def test_the_replica_starts_when_the_old_pod_has_ended(make_scene):
-    """Nobody has to do anything else."""
+    """No other action is needed."""
     scene, pod = made_again(make_scene, **SHARED)
     scene.settle()
     pod["status"]["phase"] = "Failed"
 
     assert jobs(scene.settle()) == ["job-0"]
-
-
-def test_a_job_that_is_made_again_keeps_the_claim_of_an_earlier_release(make_scene):
-    """That release did not bound the claim's name; the run must not begin again on another claim."""
-    scene, name = make_scene(), "quadruped-blind-locomotion-rough-terrain-ppo-a"
-    scene.raw["metadata"]["name"] = name
-    before = f"{name}-0-{scene.raw['metadata']['uid']}"
-    scene.objects["claims"].append({"kind": "PersistentVolumeClaim", "metadata": {"name": before}})
-
-    scene.settle()
-
-    [job] = scene.objects["jobs"]
-    volumes = job["spec"]["template"]["spec"]["volumes"]
-    assert {"claimName": before} in [each.get("persistentVolumeClaim") for each in volumes]
-    assert len(scene.objects["claims"]) == 1

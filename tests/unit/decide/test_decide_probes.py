@@ -1,4 +1,4 @@
-"""A trainer that starts slowly, and one that the kubelet ended because a probe failed."""
+"""A trainer that starts slowly, and one that the kubelet ends because a probe failed."""
 
 import pytest
 
@@ -13,7 +13,7 @@ SIGNALLED = "SIGTERM: ending; nothing was started"
 
 @pytest.fixture
 def start_slowly(accepted):
-    """`start_slowly()`: a job whose trainer runs and has not answered its startup probe, and the pod."""
+    """`start_slowly()` returns a job whose trainer has not passed its startup probe, and the pod."""
 
     def make(**spec):
         scene = accepted(**spec)
@@ -26,7 +26,7 @@ def start_slowly(accepted):
 
 
 def end_by_probe(scene, pod, words=LIVENESS, code=75):
-    """Let the kubelet end the trainer of a pod, and write why."""
+    """Let the kubelet end the trainer of a pod, and emit the event with the reason."""
     scene.end(pod, code, SIGNALLED)
     event = {"involvedObject": {"uid": pod["metadata"]["uid"]}, "reason": "Killing", "message": words}
     scene.objects["events"].append({**event, "lastTimestamp": scene.stamp()})
@@ -38,7 +38,7 @@ def running(scene):
 
 
 def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
-    """Importing PyTorch takes minutes on a busy node, and nothing is trained meanwhile."""
+    """The import of PyTorch takes minutes on a busy node, and nothing is trained meanwhile."""
     scene, _ = start_slowly()
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "Starting")
@@ -48,7 +48,7 @@ def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
 
 @pytest.mark.parametrize("answer", ["to the kubelet", "to the operator"])
 def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
-    """The kubelet's report and the operator's own request may come in any order."""
+    """The kubelet's report and the operator's own poll may come in any order."""
     scene, pod = start_slowly()
     if answer == "to the kubelet":
         pod["status"]["containerStatuses"][0]["started"] = True
@@ -60,7 +60,7 @@ def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
 
 
 def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly):
-    """A trainer that hangs in an import is not past its start."""
+    """A trainer that hangs in an import has not started."""
     scene, _ = start_slowly(startTimeoutSeconds=600)
 
     scene.settle(601)
@@ -71,7 +71,7 @@ def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly)
 
 @pytest.mark.parametrize(("words", "probe"), [(LIVENESS, "liveness"), (STARTUP, "startup")])
 def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words, probe):
-    """The pod itself does not show who sent the signal; only the kubelet's event does."""
+    """The pod does not show who sent the signal; only the kubelet's event does."""
     scene, pod = training()
     end_by_probe(scene, pod, words)
 
@@ -84,13 +84,13 @@ def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words,
 
 
 def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training):
-    """Its Job ignores exit code 75, so that such pods would follow each other for ever."""
+    """The Job ignores exit code 75, so it would replace such pods for ever."""
     scene, pod = training()
     end_by_probe(scene, pod)
 
     decision = scene.settle()
     scene.settle(60)
-    scene.objects["events"].clear()  # nothing is asked about an older pod
+    scene.objects["events"].clear()  # the operator requests no events of an older pod
     scene.running_pod()
     scene.settle()
 
@@ -102,7 +102,7 @@ def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training)
 
 
 def test_probes_end_a_replica_after_backoff_limit_retries(training):
-    """The limit is of retries: n + 1 pods, as for a pod that fails by itself."""
+    """The limit counts retries, so n + 1 pods are allowed, as for a pod that fails by itself."""
     scene, pod = training(backoffLimit=2)
     for _ in range(2):
         end_by_probe(scene, pod)
@@ -119,7 +119,7 @@ def test_probes_end_a_replica_after_backoff_limit_retries(training):
 
 
 def test_a_trainer_that_its_probe_killed_keeps_its_reason_when_the_next_pod_is_there(training):
-    """Its Job counts exit code 137 itself; the event is about an older pod then, and is not read again."""
+    """The Job counts exit code 137 itself; the event is about an older pod by then, and is not read again."""
     scene, pod = training()
     end_by_probe(scene, pod, code=137)
     decision = scene.settle()
@@ -132,11 +132,11 @@ def test_a_trainer_that_its_probe_killed_keeps_its_reason_when_the_next_pod_is_t
 
     assert not [action for action in decision.actions if isinstance(action, Replace)]
     assert scene.replica().last_attempt.reason == "ProbeFailed"
-    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (1, None)
+    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (1, 0)
 
 
 def test_a_deleted_pod_was_not_ended_by_its_probe(training):
-    """The kubelet writes that it stops the container, and that is no failed probe."""
+    """The kubelet's event only reports that it stops the container, not that a probe failed."""
     scene, pod = training()
     scene.delete(pod)
     end_by_probe(scene, pod, "Stopping container trainer")
@@ -144,12 +144,12 @@ def test_a_deleted_pod_was_not_ended_by_its_probe(training):
     scene.settle()
 
     assert scene.replica().last_attempt.reason == "Disrupted"
-    assert scene.replica().restarts.operator is None
+    assert scene.replica().restarts.operator == 0
 
 
 @pytest.mark.parametrize("saved", [False, True])
 def test_the_next_pod_resumes_only_where_there_is_a_checkpoint(training, saved):
-    """An attempt that was ended before it began has saved nothing."""
+    """An attempt that ended before it began has saved nothing."""
     scene, pod = training()
     checkpoint = CheckpointStatus(step=5, time="2026-01-31T12:00:00Z") if saved else None
     scene.poll(pod, step=5, last_checkpoint=checkpoint)

@@ -1,4 +1,4 @@
-"""What holds for every job, whatever a cluster shows of it and in whatever order."""
+"""These properties hold for every job, whatever objects a cluster has and in whatever order they appear."""
 
 from copy import deepcopy
 from datetime import UTC, datetime, timedelta
@@ -40,7 +40,7 @@ counts = st.integers(0, 2**53)
 
 
 def maybe(strategy):
-    """Return a strategy of what is mostly right and sometimes anything."""
+    """Return a strategy of values that are mostly valid and sometimes arbitrary."""
     return st.one_of(strategy, strategy, strategy, garbage)
 
 
@@ -86,7 +86,7 @@ states = st.one_of(
 
 
 def container_status(name):
-    """Return what a kubelet may say of a container."""
+    """Return a container status as a kubelet may write it."""
     return st.fixed_dictionaries(
         {
             "name": st.just(name),
@@ -114,7 +114,7 @@ def conditions(*kinds):
 
 @st.composite
 def pods(draw, planned):
-    """Return a pod of a replica, as odd as it may be."""
+    """Return a pod of a replica, however odd."""
     template = planned["spec"]["template"]
     number = draw(st.integers(0, 3))
     spec = trimmed({"kind": "Pod", **deepcopy(template)})["spec"]
@@ -185,7 +185,7 @@ events = st.fixed_dictionaries(
 
 @st.composite
 def clusters(draw, planned):
-    """Return what a cluster may show of a job."""
+    """Return the objects that a cluster may have of a job."""
     jobs = []
     for each in planned.replicas.values():
         if draw(st.booleans()):
@@ -245,7 +245,7 @@ histories = st.lists(st.tuples(clusters(PLANNED), st.integers(0, 700)), min_size
 
 
 def decisions(history):
-    """Yield each decision of a history, with the status before it and what was seen."""
+    """Yield each decision of a history, with the status before it, the objects and the times."""
     first = one(raw(), Objects())
     status, times = as_data(first.status), Times(now=START, clock_s=CLOCK_S, record=first.record)
     for objects, seconds in history:
@@ -260,7 +260,7 @@ def decisions(history):
 @settings(max_examples=30)
 @given(histories)
 def test_deciding_again_says_nothing_new(history):
-    """Level-triggered: the status that came out, and the same objects, lead to the same status."""
+    """The operator is level-triggered: the new status with the same objects gives the same status."""
     for _, objects, times, decision in decisions(history):
         again = one(raw(as_data(decision.status)), objects, times)
 
@@ -272,7 +272,7 @@ def test_deciding_again_says_nothing_new(history):
 @settings(max_examples=30)
 @given(histories)
 def test_an_end_is_an_end(history):
-    """Neither a job nor a replica leaves a terminal phase, and neither is planned again."""
+    """No job and no replica leaves a terminal phase or is planned again."""
     for before, _, _, decision in decisions(history):
         ended = {each.index for each in before.replicas if each.phase in TERMINAL}
         now_ended = {each.index for each in decision.status.replicas if each.phase in TERMINAL}
@@ -287,7 +287,7 @@ def test_an_end_is_an_end(history):
 @settings(max_examples=30)
 @given(histories)
 def test_counts_never_fall_and_always_add_up(history):
-    """The attempt's number is one more than what was replaced, by cause."""
+    """The number of the attempt is one more than the sum of the restarts of all causes."""
     for before, _, _, decision in decisions(history):
         for old, new in zip(before.replicas, decision.status.replicas, strict=False):
             was, now = old.restarts, new.restarts
@@ -302,14 +302,17 @@ def test_counts_never_fall_and_always_add_up(history):
 
 
 def kept(replica):
-    """Return the number of the attempt that is remembered, 0 for none."""
+    """Return the number of the remembered attempt, or 0."""
     return replica.last_attempt.attempt if replica.last_attempt else 0
 
 
 @settings(max_examples=30)
 @given(histories)
 def test_phase_and_conditions_tell_the_same(history):
-    """One of them at most is true, and it is the phase's; and the job is as its spec asks, or is not."""
+    """At most one of these conditions is true, and it is that of the phase.
+
+    The same holds for Reconciling and Stalled.
+    """
     for _, _, _, decision in decisions(history):
         status = decision.status
         held = {each.type.value for each in status.conditions if each.status == "True"}
@@ -326,7 +329,7 @@ def test_phase_and_conditions_tell_the_same(history):
 @settings(max_examples=30)
 @given(histories)
 def test_what_is_written_is_within_the_bounds_of_the_definition(history):
-    """An API server refuses the whole status for one text that is too long, or one number too large."""
+    """An API server refuses the whole status if one text is too long or one number too large."""
     for _, _, _, decision in decisions(history):
         assert accept(raw(as_data(decision.status))).status == decision.status
         for happening in decision.events:
@@ -337,7 +340,7 @@ def test_what_is_written_is_within_the_bounds_of_the_definition(history):
 @settings(max_examples=30)
 @given(st.lists(garbage, max_size=3), st.lists(garbage, max_size=3))
 def test_garbage_is_as_good_as_nothing(things, others):
-    """One bad object must not delay another, whatever it is."""
+    """One invalid object must not delay any other."""
     objects = Objects(jobs=things, pods=others, claims=things, events=others, config_maps=things)
 
     assert one(raw(), objects).status.phase is Phase.PENDING

@@ -1,4 +1,4 @@
-"""Attempts and restarts: exact, whatever was seen of what happened, and never falling."""
+"""The counts of attempts and restarts are exact, whatever the operator has seen, and never decrease."""
 
 import pytest
 from hypothesis import given
@@ -8,14 +8,14 @@ from palaestra.decide import Stop
 
 
 def restarts(scene):
-    """Return attempt, and restarts by trainer, disruption and suspension."""
+    """Return the attempt, and the restarts by trainer, disruption, suspension and simulator."""
     replica = scene.replica()
     counts = replica.restarts
     return replica.attempt, counts.trainer, counts.disruption, counts.suspension
 
 
 def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
-    """The last failure of all is none."""
+    """The last failure causes no restart."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -30,7 +30,7 @@ def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
 
 
 def test_a_pod_that_was_taken_is_a_disruption(training):
-    """It does not count against backoffLimit."""
+    """A disruption does not count against backoffLimit."""
     scene, pod = training()
     scene.take(pod)
     scene.pass_(5)
@@ -42,7 +42,7 @@ def test_a_pod_that_was_taken_is_a_disruption(training):
 
 
 def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
-    """It is gone without a trace, and another is there."""
+    """The pod is gone without a trace, and another one exists."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(5)
@@ -54,7 +54,7 @@ def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
 
 
 def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
-    """The Job has booked it."""
+    """The Job has counted it as a failure."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.count_failures(1)
@@ -67,7 +67,7 @@ def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
 
 
 def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
-    """The pods tell themselves; the two come by two watches."""
+    """The pods are sufficient; pods and Jobs come from two watches."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.pass_(15)
@@ -82,7 +82,7 @@ def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
 
 
 def test_a_pod_that_is_seen_late_is_not_needed_either(training):
-    """The Job's count waits for the pod that replaces."""
+    """The Job's count is kept until the pod is seen to be replaced."""
     scene, pod = training()
     scene.count_failures(1)
     scene.settle()
@@ -98,7 +98,7 @@ def test_a_pod_that_is_seen_late_is_not_needed_either(training):
 
 
 def test_what_happened_while_nobody_looked_is_counted(training, last_word):
-    """The failed pods stay; the run directory's record holds those that do not."""
+    """Failed pods stay in the cluster; the record in the run directory has the others."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -114,7 +114,7 @@ def test_what_happened_while_nobody_looked_is_counted(training, last_word):
 
 
 def test_a_record_that_cannot_be_true_is_not_believed(training):
-    """A pod may write what it likes."""
+    """A pod may write anything into its record."""
     scene, pod = training()
     scene.poll(pod, attempt=2**53)
 
@@ -124,7 +124,7 @@ def test_a_record_that_cannot_be_true_is_not_believed(training):
 
 
 def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simulator):
-    """A trainer counts within its attempt; its last word has what the last poll had not."""
+    """A trainer counts within its attempt; its last word may have more restarts than the last poll."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(restarts=2), simulator(name="evaluate-0", restarts=1)))
     scene.settle()
@@ -145,7 +145,7 @@ def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simula
 
 
 def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_word, simulator):
-    """They lie in the pods that failed."""
+    """The failed pods still have their termination messages."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(restarts=1),))
     scene.settle()
@@ -161,7 +161,7 @@ def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_wor
 
 
 def test_a_new_attempt_does_not_show_step_0(training, last_word):
-    """Until it has looked into its run directory it knows no better; the status does."""
+    """The trainer reports step 0 until it has read its run directory; the status keeps the known step."""
     scene, pod = training()
     scene.end(pod, 75, last_word(step=50, attempt=1))
     scene.settle(5)
@@ -177,13 +177,13 @@ def test_a_new_attempt_does_not_show_step_0(training, last_word):
 
 
 def tell_suspension(scene, status):
-    """Let the Job controller tell since when the Job is suspended, or is no more."""
+    """Set the condition by which the Job controller reports a suspension or its end."""
     turned = {"type": "Suspended", "status": status, "lastTransitionTime": scene.stamp()}
     scene.job().setdefault("status", {})["conditions"] = [turned]
 
 
 def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
-    """The Job controller makes the pod, then takes the time; a second can begin between the two."""
+    """The Job controller makes the pod and then takes the time; a second may pass between them."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -197,7 +197,7 @@ def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
 
 
 def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_its_end_is_dated(training):
-    """A Job controller that is busy takes the time of the resumption seconds after it has made the pod."""
+    """A busy Job controller may take the time of the resumption seconds after it has made the pod."""
     scene, _ = training()
     scene.job()["spec"]["suspend"] = True
     tell_suspension(scene, "True")
@@ -215,7 +215,7 @@ def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_
 
 
 def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(training):
-    """It would have been replaced anyway."""
+    """The pod would have been replaced anyway."""
     scene, pod = training()
     scene.take(pod)
     scene.settle(5)
@@ -233,7 +233,10 @@ def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(t
 
 
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
-    """They come by two watches; a resumption that is seen late must not count for the pod after that one."""
+    """Pods and Jobs come from two watches.
+
+    A resumption that is seen late must not count for the pod after that one.
+    """
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -253,7 +256,7 @@ def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
 
 
 def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training):
-    """The newest pod was there when the Job was suspended."""
+    """The newest pod already existed when the Job was suspended."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -267,7 +270,7 @@ def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training)
 
 
 def pause(scene, pod, *, resumes=True):
-    """Let the author suspend the job, and its controller delete the pod; with `resumes` resume it at once."""
+    """Suspend the job and delete its pod, as its controller does; with `resumes` resume it at once."""
     scene.raw["spec"]["suspend"] = True
     scene.settle()
     tell_suspension(scene, "True")
@@ -277,7 +280,7 @@ def pause(scene, pod, *, resumes=True):
 
 
 def resume(scene):
-    """Let the author resume the job, and its controller tell so."""
+    """Resume the job, and report it as the Job controller does."""
     scene.raw["spec"]["suspend"] = False
     scene.settle()
     tell_suspension(scene, "False")
@@ -295,7 +298,7 @@ def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
 
 
 def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_such(accepted):
-    """The cache of pods may lag; the patch that resumes the Job names the pod."""
+    """The cache of pods may be late; the patch that resumes the Job names the pod."""
     scene = accepted()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -312,7 +315,7 @@ def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_suc
 
 @pytest.mark.parametrize("how", ["taken", "deleted", "gone", "interrupted"])
 def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, training, last_word):
-    """It would have been replaced anyway."""
+    """The pod would have been replaced anyway."""
     scene, pod = training()
     if how == "taken":
         scene.take(pod)
@@ -337,7 +340,7 @@ def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, trainin
 
 
 def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
-    """The trainer had ended, and the Job has booked it."""
+    """The trainer had ended, and the Job has counted the failure."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -350,7 +353,7 @@ def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
 
 
 def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(training):
-    """The second one ended nothing, and does not make a disruption of the first."""
+    """The second suspension ended no pod, and does not turn the first into a disruption."""
     scene, pod = training()
     pause(scene, pod)
     scene.raw["spec"]["suspend"] = True
@@ -364,7 +367,7 @@ def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(tr
 
 
 def test_a_mark_is_counted_once(training):
-    """It stays on the Job; the next pod is another."""
+    """The mark stays on the Job, but names another pod than the next one."""
     scene, pod = training()
     pause(scene, pod)
     taken = scene.running_pod()
@@ -379,7 +382,7 @@ def test_a_mark_is_counted_once(training):
 
 
 def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(training):
-    """The mark names an earlier pod; Kueue writes none."""
+    """The mark names an earlier pod, and Kueue writes no mark."""
     scene, pod = training()
     pause(scene, pod)
     second = scene.running_pod()
@@ -394,29 +397,14 @@ def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(train
     assert restarts(scene) == (3, 0, 0, 2)
 
 
-def test_a_suspension_by_an_earlier_release_goes_by_its_times(training):
-    """That release wrote neither annotation; the upgrade came before the resumption."""
-    scene, pod = training()
-    pause(scene, pod, resumes=False)
-    scene.job()["metadata"].pop("annotations")
-    scene.settle(15)
-    scene.raw["metadata"]["generation"] = 2
-    resume(scene)
-    scene.running_pod()
-
-    scene.settle()
-
-    assert restarts(scene) == (2, 0, 0, 1)
-
-
 ENDS = ("failure", "taken", "deleted", "suspended")
 
 
 @given(st.lists(st.tuples(st.sampled_from(ENDS), st.booleans()), max_size=6))
 def test_the_counts_are_those_of_what_happened(accepted, lives):
-    """Each pod of a replica ends somehow, and an operator looks after some of them only.
+    """Each pod of a replica ends in some way, and an operator sees only some of the ends.
 
-    A pod that is deleted between two passes is still in the run directory's record.
+    A pod that is deleted between two reconciles is still in the record of the run directory.
     """
     scene = accepted(backoffLimit=100)
     truth = dict.fromkeys(ENDS, 0)
@@ -447,7 +435,7 @@ def test_the_counts_are_those_of_what_happened(accepted, lives):
     )
 )
 def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
-    """With the other causes they add up to the attempts, and no count ever falls."""
+    """Together with the other causes they add up to the attempts, and no count decreases."""
     scene = accepted(backoffLimit=100)
     truth, before, failures = dict.fromkeys(("failure", "taken", "paused"), 0), (0, 0, 0, 0), 0
     for end, seconds in lives:
@@ -460,7 +448,7 @@ def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
             pause(scene, pod)
         else:
             failures += _end(scene, pod, end, failures)
-            scene.pass_(10)  # as the Job controller does before the next pod
+            scene.pass_(10)  # the Job controller waits too before it makes the next pod
         truth["paused" if end == "late" else end] += 1
         counts = restarts(scene)
         assert counts[0] == 1 + sum(counts[1:])
@@ -474,7 +462,7 @@ def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
 
 
 def _end(scene, pod, end, failures):
-    """Let a pod end; return how many failures the Job books for it."""
+    """End a pod, and return the number of failures that the Job counts for it."""
     if end == "failure":
         scene.end(pod, 70)
         scene.count_failures(failures + 1)

@@ -1,4 +1,4 @@
-"""The status as people read it: columns, conditions, events."""
+"""The parts of the status that people read: columns, conditions, events."""
 
 import json
 
@@ -20,7 +20,7 @@ from palaestra_protocol.pod.status import (
 
 
 def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
-    """A job is as far as its last replica."""
+    """A job has advanced as far as its last replica."""
     scene = accepted(replicas=3)
     for index, (step, rate) in enumerate([(30, 0.9), (20, 0.5)]):
         scene.poll(scene.running_pod(index), step=step, success_rate=rate)
@@ -31,7 +31,7 @@ def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
 
 
 def test_what_is_not_known_is_absent_and_never_zero(training):
-    """A rate of 0 would be believed."""
+    """People would believe a rate of 0."""
     scene, _ = training()
 
     status, replica = scene.status, scene.replica()
@@ -39,7 +39,7 @@ def test_what_is_not_known_is_absent_and_never_zero(training):
 
 
 def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
-    """Unknown is unknown; the last known step is still the last known step."""
+    """The last known step stays true, but the speed is unknown."""
     scene, pod = training()
     scene.poll(pod, step=30, steps_per_second=20.0, mean_return=1.0)
     scene.settle()
@@ -52,7 +52,7 @@ def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
 
 
 def test_figures_have_the_four_decimals_that_people_read(training):
-    """`kubectl get` prints what the status holds, and one in three is no 0.3333333333333333."""
+    """`kubectl get` prints the value as it is stored, and nobody wants to read 0.3333333333333333."""
     scene, pod = training()
     scene.poll(pod, step=30, success_rate=1 / 3, mean_return=-0.0770739148936, steps_per_second=251.23456)
 
@@ -64,7 +64,7 @@ def test_figures_have_the_four_decimals_that_people_read(training):
 
 
 def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
-    """The next attempt reports none until its first evaluation."""
+    """The next attempt has no interval before its first evaluation."""
     scene, pod = training()
     scene.poll(pod, step=30, success_rate=0.9, success_interval=SuccessInterval(low=0.7, high=1, episodes=20))
     scene.settle()
@@ -77,7 +77,7 @@ def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
 
 
 def test_the_status_lists_simulators(training, simulator):
-    """With their last faults, on one line."""
+    """Each simulator has its last faults on one line."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
 
@@ -90,7 +90,7 @@ def test_the_status_lists_simulators(training, simulator):
 
 
 def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
-    """All replicas have the same worlds; the report outlives the pod that made it."""
+    """All replicas have the same worlds; the report remains after the pod that made it is gone."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in range(2)]
     scene.poll(pods[0])
@@ -106,7 +106,7 @@ def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
 
 
 def test_the_status_shows_goodput_and_faults(training, simulator):
-    """In whole seconds, if the trainer reports them; that of an older release does not."""
+    """In whole seconds, if the trainer reports them."""
     scene, pod = training()
     scene.poll(pod, step=1)
     scene.settle()
@@ -125,24 +125,14 @@ def test_the_status_shows_goodput_and_faults(training, simulator):
     assert (told.flapping, told.given_up, told.standby) == (True, True, "ready")
 
 
-@pytest.mark.parametrize(("seconds", "written"), [(0.4, None), (7.2, 7)])
-def test_recycling_is_written_once_there_was_some(training, seconds, written):
-    """Command lines of an older release refuse a field that they do not know."""
-    scene, pod = training()
-    scene.poll(pod, goodput={"stepping": 50.9, "recycling": seconds})
-    scene.settle()
-
-    assert scene.replica().goodput.recycling == written
-
-
 def test_every_cause_and_every_kind_of_fault_has_a_field():
-    """The operator reads by name what a trainer of this release tells."""
+    """The operator reads the values of a trainer by name."""
     assert {to_camel(cause) for cause in Cause} == {to_camel(name) for name in Goodput.model_fields}
     assert {kind.value for kind in FaultKind} == set(Faults.model_fields)
 
 
 def test_a_status_of_two_replicas_stays_small(accepted, simulator):
-    """People read it, and an API server keeps it: everything is at its longest here."""
+    """People read it and an API server stores it, so this test gives every field its longest value."""
     scene = accepted(replicas=2)
     fact = "x" * 500
     faults = tuple(
@@ -169,7 +159,7 @@ def test_a_status_of_two_replicas_stays_small(accepted, simulator):
 
 
 def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
-    """As the trainer wrote it; a time that no calendar of ours has is none."""
+    """The time is as the trainer wrote it; an impossible date is left out."""
     scene, pod = training()
     scene.poll(pod, last_checkpoint=CheckpointStatus(step=5, time="2026-01-31T11:59:00+01:00"))
     scene.settle()
@@ -193,7 +183,7 @@ def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(t
 
 
 def test_a_condition_keeps_the_time_at_which_it_last_changed(training):
-    """A new message is no transition."""
+    """A new message is not a transition."""
     scene, pod = training()
     before = scene.status.conditions[1]
     scene.poll(pod, step=1)
@@ -209,7 +199,7 @@ def messages(scene):
 
 
 def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits(accepted):
-    """`kubectl describe` printed the same 300 characters four times, and hid what counts."""
+    """`kubectl describe` printed the same 300 characters four times, which hid the important lines."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
 
@@ -227,7 +217,7 @@ def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits
 
 
 def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(accepted, last_word):
-    """As above; `palaestra watch` and the event read it there."""
+    """For the same reason; `palaestra watch` and the event get the message there."""
     scene = accepted()
     scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")
@@ -240,14 +230,14 @@ def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(acc
 
 
 def test_every_condition_keeps_the_reason_in_one_word(accepted):
-    """Programs that read any of them, and the column of `kubectl get`, go on finding it."""
+    """Programs that read any condition, and the column of `kubectl get`, still find the reason."""
     scene = accepted()
 
     assert {each.reason for each in scene.status.conditions[1:]} == {"Starting"}
 
 
 def test_the_start_is_that_of_the_first_pod_and_stays(training):
-    """Also when that pod is long gone."""
+    """The time remains after that pod is gone."""
     scene, _ = training()
     first = scene.status.start_time
     scene.objects["pods"].clear()
@@ -261,7 +251,7 @@ def test_the_start_is_that_of_the_first_pod_and_stays(training):
 
 
 def test_an_ephemeral_run_is_named_in_a_condition(accepted):
-    """It is a choice that somebody may have made by mistake."""
+    """A user may have chosen it by mistake."""
     scene = accepted(storage={"ephemeral": True})
 
     assert scene.status.conditions[0].message.endswith("; the run is ephemeral and goes with its pod")
@@ -293,7 +283,7 @@ def test_suspending_suspended_and_resumed_are_an_event_each(training):
 
 @pytest.mark.parametrize("replicas", [1, 2])
 def test_a_job_whose_replicas_all_fail_alike_says_why(accepted, last_word, replicas):
-    """Not only that they failed."""
+    """The message must have the common reason, not only the fact that they failed."""
     scene = accepted(replicas=replicas)
     for index in range(replicas):
         scene.end(scene.running_pod(index), 81, last_word(reason="Diverged: NaN"))
@@ -307,7 +297,7 @@ def test_a_job_whose_replicas_all_fail_alike_says_why(accepted, last_word, repli
 
 
 def test_nothing_is_planned_where_nothing_is_missing(training):
-    """Two hundred jobs are looked at every ten seconds; their worlds are generated once."""
+    """Two hundred jobs are reconciled every ten seconds, and their worlds are generated only once."""
     scene, _ = training()
     job = accept(scene.raw)
     prepared = prepare(job, observe(job, Objects(**scene.objects)), scene.layout)

@@ -1,4 +1,4 @@
-"""A status is written at once where people wait for it, and every half minute where it only moves on."""
+"""A change that people wait for is written at once; progress is written every half minute."""
 
 from copy import deepcopy
 
@@ -31,7 +31,7 @@ def changed(change):
 
 
 def test_what_is_equal_is_not_written():
-    """No request while nothing changes."""
+    """Without a change, the operator sends no request."""
     assert write_in_s(OLD, deepcopy(OLD), None) is None
 
 
@@ -43,7 +43,7 @@ def test_an_empty_list_is_not_written():
 
 
 def test_a_list_that_an_older_definition_adds_is_no_change():
-    """Else the operator would write the status again and again."""
+    """Otherwise the operator would write the status again and again."""
     added = deepcopy(OLD)
     added["replicas"][0]["memoryKills"] = []
 
@@ -51,7 +51,10 @@ def test_a_list_that_an_older_definition_adds_is_no_change():
 
 
 def test_active_time_is_written_with_what_else_changes():
-    """Alone it would be a write every half minute of a job that waits; with progress it costs none."""
+    """On its own it would cause a write every half minute for a waiting job.
+
+    With progress it costs nothing.
+    """
     active = {"activeSeconds": 30, "activeSince": "2026-01-31T12:00:30Z"}
 
     assert write_in_s(OLD, OLD | active, None) is None
@@ -74,7 +77,7 @@ def test_active_time_is_written_with_what_else_changes():
     ],
 )
 def test_progress_waits_for_half_a_minute(change):
-    """Two hundred jobs with a write every ten seconds would be twenty a second."""
+    """With a write every ten seconds, two hundred jobs would cause twenty writes a second."""
     new = changed(change)
 
     assert write_in_s(OLD, new, 29) == 1
@@ -83,7 +86,7 @@ def test_progress_waits_for_half_a_minute(change):
 
 
 def queued(words):
-    """Return the status of a job that waits in a queue, in Kueue's words."""
+    """Return the status of a job that waits in a queue, with Kueue's message."""
     told = {"reason": "Queued", "message": f"waits in queue trainings for Kueue: {words}"}
     conditions = [{"type": "Suspended", "status": "True", **told}]
     return {"phase": "Suspended", "conditions": conditions, "replicas": [{"index": 0, **told}]}
@@ -97,14 +100,14 @@ def queued(words):
     ],
 )
 def test_amounts_that_change_with_each_job_of_the_queue_are_written_as_progress(words, wait_s):
-    """A new shortage is news; its amount changes whenever another job comes or goes."""
+    """A new shortage is news, but its amount changes whenever another job comes or goes."""
     old = queued("cpu in flavor any-machine, 425m more needed")
 
     assert write_in_s(old, queued(words), 5) == wait_s
 
 
 def test_a_number_in_another_message_is_news():
-    """How often a sidecar has crashed, for instance."""
+    """An example is the number of crashes of a sidecar."""
     old = changed({"reason": "SidecarCrashLoop", "message": "crashed 3 times"})
 
     assert write_in_s(old, changed({"reason": "SidecarCrashLoop", "message": "crashed 4 times"}), 5) == 0
@@ -125,7 +128,7 @@ def test_a_number_in_another_message_is_news():
     ],
 )
 def test_what_people_wait_for_is_written_at_once(change):
-    """Phases, reasons, attempts, and the first numbers of a training."""
+    """These are phases, reasons, attempts and the first values of a training."""
     assert write_in_s(OLD, changed(change), 0) == 0
 
 
@@ -133,5 +136,5 @@ def test_what_people_wait_for_is_written_at_once(change):
     "old", [None, {}, "text", {"replicas": "none"}, {"replicas": ["none"]}, {"replicas": [{"index": 0}]}]
 )
 def test_whatever_the_api_server_holds_is_compared(old):
-    """The first status, or one that somebody has written over."""
+    """The old status may be absent, or overwritten by somebody."""
     assert write_in_s(old, OLD, 0) == 0

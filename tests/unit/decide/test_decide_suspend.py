@@ -1,4 +1,4 @@
-"""Somebody else suspends or resumes a Job of ours: what is done about it, and what is said."""
+"""The operator's reaction when somebody else suspends or resumes one of its Jobs."""
 
 from copy import deepcopy
 
@@ -21,13 +21,13 @@ def by_kueue(scene, *, suspend):
 
 
 def without_annotation(scene):
-    """Let the Job be one that an earlier release has made, and its status be written."""
+    """Let somebody remove the annotation of the Job, and its status be written."""
     scene.job()["metadata"].pop("annotations", None)
     scene.settle()
 
 
 def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
-    """Kueue with manageJobsWithoutQueueName suspends it again at once: a fight of 22 patches a second."""
+    """Kueue with manageJobsWithoutQueueName suspends it again at once, which made 22 patches a second."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
@@ -40,7 +40,7 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
 
 
 def test_a_suspension_by_another_manager_emits_an_event(training, reasons):
-    """A user waits for a job that does not move."""
+    """Otherwise a user would wait for the job and not know the reason."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
@@ -60,7 +60,7 @@ def test_a_suspension_by_an_unknown_manager_is_reported_as_such(training):
 
 
 def test_a_job_that_another_manager_resumes_is_left_running_and_reported(training):
-    """It is admitted by its queue, although its author has suspended it."""
+    """Its queue has admitted it, although its author has suspended it."""
     scene, _ = training(suspend=False)
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -72,7 +72,7 @@ def test_a_job_that_another_manager_resumes_is_left_running_and_reported(trainin
 
 @pytest.mark.parametrize("suspended", [True, False])
 def test_the_author_is_heeded_whatever_somebody_else_has_set(suspended, training):
-    """What the TrainingJob says is written once it differs from what was written last."""
+    """The operator writes the value of the TrainingJob when it differs from the value that it wrote last."""
     scene, _ = training()
     by_kueue(scene, suspend=suspended)
     scene.settle()
@@ -87,7 +87,7 @@ def test_the_author_is_heeded_whatever_somebody_else_has_set(suspended, training
 
 
 def test_what_was_set_is_written_by_the_same_patch():
-    """An operator that is killed between two patches would take its own for somebody else's."""
+    """An operator that is killed between two patches would take its own change for somebody else's."""
     mark = Suspended(pod="pod-0", lived=True)
 
     patch = SetSuspend(job="job-0", replica=0, suspend=True, mark=mark).patch
@@ -96,18 +96,22 @@ def test_what_was_set_is_written_by_the_same_patch():
     assert patch == {"metadata": {"annotations": annotations}, "spec": {"suspend": True}}
 
 
-def test_a_job_of_an_earlier_release_is_taken_as_it_stands(training):
-    """It has no annotation; the release that made it kept it as the spec was."""
+def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(training):
+    """Nobody knows any more what the operator set last; from then on the annotation is there again."""
     scene, _ = training()
     without_annotation(scene)
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
 
+    assert scene.step().actions == (SetSuspend(job="job-0", replica=0, suspend=False),)
+
+    by_kueue(scene, suspend=True)
+
     assert scene.settle().actions == ()
     assert scene.replica().message.startswith("suspended by kueue, ")
 
 
-def test_the_author_suspends_and_resumes_a_job_of_an_earlier_release(training):
+def test_the_author_suspends_and_resumes_a_job_without_its_annotation(training):
     """From then on it has the annotation."""
     scene, _ = training()
     without_annotation(scene)
@@ -120,18 +124,6 @@ def test_the_author_suspends_and_resumes_a_job_of_an_earlier_release(training):
     resumed = scene.settle().actions
 
     assert [each.suspend for each in (*suspended, *resumed)] == [True, False]
-
-
-def test_a_job_that_an_earlier_release_suspended_is_resumed_by_this_one(training):
-    """An upgrade between the two is no reason to wait for ever."""
-    scene, _ = training()
-    scene.raw["spec"]["suspend"] = True
-    scene.settle()
-    without_annotation(scene)
-    scene.raw["spec"]["suspend"] = False
-    scene.raw["metadata"]["generation"] = 2
-
-    assert scene.step().actions == (SetSuspend(job="job-0", replica=0, suspend=False),)
 
 
 WORLD = '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'
@@ -161,14 +153,14 @@ USES = [
 
 
 def open_to_jobs(kind, name, labels=None):
-    """Return an object that a job may use, or with other labels may not."""
+    """Return an object that a job may use, unless it is given other labels."""
     found = deepcopy(THERE[(kind, name)])
     found["metadata"]["labels"] = {"palaestra.dev/for-jobs": "true"} if labels is None else labels
     return found
 
 
 def to_be_resumed(make_scene, kind, name, spec):
-    """Return a scene in which a suspended job uses an object, and is to be resumed."""
+    """Return a scene in which a suspended job that uses an object is about to be resumed."""
     scene = make_scene(**spec)
     scene.there[(kind, name)] = open_to_jobs(kind, name)
     scene.settle()
@@ -183,7 +175,7 @@ def to_be_resumed(make_scene, kind, name, spec):
 @pytest.mark.parametrize("annotated", [True, False])
 @pytest.mark.parametrize(("kind", "name", "spec"), USES)
 def test_a_job_is_not_resumed_with_what_is_for_jobs_no_more(make_scene, annotated, kind, name, spec):
-    """A removed label applies to new pods, and the next pod of the job is a new one."""
+    """A removed label applies to new pods, and the next pod of the job is new."""
     scene = to_be_resumed(make_scene, kind, name, spec)
     scene.there[(kind, name)] = open_to_jobs(kind, name, {})
     if not annotated:
@@ -204,7 +196,7 @@ def test_a_job_is_not_resumed_with_what_is_for_jobs_no_more(make_scene, annotate
 
 @pytest.mark.parametrize(("kind", "name", "spec"), USES)
 def test_only_a_world_may_be_gone_when_a_job_is_resumed(make_scene, kind, name, spec):
-    """Its copy is in the job's own ConfigMap; pods without a Secret or claim would not start."""
+    """The job's own ConfigMap has a copy of a world; without a Secret or a claim, pods would not start."""
     scene = to_be_resumed(make_scene, kind, name, spec)
     scene.there.clear()
 
@@ -214,7 +206,7 @@ def test_only_a_world_may_be_gone_when_a_job_is_resumed(make_scene, kind, name, 
 
 
 def test_suspending_asks_for_no_label(make_scene):
-    """To stop is always right."""
+    """Stopping is always allowed."""
     scene = to_be_resumed(make_scene, "Secret", "keys", {"trainer": SECRET})
     scene.settle()
     scene.there.clear()
@@ -223,10 +215,12 @@ def test_suspending_asks_for_no_label(make_scene):
     assert scene.settle().actions == (SetSuspend(job="job-0", replica=0, suspend=True),)
 
 
-def test_a_refused_patch_of_a_job_of_an_earlier_release_is_sent_again(training):
+@pytest.mark.parametrize("annotated", [True, False])
+def test_a_refused_patch_of_a_job_is_sent_again(training, annotated):
     """The status that is written after the refusal must not make it look like somebody else's doing."""
     scene, _ = training()
-    without_annotation(scene)
+    if not annotated:
+        without_annotation(scene)
     scene.raw["spec"]["suspend"] = True
     scene.raw["metadata"]["generation"] = 2
 
@@ -238,7 +232,10 @@ def test_a_refused_patch_of_a_job_of_an_earlier_release_is_sent_again(training):
 
 
 def test_a_job_is_suspended_once_its_pod_has_ended(training):
-    """Its trainer saves a checkpoint for up to a minute; who took the node before that would lose it."""
+    """Its trainer saves a checkpoint for up to a minute.
+
+    A person who stops the node before that would lose it.
+    """
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -258,7 +255,7 @@ def test_a_job_is_suspended_once_its_pod_has_ended(training):
 
 
 def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, last_word):
-    """`kubectl wait --for=condition=Running` would return for a pod that is about to go; nor is it taken."""
+    """`kubectl wait --for=condition=Running` would return for a pod that is about to end."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -282,7 +279,7 @@ def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, l
 
 
 def test_a_suspended_pod_on_a_lost_node_is_reported_as_lost(training):
-    """It saves nothing any more; the Node object has to go before the job can be resumed."""
+    """Its trainer can save nothing; somebody must delete the Node object before the job can be resumed."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()

@@ -1,10 +1,10 @@
-"""A job that an earlier release accepted goes on, whatever a new rule says about its spec."""
+"""A job that was accepted goes on, whatever a new rule says about its spec."""
 
 import pytest
 
 from palaestra.api.status import Phase
 
-# What this release no longer accepts in a new job.
+# What an operator does not accept in a new job.
 ANTI_AFFINITY = {
     "requiredDuringSchedulingIgnoredDuringExecution": [
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
@@ -17,7 +17,6 @@ ACCEPTED_EARLIER = {
     "a runtime": {"scheduling": {"runtimeClassName": "kata"}},
     "a toleration": {"scheduling": {"tolerations": [{"key": "dedicated", "operator": "Exists"}]}},
     "an anti-affinity": {"scheduling": {"affinity": {"podAntiAffinity": ANTI_AFFINITY}}},
-    "a pull Secret without the label": {"imagePullSecrets": [{"name": "registry"}]},
 }
 
 
@@ -33,7 +32,7 @@ def upgraded(request, make_scene):
 
 
 def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
-    """The control: without it, the tests below would show nothing."""
+    """This is the control: without it, the tests below would prove nothing."""
     scene = make_scene(**upgraded.raw["spec"])
 
     decision = scene.settle()
@@ -43,7 +42,7 @@ def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
 
 
 def test_it_runs_on(upgraded):
-    """The operator that comes with the upgrade changes nothing about it."""
+    """The upgraded operator changes nothing about it."""
     upgraded.restart()
 
     decision = upgraded.settle()
@@ -53,7 +52,7 @@ def test_it_runs_on(upgraded):
 
 
 def test_it_is_suspended_and_resumed(upgraded):
-    """Each is a change of the spec, and of a field that may change."""
+    """Both change a field of the spec that may change."""
     for generation, suspend in enumerate((True, False), 2):
         upgraded.raw["spec"]["suspend"] = suspend
         upgraded.raw["metadata"]["generation"] = generation
@@ -64,7 +63,7 @@ def test_it_is_suspended_and_resumed(upgraded):
 
 
 def test_its_replica_is_planned_again(upgraded):
-    """Its Job was deleted by somebody, and its spec is as it was at acceptance."""
+    """A user deleted its Job, and its spec is the same as at acceptance."""
     upgraded.objects["pods"].clear()
     upgraded.objects["jobs"].clear()
 

@@ -1,4 +1,7 @@
-"""An object of the API server is a TrainingJob, or refused with a reason, by itself."""
+"""An object of the API server is either a TrainingJob or refused with its reason.
+
+Neither affects other objects.
+"""
 
 from datetime import UTC, datetime
 
@@ -18,7 +21,7 @@ def raw(spec=None, status=None, **metadata):
 
 
 def refused(obj):
-    """Return how an object is refused."""
+    """Return the error with which an object is refused."""
     with pytest.raises(JobRefused) as info:
         accept(obj)
     return info.value
@@ -32,7 +35,7 @@ def test_a_right_job_is_read_with_its_generation_and_its_status():
 
 
 def test_a_mistake_that_only_the_models_find_is_reported_with_its_field():
-    """An API server cannot look into free objects."""
+    """An API server cannot check free objects."""
     problem = refused(raw(SAC))
 
     assert problem.reason == "InvalidSpec"
@@ -63,14 +66,14 @@ def test_refusing_again_changes_nothing():
 
 
 def test_a_job_that_was_refused_once_is_never_started():
-    """Not even by a release that would have taken it."""
+    """Not even a release that would accept it starts it."""
     failed = as_data(reject(raw(SAC), refused(raw(SAC)), NOW).status)
 
     assert accept(raw(status=failed)).status.phase == "Failed"
 
 
 def test_it_is_deleted_after_its_time_to_live():
-    """As any other job that has ended."""
+    """The same holds for any other ended job."""
     spec = {**SAC, "ttlSecondsAfterFinished": 60}
     status = as_data(reject(raw(spec), refused(raw(spec)), NOW).status)
     obj = raw(spec, status)
@@ -84,7 +87,7 @@ def test_it_is_deleted_after_its_time_to_live():
 
 def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
     """An upgrade with jobs running must not touch a pod."""
-    release = {"trainer": "t:1", "stub": "s:1", "webots": "w:1"}
+    release = {"trainer": "t:1", "stub": "s:1", "mujoco": "m:1", "webots": "w:1"}
     obj = raw(SAC, {"phase": "Running", "release": release})
 
     decision = reject(obj, refused(obj), NOW)
@@ -95,7 +98,7 @@ def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
 
 @pytest.mark.parametrize("status", [{"phase": "Dancing"}, {"activeSeconds": "4"}, "text"])
 def test_a_status_that_cannot_be_read_is_left_alone(status):
-    """Which replicas have ended is not known, so nothing is done with the job."""
+    """The operator cannot know which replicas have ended, so it does nothing."""
     obj = raw(status=status)
 
     decision = reject(obj, refused(obj), NOW)
@@ -114,5 +117,5 @@ def test_a_status_that_cannot_be_read_is_left_alone(status):
     ],
 )
 def test_jobs_of_other_controllers_and_of_nobody_are_left_alone(spec, metadata, ours):
-    """A job that is being deleted gets no new children."""
+    """The operator also leaves a job alone that is being deleted: it gets no new children."""
     assert managed_here(raw(spec, **metadata)) is ours

@@ -1,4 +1,4 @@
-"""Problems of a replica that goes on: shown at once, in the words of the component that reports them."""
+"""Problems of a replica that has not failed are shown at once, with the message of their source."""
 
 import pytest
 
@@ -27,7 +27,10 @@ def refused(scene, words, **event):
     ],
 )
 def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
-    """Quota, Pod Security, a webhook, a LimitRange: only an event on the Job has the reason."""
+    """Quota, Pod Security, a webhook or a LimitRange may refuse them.
+
+    Only an event on the Job has the reason.
+    """
     scene = accepted()
     refused(scene, words)
 
@@ -64,7 +67,7 @@ EVERY = f"{MASTER}, {SIMULATORS} and {TRAINER}"
     ],
 )
 def test_a_pod_refused_for_its_sizes_names_the_fields_that_set_them(accepted, words, fields):
-    """A job has no `ros-master` or `install-sidecar`: the API server's words lead to no field of it."""
+    """A job has no field `ros-master` or `install-sidecar`, so the API server's message names no field."""
     scene = accepted()
     refused(scene, f'Error creating: pods "job-0-x" is forbidden: {words}')
 
@@ -86,7 +89,7 @@ def test_a_pod_refused_for_a_webhooks_container_names_no_field_of_the_job(accept
 
 
 def test_an_old_refusal_does_not_count(accepted):
-    """A pod was made since."""
+    """A pod was created since then."""
     scene = accepted()
     refused(scene, "exceeded quota")
     scene.pass_(5)
@@ -98,7 +101,7 @@ def test_an_old_refusal_does_not_count(accepted):
 
 
 def test_the_message_about_an_unschedulable_pod_quotes_the_scheduler(accepted):
-    """Its words name the missing resource."""
+    """The scheduler's message names the missing resource."""
     scene = accepted()
     pod = scene.new_pod()
     words = "0/3 nodes are available: 3 Insufficient nvidia.com/gpu."
@@ -116,7 +119,7 @@ def test_the_message_about_an_unschedulable_pod_quotes_the_scheduler(accepted):
     "waiting", ["ErrImagePull: not found", "ImagePullBackOff: Back-off", "InvalidImageName"]
 )
 def test_an_image_that_does_not_come_is_named_with_its_container(accepted, waiting):
-    """In a pod of four containers it is not clear whose it is."""
+    """In a pod of four containers the user could not know whose image it is."""
     scene = accepted()
     scene.container(scene.new_pod(), "sim-collect-0", waiting=waiting)
 
@@ -128,7 +131,7 @@ def test_an_image_that_does_not_come_is_named_with_its_container(accepted, waiti
 
 
 def test_a_container_that_the_node_cannot_make_is_named(accepted):
-    """As when the Secret lacks the key."""
+    """An example is a Secret without the key."""
     scene = accepted()
     words = "couldn't find key token in Secret default/keys"
     scene.container(scene.new_pod(), "trainer", waiting=f"CreateContainerConfigError: {words}")
@@ -140,7 +143,7 @@ def test_a_container_that_the_node_cannot_make_is_named(accepted):
 
 
 def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
-    """Nothing is force-deleted: the pod may still write to the volume."""
+    """The operator does not force-delete it: the pod may still write to the volume."""
     scene, pod = training()
     scene.delete(pod)
     assert scene.step().wake_after_s == 90
@@ -153,7 +156,7 @@ def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
 
 
 def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
-    """The trainer only sees that it broke."""
+    """The trainer sees only that the simulator failed."""
     group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
     scene, pod = training(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
     scene.container(
@@ -171,7 +174,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
 
 
 def test_between_two_pods_the_message_says_how_the_last_one_failed(training, last_word):
-    """With the trainer's own last word."""
+    """The message has the trainer's own last word."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: KeyError"))
     scene.count_failures(1)
@@ -184,7 +187,7 @@ def test_between_two_pods_the_message_says_how_the_last_one_failed(training, las
 
 
 def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
-    """Kubernetes puts it into the termination message."""
+    """Kubernetes puts that into the termination message."""
     scene, pod = training()
     scene.end(pod, 1, "Traceback (most recent call last):\n  ...\nMemoryError\n")
 
@@ -194,7 +197,7 @@ def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
 
 
 def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(training):
-    """The next pod may do better with less in its buffer; or not."""
+    """The next pod may need less memory for its buffer, or fail again."""
     scene, pod = training()
     scene.end(pod, 137, reason="OOMKilled")
 
@@ -205,7 +208,7 @@ def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(traini
 
 
 def test_a_pod_that_the_cluster_took_is_no_failure(training):
-    """And no warning: it is what clusters do."""
+    """No warning is emitted either: clusters do that all the time."""
     scene, pod = training()
     scene.take(pod, "preempted by a more important pod")
 
@@ -217,7 +220,7 @@ def test_a_pod_that_the_cluster_took_is_no_failure(training):
 
 
 def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, last_word):
-    """As when the ROS master was lost: the cluster has taken nothing."""
+    """This happens when the ROS master was lost: the cluster has not evicted the pod."""
     scene, pod = training()
     scene.end(pod, 75, last_word(reason="MasterLost: it does not answer"))
 
@@ -238,7 +241,7 @@ def test_a_full_volume_is_reported_between_retries(training, last_word):
 
 
 def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accepted):
-    """Only an event on the pod has the cause; by its status the pod only starts."""
+    """Only an event on the pod has the cause; its status only shows that it starts."""
     scene = accepted()
     pod = scene.new_pod()
     words = 'Multi-Attach error for volume "pvc-1": still attached to node-2'
@@ -261,7 +264,7 @@ def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accept
 
 
 def test_while_its_simulators_start_a_trainer_does_not_train(training):
-    """By its own word; one that serves none is believed to train."""
+    """The trainer reports this phase itself; a trainer that serves no status counts as training."""
     scene, pod = training()
     scene.poll(pod, phase="starting")
 
@@ -272,7 +275,7 @@ def test_while_its_simulators_start_a_trainer_does_not_train(training):
 
 @pytest.mark.parametrize("about", [0, None], ids=["of the replica", "of the whole job"])
 def test_the_message_about_a_refused_object_quotes_the_api_server(make_scene, about, reasons):
-    """A claim over its quota has no Job whose events could have the reason."""
+    """A claim that exceeds its quota has no Job whose events could have the reason."""
     scene = make_scene()
     scene.step()
     scene.denied = {about: 'persistentvolumeclaims "job-0" is forbidden: exceeded quota: volumes'}
@@ -301,7 +304,7 @@ def test_a_refusal_of_one_replica_is_not_reported_for_another(make_scene):
 
 
 def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, command_groups):
-    """The trainer never started, so it has no word."""
+    """The trainer never started, so it has no last word."""
     scene = accepted(backoffLimit=0, simulators=command_groups)
     pod = scene.new_pod()
     scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
@@ -317,7 +320,7 @@ def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, comm
 
 @pytest.mark.parametrize(("limit", "code"), [(0, 70), (3, 2), (3, 80), (3, 81)])
 def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, reasons, limit, code):
-    """No other will come, whatever the Job says later."""
+    """No other pod follows, whatever the Job reports later."""
     scene, pod = training(backoffLimit=limit)
     scene.end(pod, code, last_word())
 
@@ -328,7 +331,7 @@ def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, 
 
 
 def test_a_replica_on_a_lost_node_does_not_run(training):
-    """The node's last word was that it does; nobody knows."""
+    """The node last reported that it runs, but its state is unknown."""
     scene, pod = training()
     scene.delete(pod, 0)
     scene.settle()
@@ -344,7 +347,7 @@ def test_a_replica_on_a_lost_node_does_not_run(training):
 
 
 def test_a_pod_that_is_not_there_and_was_not_asked_about_says_so(make_scene):
-    """Silence would read as if nothing were wrong."""
+    """An empty message would suggest that nothing is wrong."""
     scene = make_scene()
     scene.settle()
     scene.objects["unasked"] = frozenset({scene.job()["metadata"]["uid"]})

@@ -1,4 +1,4 @@
-"""What the doctor makes of what it sees."""
+"""The doctor's checks and their results."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
     [("v1.9.3", "wrong"), ("v1.32.9", "wrong"), ("v1.33.2+k3s1", "ok"), ("v2.0.0", "ok"), ("", "wrong")],
 )
 def test_a_version_is_judged_by_whether_it_has_sidecars_for_good(version, verdict):
-    """Since 1.33, which is what the chart demands, too."""
+    """Sidecars are stable since 1.33, which the chart also requires."""
     assert judged_version("nodes", version).verdict == verdict
 
 
@@ -32,14 +32,14 @@ def test_versions_are_compared_as_numbers():
 
 
 def test_the_first_version_is_the_charts():
-    """What helm installs, the doctor must find right."""
+    """The doctor must accept the versions on which Helm installs the chart."""
     chart = yaml.safe_load((ROOT / "charts/palaestra/Chart.yaml").read_text())
 
     assert release(chart["kubeVersion"].removeprefix(">=")) == FIRST
 
 
 def test_a_pod_that_came_back_as_it_was_is_right():
-    """Webhooks may add what they like."""
+    """Webhooks may add containers."""
     pod = trial_pod("lab", "trainer:1")
     pod["spec"]["initContainers"].insert(0, {"name": "added-by-a-mesh"})
 
@@ -47,7 +47,7 @@ def test_a_pod_that_came_back_as_it_was_is_right():
 
 
 def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
-    """Everything after it would wait for its end for ever."""
+    """All containers after it would wait for its end for ever."""
     pod = trial_pod("lab", "trainer:1")
     del pod["spec"]["initContainers"][0]["restartPolicy"]
 
@@ -64,19 +64,19 @@ PINNED = {part: part + DIGEST for part in ("operator", "trainer", "stub", "mujoc
 
 
 def operator(**images):
-    """Return the operator's container as the chart makes it, with these images in place of pinned ones."""
+    """Return the operator's container as in the chart, with these images instead of pinned ones."""
     own, *given = (PINNED | images).items()
     return {"image": own[1], "command": ["palaestra", *(f"--{part}-image={image}" for part, image in given)]}
 
 
 def test_images_that_are_named_by_digest_are_right():
-    """Nobody can change what they are."""
+    """The image of a digest cannot change."""
     assert judged_images(operator()).verdict is CheckStatus.RIGHT
 
 
 @pytest.mark.parametrize("part", PINNED)
 def test_an_image_that_is_named_by_tag_is_a_warning(part):
-    """A run that goes on after an interruption may meet another image under the same tag."""
+    """A run that resumes after an interruption may get another image of the same tag."""
     found = judged_images(operator(**{part: "registry.example.com/image:1"}))
 
     assert found.verdict is CheckStatus.WARNING
@@ -85,7 +85,7 @@ def test_an_image_that_is_named_by_tag_is_a_warning(part):
 
 
 def test_images_of_an_operator_that_is_given_none_are_the_releases():
-    """They are named by tag."""
+    """The release's images are named by tag."""
     found = judged_images({"image": "operator" + DIGEST})
 
     assert found.fact.startswith("palaestra-trainer:")
@@ -103,7 +103,7 @@ def test_a_definition_with_more_in_it_is_the_same():
 
 
 def test_the_place_where_another_release_s_definition_differs_is_returned():
-    """The first that is not as it is here."""
+    """The function returns the path of the first difference."""
     ours = crd()
     found = deepcopy(ours)
     del found["spec"]["versions"][0]["schema"]["openAPIV3Schema"]["properties"]["spec"]
@@ -114,7 +114,7 @@ def test_the_place_where_another_release_s_definition_differs_is_returned():
 
 
 def test_the_operators_rights_are_those_of_an_installation():
-    """A right that is missing there would be told wrong for ever, and one more would go unnoticed."""
+    """A missing permission would be reported as wrong for ever, and nobody would notice one too many."""
     installed = yaml.safe_load_all((ROOT / "manifests/install.yaml").read_text())
     [role] = [
         each
@@ -136,7 +136,7 @@ def test_the_operators_rights_are_those_of_an_installation():
 
 
 def test_a_finding_is_a_line_and_its_remedy_another():
-    """The remedy is what the eye looks for."""
+    """A reader looks for the remedy first."""
     found = (right("nodes", "v1.36.0"), wrong("storage class", "there is none", "annotate one"))
 
     lines = [line for each in found for line in shown(each)]

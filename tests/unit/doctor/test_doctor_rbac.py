@@ -1,4 +1,4 @@
-"""What the doctor makes of the rights that the operator's account lacks."""
+"""The doctor's report on missing permissions of the operator's account."""
 
 import pytest
 
@@ -11,34 +11,34 @@ JOBS = ("batch", "jobs", "create")
 
 
 class Server:
-    """An API server that refuses some rights; it may serve Workloads."""
+    """An API server that refuses some permissions; it may serve Workloads."""
 
     def __init__(self, refused, workloads=""):
         self._refused, self._workloads = refused, workloads
 
     def get(self, resource, namespace, name):
-        """Return nothing: the operator has no Deployment."""
+        """Return an empty list: the operator has no Deployment."""
         raise NotFound(404, "NotFound", f"{resource.plural} {namespace}/{name}")
 
     def serves(self, group_version):
-        """Return whether it serves Kueue in a version."""
+        """Return whether the server has Kueue in a version."""
         return group_version == self._workloads
 
     def create(self, _, review):
-        """Return the answer to a SubjectAccessReview."""
+        """Return the response to a SubjectAccessReview."""
         asked = review["spec"]["resourceAttributes"]
         right = (asked["group"], asked["resource"], asked["verb"])
         return {"status": {"allowed": right not in self._refused}}
 
 
 def examined(*refused, workloads="kueue.x-k8s.io/v1beta2"):
-    """Return what the doctor finds where the operator's account lacks some rights."""
+    """Return the doctor's results if the operator's account lacks some permissions."""
     api = Server(refused, workloads)
     return list(operator_rights(Site(api=api, namespace="lab", operator_namespace="palaestra-system")))
 
 
 def test_a_role_that_cannot_read_workloads_is_a_warning_where_kueue_is():
-    """With the role of an earlier release jobs train; only the words of Kueue are missing."""
+    """Without this right jobs train; only the words of Kueue are missing."""
     [found] = examined(WORKLOADS)
 
     assert found.verdict is CheckStatus.WARNING
@@ -48,14 +48,14 @@ def test_a_role_that_cannot_read_workloads_is_a_warning_where_kueue_is():
 
 @pytest.mark.parametrize("served", ["", "kueue.x-k8s.io/v1beta1"])
 def test_without_workloads_that_the_operator_reads_their_right_is_not_checked(served):
-    """The right would change nothing, so a warning would be noise."""
+    """The permission would have no effect, so a warning would only distract."""
     [found] = examined(WORKLOADS, workloads=served)
 
     assert found.verdict is CheckStatus.RIGHT
 
 
 def test_a_right_that_training_needs_is_wrong_beside_the_warning():
-    """One remedy helps against both; only the first changes the exit code."""
+    """One remedy solves both; only the first changes the exit code."""
     found = examined(JOBS, WORKLOADS)
 
     assert [each.verdict for each in found] == [CheckStatus.WRONG, CheckStatus.WARNING]
@@ -63,7 +63,7 @@ def test_a_right_that_training_needs_is_wrong_beside_the_warning():
 
 
 def test_a_role_of_this_release_suffices():
-    """With Kueue or without it."""
+    """It suffices with and without Kueue."""
     [found] = examined()
 
     assert found.verdict is CheckStatus.RIGHT

@@ -1,4 +1,4 @@
-"""The fault comes once, at the request that the plan names."""
+"""A fault occurs once, at the request that the plan names."""
 
 import pytest
 
@@ -27,7 +27,7 @@ def test_the_fault_comes_at_the_request_that_it_is_planned_for_and_once():
 
 
 def test_events_of_watches_are_counted_by_themselves():
-    """A watch is one request, and many changes."""
+    """A watch is one request, but carries many changes."""
     fault = Fault(kind=Kind.CUT, request="change", number=2)
     course = Course(fault)
 
@@ -38,7 +38,7 @@ def test_events_of_watches_are_counted_by_themselves():
 
 
 def test_it_is_away_for_as_long_as_the_plan_says():
-    """And not before, nor after."""
+    """The server is away exactly for that time."""
     now = [0.0]
     course = Course(Fault(kind=Kind.AWAY, request="get", number=1, seconds=3.0), lambda: now[0])
     assert not course.away
@@ -52,7 +52,7 @@ def test_it_is_away_for_as_long_as_the_plan_says():
 
 @pytest.mark.parametrize("asked", [PODS, Asked(verb="update", resource="leases", name="operator")])
 def test_watches_and_the_lease_do_not_end_the_quiet(asked):
-    """An operator at rest asks for these."""
+    """An idle operator sends these requests too."""
     now = [5.0]
     course = Course(None, lambda: now[0])
     course.request(GET)

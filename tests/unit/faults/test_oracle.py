@@ -1,4 +1,4 @@
-"""The oracle finds what it is there for, in made-up runs where it is wrong."""
+"""The oracle finds each kind of error in made-up runs that have it."""
 
 from tests.faults.oracle import doubles, orphans
 
@@ -21,7 +21,7 @@ def test_two_pods_of_a_replica_at_one_moment_are_found():
 
 
 def test_a_pod_that_follows_one_that_ended_or_was_deleted_is_none_too_many():
-    """That is what a restart is."""
+    """A restart replaces one pod with the next."""
     ended = [("ADDED", pod("a")), ("MODIFIED", pod("a", "Failed")), ("ADDED", pod("b"))]
     deleted = [("ADDED", pod("a")), ("DELETED", pod("a")), ("ADDED", pod("b"))]
 
@@ -30,12 +30,12 @@ def test_a_pod_that_follows_one_that_ended_or_was_deleted_is_none_too_many():
 
 
 def test_a_job_of_the_same_name_is_another_job():
-    """Its replicas are no replicas of the one before."""
+    """Its replicas are not those of the earlier job."""
     assert doubles([("ADDED", pod("a")), ("ADDED", pod("b", job_uid="other"))]) == []
 
 
 def test_an_object_whose_owner_is_gone_is_an_orphan():
-    """The garbage collector takes it, or it is one for ever."""
+    """The garbage collector deletes it, or it stays for ever."""
     owned = {"metadata": {"uid": "j", "ownerReferences": [{"uid": OWNER}]}}
 
     assert orphans({"TrainingJob": {}, "Job": {"job-0": owned}}) == ["Job job-0 is left behind"]
@@ -43,21 +43,21 @@ def test_an_object_whose_owner_is_gone_is_an_orphan():
 
 
 def test_an_object_of_a_deleted_job_that_owns_nothing_is_an_orphan():
-    """By its label: nobody would ever take it."""
+    """Only its label names the job, so the garbage collector would never delete it."""
     labelled = {"metadata": {"uid": "n", "labels": {"palaestra.dev/job-uid": OWNER}}}
 
     assert orphans({"NetworkPolicy": {"job": labelled}}) == ["NetworkPolicy job is left behind"]
 
 
 def test_a_claim_outlives_its_job():
-    """It holds the run."""
+    """The claim holds the run."""
     claim = {"metadata": {"uid": "c", "labels": {"palaestra.dev/job-uid": OWNER}}}
 
     assert orphans({"PersistentVolumeClaim": {"job-0": claim}}) == []
 
 
 def test_a_pod_that_is_being_deleted_is_left_to_its_kubelet():
-    """On a lost node it stays for ever, whatever an operator does."""
+    """On a lost node it stays for ever, and no operator can change that."""
     going = pod("a")
     going["metadata"]["deletionTimestamp"] = "2026-01-31T12:00:00Z"
 

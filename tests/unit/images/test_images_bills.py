@@ -1,4 +1,4 @@
-"""A bill of materials lists what is in an image, not what somebody asked for."""
+"""A bill of materials lists the content of an image, not the packages that somebody requested."""
 
 import io
 import json
@@ -45,13 +45,13 @@ def layer(*files):
 
 
 def metadata(name, version="1.2"):
-    """Return path and text of what a wheel leaves where it is installed."""
+    """Return path and text of the metadata that an installed wheel has."""
     return f"{SITE}/{name}-{version}.dist-info/METADATA", METADATA.format(name=name, version=version)
 
 
 @pytest.fixture
 def image(tmp_path):
-    """Write an image of some layers, as an engine saves it; return it as `make images` knows it."""
+    """Write an image of some layers as an engine saves it, and return it as `make images` does."""
 
     def write(*layers):
         path = tmp_path / "operator-0123.tar"
@@ -66,14 +66,14 @@ def image(tmp_path):
 
 
 def listed(bill):
-    """Return the package URLs of a bill, which has to be as the format demands."""
+    """Return the package URLs of a bill, and check that it has the required format."""
     text = bill.read_text()
     assert JsonStrictValidator(bills.VERSION).validate_str(text) is None
     return [component["purl"] for component in json.loads(text)["components"]]
 
 
 def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
-    """A scanner finds by it what is affected by a new vulnerability."""
+    """With it, a scanner finds the images that a new vulnerability affects."""
     debian = layer(("var/lib/dpkg/status", STATUS))
     built = image(debian, layer(metadata("Ruamel.Yaml"), metadata("numpy", "2.5")))
 
@@ -90,7 +90,7 @@ def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
 
 
 def test_a_package_that_a_later_layer_removes_is_not_listed(image):
-    """The trainer's image is built with some that it does not keep."""
+    """The trainer's image removes some packages that only its build needs."""
     installed = layer(metadata("hatchling"), metadata("numpy"))
     removal = layer((f"{SITE}/.wh.hatchling-1.2.dist-info", ""))
 
@@ -100,7 +100,7 @@ def test_a_package_that_a_later_layer_removes_is_not_listed(image):
 
 
 def test_a_folder_that_a_later_layer_replaces_is_not_listed(image):
-    """The layer's mark stands for all that was in the folder."""
+    """The layer's whiteout file stands for the whole folder."""
     replacement = layer((f"{SITE}/.wh..wh..opq", ""), metadata("numpy", "2.5"))
 
     bill = bills.of_image(image(layer(metadata("numpy")), replacement))
@@ -109,7 +109,7 @@ def test_a_folder_that_a_later_layer_replaces_is_not_listed(image):
 
 
 def test_a_bill_is_the_same_for_the_same_image_and_goes_with_its_archive(image):
-    """It can be compared, and says nothing of an image that is gone."""
+    """Two bills can be compared, and no bill is left of a removed image."""
     built = image(layer(metadata("numpy")))
     first = bills.of_image(built).read_text()
     old = built.archive.with_name("operator-old.tar.cdx.json")
@@ -121,7 +121,7 @@ def test_a_bill_is_the_same_for_the_same_image_and_goes_with_its_archive(image):
 
 
 def test_what_is_no_archive_is_refused_with_its_path(image):
-    """Another program may have written there."""
+    """Another program may have written that file."""
     built = image()
     built.archive.write_text("no archive")
 
@@ -130,7 +130,7 @@ def test_what_is_no_archive_is_refused_with_its_path(image):
 
 
 def test_a_bill_of_a_wheel_lists_what_it_was_tested_with(tmp_path):
-    """With the hashes of the lock, by which a person can install the same."""
+    """It has the hashes of the lock, so that a person can install the same packages."""
     sim, trainer, operator = bills.of_wheels(ROOT, tmp_path, "x86_64")
 
     assert f"pkg:pypi/palaestra-sim@{version('palaestra-sim')}" in listed(operator)

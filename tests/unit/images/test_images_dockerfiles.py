@@ -1,4 +1,4 @@
-"""What every Dockerfile keeps to, and that hadolint finds nothing else in them."""
+"""The rules for all Dockerfiles, and a check that hadolint finds nothing else in them."""
 
 import json
 import re
@@ -43,13 +43,13 @@ def values(instructions, wanted):
 
 
 def test_an_image_runs_as_a_user_without_rights(instructions):
-    """By number: a cluster that refuses root can't look up a name."""
+    """The user is a number: a cluster that refuses root cannot look up a name."""
     assert values(instructions, "USER") == ["65532:65532"]
     assert [each for each, _ in instructions].index("USER") > [each for each, _ in instructions].index("RUN")
 
 
 def test_an_image_runs_as_any_user_of_the_group_0(instructions):
-    """OpenShift gives each namespace a user of its own, which has no name and no home in the image."""
+    """OpenShift gives each namespace its own user, which has no name and no home in the image."""
     folders = [
         words
         for run in values(instructions, "RUN")
@@ -61,7 +61,7 @@ def test_an_image_runs_as_any_user_of_the_group_0(instructions):
 
 
 def test_an_image_has_debian_trixie_as_its_base_unless_another_is_named(instructions):
-    """A base that is called `latest` is another one tomorrow."""
+    """A base that is called `latest` may be another one tomorrow."""
     assert values(instructions, "FROM") == ["${BASE}"]
     assert "BASE=docker.io/library/debian:trixie-slim" in values(instructions, "ARG")
 
@@ -79,7 +79,7 @@ def test_every_use_of_apt_is_without_recommendations_and_cleans_up(instructions)
 
 
 def test_packages_are_installed_by_hash_from_the_context_alone(instructions):
-    """No index is asked in a build, so none has to be reachable, trusted or up to date."""
+    """A build uses no package index, so none must be reachable, trusted or up to date."""
     *locked, ours = (run for run in values(instructions, "RUN") if "uv pip install" in run)
 
     assert all("--no-index" in run and "--no-cache" in run and "--no-deps" in run for run in (*locked, ours))
@@ -96,7 +96,7 @@ def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
 
 @pytest.mark.parametrize("name", ["stub", "mujoco", "trainer", "notebook"])
 def test_an_image_with_ros_has_the_package_webots_ros(name):
-    """Programs of users import it there, beside the messages inside its own."""
+    """Users' programs import it there; Palaestra's own code uses the messages that it contains itself."""
     runs = values(parsed(recipes("debian")[name]), "RUN")
 
     distribution, *_ = [run for run in runs if "apt-get" in run]
@@ -116,14 +116,14 @@ def test_an_image_has_a_folder_for_a_project_of_the_user_s_own(name):
 
 
 def test_what_changes_most_comes_last(instructions):
-    """A changed source builds one layer anew, not PyTorch."""
+    """If a source changes, only the last layer is built again, without PyTorch."""
     order = [f"{instruction} {value}" for instruction, value in instructions]
 
     assert order.index("ARG REQUIREMENTS") < order.index("ARG PACKAGES") < order.index("ARG VERSION")
 
 
 def test_the_notebook_begins_with_the_layers_of_the_trainer():
-    """Debian's PyTorch and the trainer's libraries are 1.4 GB; what is equal is built and kept once."""
+    """Debian's PyTorch and the trainer's libraries have 1.4 GB; equal layers are built and stored once."""
     trainer, notebook = (parsed(recipes("debian")[name]) for name in ("trainer", "notebook"))
     shared = next(n for n, pair in enumerate(trainer) if "/context/requirements.txt" in pair[1]) + 1
 
@@ -131,7 +131,7 @@ def test_the_notebook_begins_with_the_layers_of_the_trainer():
 
 
 def test_mujoco_begins_with_the_layers_of_the_stub():
-    """A node that runs both pulls Python and the messages of ROS once."""
+    """A node that runs both pulls Python and the ROS messages once."""
     stub, mujoco = (parsed(recipes("debian")[name]) for name in ("stub", "mujoco"))
     shared = stub.index(("ENV", "PYTHONDONTWRITEBYTECODE=1")) + 1
 
@@ -139,14 +139,17 @@ def test_mujoco_begins_with_the_layers_of_the_stub():
 
 
 def test_mujoco_s_image_can_draw():
-    """By EGL and Mesa's driver for the processor, which EGL brings; PyOpenGL loads the other."""
+    """It uses EGL and Mesa's driver for the processor, which comes with EGL.
+
+    PyOpenGL also loads libopengl.
+    """
     install, *_ = [run for run in values(parsed(recipes("debian")["mujoco"]), "RUN") if "libegl1" in run]
 
     assert "libopengl0" in install.split()
 
 
 def test_the_labels_say_what_is_inside(instructions, recipe):
-    """`inspect` answers without running anything."""
+    """`inspect` shows them without running anything."""
     (labels,) = values(instructions, "LABEL")
     found = dict(re.findall(r'org\.opencontainers\.image\.(\w+)="([^"]*)"', labels))
 
@@ -157,19 +160,19 @@ def test_the_labels_say_what_is_inside(instructions, recipe):
 
 
 def test_no_dockerfile_copies_or_adds(instructions):
-    """A mounted file leaves no layer; a copied file would stay in one."""
+    """A mounted file leaves no layer, but a copied file stays in one."""
     assert not {"COPY", "ADD"} & {instruction for instruction, _ in instructions}
 
 
 def test_folders_with_the_version_of_python_are_those_of_the_lock():
-    """The Python of the base decides both."""
+    """The Python version of the base image determines both."""
     for recipe in RECIPES:
         found = re.findall(r"/python(3\.\d+)/", (ROOT / recipe.dockerfile).read_text())
         assert set(found) <= {PYTHON}
 
 
 def linted(*options):
-    """Return the rules that hadolint sees broken, by Dockerfile."""
+    """Return the rules of hadolint that are broken, by Dockerfile."""
     files = [
         str(path.relative_to(ROOT))
         for folders in ("*", "images/*")
@@ -189,7 +192,7 @@ def linted(*options):
 
 
 def test_hadolint_finds_nothing_in_any_dockerfile():
-    """Also in one that no recipe builds yet, and in what ShellCheck knows of the shell in them."""
+    """It also checks Dockerfiles that no recipe builds, and runs ShellCheck on the shell commands in them."""
     broken = linted()
 
     assert broken.keys() >= {recipe.dockerfile for recipe in RECIPES}
@@ -197,7 +200,7 @@ def test_hadolint_finds_nothing_in_any_dockerfile():
 
 
 def test_every_excuse_of_hadolint_is_needed():
-    """One that nobody needs any more would hide the next mistake."""
+    """An exception that is no longer needed would hide the next mistake."""
     broken = linted("--config=/dev/null")
 
     assert set(yaml.safe_load(EXCUSES.read_text())["ignored"]) == set().union(*broken.values())

@@ -1,4 +1,4 @@
-"""Docker builds where it can; else the reason to do without it is found before anything is built."""
+"""Docker builds where it can; otherwise the reason not to use it is found before anything is built."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ from tools.images import programs
 from tools.images.engines import Docker, Order
 from tools.images.errors import ImagesError
 
-# Answers what is asked of it by the words in DOCKER_KNOWS; notes every call; saves "saved".
+# This program succeeds for the commands in DOCKER_KNOWS, logs every call, and saves "saved".
 DOCKER = """#!/bin/bash
 echo "$@" >>"$DOCKER_CALLS"
 for word in $DOCKER_KNOWS; do [[ $word == "$1" || $word == "$1-$2" ]] && known=yes; done
@@ -24,7 +24,7 @@ EVERYTHING = "version buildx-version buildx-build image-inspect pull save"
 
 @pytest.fixture
 def docker(tmp_path, monkeypatch):
-    """Return a function that sets what the `docker` on the PATH can do, and the file of its calls."""
+    """Return a function that sets the commands that `docker` knows, and returns the file of its calls."""
     program, calls = tmp_path / "bin" / "docker", tmp_path / "calls"
     program.parent.mkdir()
     program.write_text(DOCKER)
@@ -42,7 +42,7 @@ def docker(tmp_path, monkeypatch):
 
 @pytest.fixture
 def order(tmp_path):
-    """Return an order for an image."""
+    """Return an order to build an image."""
     return Order(
         reference="docker.io/library/palaestra-stub:1.2.3",
         dockerfile=Path("/context/Dockerfile"),
@@ -55,14 +55,14 @@ def order(tmp_path):
 
 @pytest.mark.parametrize("lacking", ["version", "buildx-version"])
 def test_without_an_engine_or_buildx_there_is_no_docker(docker, lacking):
-    """The client alone is installed on many machines, and an old engine knows no mounts in a build."""
+    """Many machines have only the client, and an old engine has no mounts in a build."""
     docker(" ".join(word for word in EVERYTHING.split() if word != lacking))
 
     assert Docker.here() is None
 
 
 def test_without_a_base_image_to_be_had_there_is_no_docker(docker):
-    """No registry may be reachable; buildah makes a base of its own."""
+    """A registry may be unreachable; buildah makes its own base image."""
     calls = docker("version buildx-version")
 
     assert Docker.here() is None
@@ -70,7 +70,7 @@ def test_without_a_base_image_to_be_had_there_is_no_docker(docker):
 
 
 def test_a_base_image_that_is_there_is_not_pulled(docker):
-    """Building works without a network, and pulling is counted by registries."""
+    """A build must work without a network, and registries limit the number of pulls."""
     calls = docker(EVERYTHING)
     found = Docker.here()
 
@@ -80,7 +80,7 @@ def test_a_base_image_that_is_there_is_not_pulled(docker):
 
 
 def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
-    """The Dockerfile says what they mean."""
+    """The Dockerfile explains these arguments."""
     calls = docker(EVERYTHING)
     Docker.here().build(order)
 
@@ -89,7 +89,7 @@ def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
 
 
 def test_docker_loads_what_another_image_is_built_from(docker, tmp_path):
-    """Its name may be that of an older image, which another checkout has built."""
+    """The name may belong to an older image, which another checkout has built."""
     calls = docker(f"{EVERYTHING} load")
     Docker.here().load(tmp_path / "trainer.tar", tmp_path / "load.log")
 
@@ -97,7 +97,7 @@ def test_docker_loads_what_another_image_is_built_from(docker, tmp_path):
 
 
 def test_a_failed_build_leaves_no_archive(docker, order):
-    """An archive that is there is whole."""
+    """An existing archive is always complete."""
     docker(EVERYTHING)
     engine = Docker.here()
     docker("save")
@@ -108,7 +108,7 @@ def test_a_failed_build_leaves_no_archive(docker, order):
 
 
 def test_a_failure_shows_the_last_lines(tmp_path):
-    """The cause is read where the command was typed."""
+    """The user reads the cause where the command was typed."""
     with pytest.raises(ImagesError, match=r"(?s)sh: ended with 3; .*\nline 99$"):
         programs.run(
             ["sh", "-c", "for i in $(seq 99); do echo line $i; done; exit 3"],
@@ -118,6 +118,6 @@ def test_a_failure_shows_the_last_lines(tmp_path):
 
 
 def test_a_program_that_takes_too_long_is_ended(tmp_path):
-    """A build that hangs is a failed one."""
+    """A build that hangs must fail."""
     with pytest.raises(ImagesError, match=r"sleep: was not done after 0 s"):
         programs.run(["sleep", "60"], log=tmp_path / "log", deadline_s=0.2)

@@ -1,4 +1,4 @@
-"""An image holds the locked versions of what its packages need, and nothing else."""
+"""An image has the locked versions of the packages that its own need, and nothing else."""
 
 import re
 from pathlib import Path
@@ -43,17 +43,17 @@ def names(requirements):
 
 
 def test_a_share_holds_what_is_needed_also_by_way_of_others():
-    """`child` is wanted by `parent` alone, and `parent` by us."""
+    """Only `parent` requires `child`, and Palaestra requires `parent`."""
     assert {"parent", "child"} <= names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
 
 def test_a_share_holds_nothing_that_only_others_need():
-    """Linters and test tools have no place in an image."""
+    """Linters and test tools do not belong into an image."""
     assert "stranger" not in names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
 
 def test_markers_are_decided_for_the_python_of_the_image():
-    """The machine that builds may have an older one."""
+    """The Python of the machine that builds may be older."""
     chosen = names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
     assert "new-python-only" in chosen
@@ -61,12 +61,12 @@ def test_markers_are_decided_for_the_python_of_the_image():
 
 
 def test_what_is_left_out_takes_along_what_only_it_needs():
-    """Debian's PyTorch stands in for the locked one, and brings libraries of its own."""
+    """Debian's PyTorch replaces the locked one, and brings its own libraries."""
     assert names(share(parse(SMALL), ["palaestra"], "x86_64", without=["parent"])) == set()
 
 
 def test_what_a_package_does_not_want_stays_where_another_wants_it():
-    """`parent` is wanted by a stranger, too."""
+    """Another package also requires `parent`."""
     pins = unwanted(parse(SMALL), "palaestra", ["parent"])
 
     assert names(share(pins, ["palaestra"], "x86_64")) == set()
@@ -74,7 +74,7 @@ def test_what_a_package_does_not_want_stays_where_another_wants_it():
 
 
 def test_an_image_without_an_extra_has_nothing_that_only_the_extra_wants():
-    """What the package wants anyway stays."""
+    """Packages that are required without the extra stay."""
     package = {
         "dependencies": ["always>=1"],
         "optional-dependencies": {"camera": ["PyOpenGL>=3", "always"], "sound": ["horn"]},
@@ -85,14 +85,14 @@ def test_an_image_without_an_extra_has_nothing_that_only_the_extra_wants():
 
 
 def test_a_share_keeps_every_hash():
-    """A wheel that is not the locked one is refused by the installer."""
+    """The installer refuses a wheel that is not the locked one."""
     requirements = share(parse(SMALL), ["palaestra"], "x86_64")
 
     assert "child==1.0 \\\n    --hash=sha256:aa \\\n    --hash=sha256:bb\n" in requirements
 
 
 def test_a_lock_of_another_form_is_refused_with_the_line():
-    """Leaving out what is not understood would make an image that lacks it."""
+    """If an unknown line were skipped, the image would lack its package."""
     with pytest.raises(ValueError, match=r"'child @ file:///child' has no version with hashes"):
         parse("child @ file:///child\n    # via palaestra\n")
 
@@ -128,7 +128,7 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
     ],
 )
 def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
-    """A sidecar stays small, and the trainer for the processor is without 5 GB of CUDA."""
+    """A sidecar stays small, and the trainer for the processor does not have 5 GB of CUDA."""
     chosen = names(contents(ROOT, recipes("debian")[image], "x86_64").requirements.text)
 
     assert holds <= chosen
@@ -136,7 +136,7 @@ def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
 
 
 def test_what_the_notebook_has_besides_agrees_with_the_lock():
-    """It comes on top of the trainer's libraries, which must stay as they are tested."""
+    """The notebook's image adds to the trainer's libraries, which must stay as they are tested."""
     here, besides = (
         {pin.name: pin.version for pin in parse(share(pins, [pin.name for pin in pins], "x86_64"))}
         for pins in (LOCK, parse((ROOT / recipes("debian")["notebook"].extra).read_text()))
@@ -148,7 +148,7 @@ def test_what_the_notebook_has_besides_agrees_with_the_lock():
 
 
 def test_what_an_image_has_besides_is_nothing_that_it_has_already():
-    """Nothing is fetched twice, and no layer brings what one below it has."""
+    """No package is downloaded twice, and no layer repeats a package of a lower one."""
     inside = contents(ROOT, recipes("debian")["notebook"], "x86_64")
 
     assert names(inside.requirements.text)
@@ -157,7 +157,7 @@ def test_what_an_image_has_besides_is_nothing_that_it_has_already():
 
 
 def test_the_trainer_for_cuda_has_the_locked_torch_and_its_libraries():
-    """Debian's is built for the processor alone."""
+    """Debian's PyTorch is built only for the processor."""
     recipe = recipes("cuda")["trainer"]
 
     assert {"torch", "triton", "nvidia-cudnn-cu12"} <= names(

@@ -1,4 +1,4 @@
-"""The digest that names an archive says everything that goes into it."""
+"""The digest in an archive's name covers everything that goes into the image."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ ROOT = Path(__file__).parents[3]
 
 @given(st.lists(st.binary(max_size=4)), st.lists(st.binary(max_size=4)))
 def test_different_parts_have_different_digests(one, other):
-    """Where one part ends and the next begins counts: a, bc is not ab, c."""
+    """The boundaries between parts count: (a, bc) differs from (ab, c)."""
     assert (digest(one) == digest(other)) == (one == other)
 
 
 def test_a_changed_file_changes_the_digest(tmp_path):
-    """Nothing stale is used."""
+    """No outdated image may be used."""
     file = tmp_path / "module.py"
     file.write_text("1")
     before = digest_of_files(tmp_path, [file])
@@ -28,7 +28,7 @@ def test_a_changed_file_changes_the_digest(tmp_path):
 
 
 def test_a_renamed_file_changes_the_digest(tmp_path):
-    """A module is known by its name."""
+    """The file name is the name of a module."""
     one, other = tmp_path / "one.py", tmp_path / "other.py"
     one.write_text("1")
     before = digest_of_files(tmp_path, [one])
@@ -38,7 +38,7 @@ def test_a_renamed_file_changes_the_digest(tmp_path):
 
 
 def test_the_place_of_the_checkout_does_not_change_the_digest(tmp_path):
-    """Two checkouts share what is built."""
+    """Two checkouts share the images."""
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "module.py").write_text("1")
@@ -49,7 +49,7 @@ def test_the_place_of_the_checkout_does_not_change_the_digest(tmp_path):
 
 
 def test_what_python_leaves_behind_changes_nothing(tmp_path):
-    """Running the tests must not make every image be built again."""
+    """A test run must not cause every image to be built again."""
     source = tmp_path / "package" / "src" / "module.py"
     source.parent.mkdir(parents=True)
     source.write_text("1")

@@ -1,4 +1,4 @@
-"""A program that prints without end fills no disk, and both ends of its output stay."""
+"""A program with endless output does not fill the disk, and both ends of its output are kept."""
 
 import os
 
@@ -11,13 +11,13 @@ FIRST, LAST = 1000, 500
 
 @pytest.fixture
 def log(tmp_path):
-    """A log file that may be read and is appended to."""
+    """A log file, open to read and to append."""
     with (tmp_path / "x.log").open("a+b", buffering=0) as file:
         yield file
 
 
 def limited(file):
-    """Return the end of a log for writing, with small parts."""
+    """Return the writing end of a log, with small parts."""
     return LimitedFile(file.fileno(), FIRST, LAST)
 
 
@@ -27,7 +27,7 @@ def content(file):
 
 
 def write_lines(file, numbers):
-    """Write a line of ten bytes for each number, and return the most bytes that the file had."""
+    """Write a line of ten bytes for each number, and return the largest size that the file had."""
     writer, most = limited(file), 0
     for number in numbers:
         writer.write(b"%09d\n" % number)
@@ -43,7 +43,7 @@ def test_a_short_log_has_every_line(log):
 
 
 def test_a_long_log_keeps_its_two_ends_and_counts_what_was_left_out(log):
-    """The start says what ran, and the end why it ended."""
+    """The start of a log shows the program, and the end shows its error."""
     most = write_lines(log, range(1000))
 
     lines = content(log)
@@ -57,7 +57,7 @@ def test_a_long_log_keeps_its_two_ends_and_counts_what_was_left_out(log):
 
 
 def test_what_was_left_out_is_counted_over_all_writers(log):
-    """A run that resumes appends to the logs of its earlier attempts."""
+    """A resumed run appends to the logs of its earlier attempts."""
     for start in range(0, 3000, 300):
         write_lines(log, range(start, start + 300))
 
@@ -77,7 +77,7 @@ def test_a_log_of_one_endless_line_is_limited_too(log):
 
 
 def test_a_log_that_cannot_be_written_raises_nothing(tmp_path):
-    """The disk is full, or was removed: the run goes on, and ends as it would have."""
+    """The disk may be full or removed; the run continues all the same."""
     (tmp_path / "x.log").write_bytes(b"x" * 5000)
     with (tmp_path / "x.log").open("rb") as log:
         assert limited(log).write(b"lost\n") == 5

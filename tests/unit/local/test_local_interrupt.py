@@ -1,4 +1,4 @@
-"""What ends a run early: a person's signals, and the end of the time that it may take."""
+"""A run ends early through a person's signals or through its deadline."""
 
 import asyncio
 import os
@@ -12,26 +12,26 @@ PATIENCE_S = 20.0
 
 
 class Target:
-    """What can be stopped and killed, and tells it."""
+    """A target that can be stopped and killed, and queues the requests."""
 
     def __init__(self):
         self.told = asyncio.Queue()
 
     def stop(self):
-        """Begin to end."""
+        """Queue a request to stop."""
         self.told.put_nowait("stop")
 
     def kill(self):
-        """End at once."""
+        """Queue a request to kill."""
         self.told.put_nowait("kill")
 
     async def next(self):
-        """Return what it is asked next."""
+        """Return the next request."""
         return await asyncio.wait_for(self.told.get(), PATIENCE_S)
 
 
 def ended_by(signals, deadline_s=None):
-    """Return what a target is asked to do, and the interrupt, after a deadline and then signals."""
+    """Return the requests to a target, and the interrupt, after a deadline and some signals."""
 
     async def play():
         interrupt, target, told = Interrupt(), Target(), []
@@ -48,7 +48,7 @@ def ended_by(signals, deadline_s=None):
 
 
 def test_a_deadline_stops_as_a_first_signal_does():
-    """The trainer saves a checkpoint, but no person has asked for an end."""
+    """The trainer saves a checkpoint, but the end is not a person's."""
     told, interrupt = ended_by(0, deadline_s=0.01)
 
     assert told == ["stop"]
@@ -56,7 +56,7 @@ def test_a_deadline_stops_as_a_first_signal_does():
 
 
 def test_a_first_signal_after_the_deadline_does_not_kill():
-    """A person need not know that the run is ending already."""
+    """The person may not know that the run is already stopping."""
     told, interrupt = ended_by(2, deadline_s=0.01)
 
     assert told == ["stop", "stop", "kill"]
@@ -65,7 +65,7 @@ def test_a_first_signal_after_the_deadline_does_not_kill():
 
 @pytest.mark.parametrize("signals", [1, 2])
 def test_a_run_that_a_person_ends_has_not_expired(signals):
-    """However long its end then takes."""
+    """This does not depend on how long the end takes."""
     told, interrupt = ended_by(signals)
 
     assert told == ["stop", "kill"][:signals]

@@ -1,4 +1,4 @@
-"""Free ports that stay free until their container listens."""
+"""Free ports that stay reserved until their container listens."""
 
 import http.server
 import socket
@@ -10,7 +10,7 @@ from palaestra.local.ports import HeldPorts
 
 
 def test_ports_differ_from_one_another():
-    """Chosen one by one and given back, two could be the same."""
+    """If ports were chosen and released one by one, two could be equal."""
     with HeldPorts() as held:
         ports = [held.any() for _ in range(50)]
 
@@ -18,7 +18,7 @@ def test_ports_differ_from_one_another():
 
 
 def test_a_held_port_is_for_its_container_and_nobody_else():
-    """A server that sets SO_REUSEADDR, as ours do, gets it; a program that does not, doesn't."""
+    """A server with SO_REUSEADDR can bind to the port, as Palaestra's do. A program without it cannot."""
     with HeldPorts() as held:
         port = held.any()
 
@@ -30,7 +30,7 @@ def test_a_held_port_is_for_its_container_and_nobody_else():
 
 
 def test_a_held_port_can_be_listened_on_again_after_a_restart():
-    """A sidecar that crashed comes back on the same port."""
+    """A sidecar that crashed listens on the same port again."""
     with HeldPorts() as held:
         port = held.any()
         for _ in range(3):
@@ -42,7 +42,7 @@ def test_a_held_port_can_be_listened_on_again_after_a_restart():
 
 
 def test_a_port_in_use_is_refused_with_a_remedy():
-    """Before anything is started."""
+    """The error comes before anything is started."""
     with socket.create_server(("127.0.0.1", 0)) as server, HeldPorts() as held:
         port = server.getsockname()[1]
 

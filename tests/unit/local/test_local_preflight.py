@@ -18,7 +18,7 @@ JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata"
 
 @pytest.fixture
 def request_for(tmp_path):
-    """Return a builder of requests to run a job with this spec."""
+    """Return a function that makes requests to run a job with this spec."""
 
     def make(**spec):
         return PreflightRequest(job=validate({**JOB, "spec": spec}), runs=tmp_path / "runs")
@@ -27,13 +27,13 @@ def request_for(tmp_path):
 
 
 def collecting(**fields):
-    """Return groups of simulators, the first with these fields."""
+    """Return groups of simulators, the first of them with these fields."""
     first = {"name": "collect", "role": "Collect", **fields}
     return {"simulators": [first, {"name": "evaluate", "role": "Evaluate"}]}
 
 
 def test_this_machine_can_run_the_minimal_job(request_for):
-    """The checks find no fault where there is none, and write nothing."""
+    """The checks find no problem and write nothing."""
     request = request_for()
 
     preflight.check(request)
@@ -42,7 +42,7 @@ def test_this_machine_can_run_the_minimal_job(request_for):
 
 
 def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypatch, tmp_path):
-    """Not as a traceback of the trainer, a minute later."""
+    """Otherwise the trainer would fail with a traceback a minute later."""
     monkeypatch.setenv("PATH", str(tmp_path))
 
     problems = list(preflight.ros_is_installed(request_for()))
@@ -51,7 +51,7 @@ def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypa
 
 
 def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch, tmp_path):
-    """There the processes that a container leaves behind could not be found, and would live on."""
+    """Without /proc, the processes that a container leaves behind could not be found and ended."""
     monkeypatch.setattr(preflight, "ENVIRONMENT", tmp_path / "environ")
 
     [problem] = preflight.processes_can_be_found(request_for())
@@ -60,7 +60,7 @@ def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch,
 
 
 def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_path):
-    """On the machine's PYTHONPATH and on the job's own; both reach a process of the pod."""
+    """The PYTHONPATH of the machine and that of the job both reach a process of the pod."""
     for folder in ("machine", "job"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "queue.py").touch()
@@ -76,7 +76,7 @@ def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_pa
 
 
 def test_a_suspended_job_is_refused(request_for):
-    """Nothing here would ever set it to false, and training that was put off must not begin."""
+    """Nothing here would ever resume it, and a suspended training must not begin."""
     [problem] = preflight.nothing_is_put_off(request_for(suspend=True))
 
     assert problem.startswith("spec.suspend: is true")
@@ -101,12 +101,15 @@ def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec
 
 
 def test_a_job_with_mujoco_runs_where_it_is_installed(request_for):
-    """`make setup` installs it."""
+    """`make setup` installs MuJoCo."""
     assert not list(preflight.programs_exist(request_for(**collecting(driver="mujoco"))))
 
 
 def test_the_error_for_a_missing_mujoco_names_the_package_and_the_extra(request_for, monkeypatch):
-    """Its program is always there, its library is an extra; a simulator's log would be read much later."""
+    """The program is always installed, but its library is an extra.
+
+    Nobody reads a simulator's log at once.
+    """
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
 
     [problem] = preflight.programs_exist(request_for(**collecting(driver="mujoco")))
@@ -118,7 +121,7 @@ def test_the_error_for_a_missing_mujoco_names_the_package_and_the_extra(request_
 
 
 def test_the_error_for_a_missing_program_of_mujoco_names_the_package(request_for, monkeypatch, tmp_path):
-    """That of an installation without simulators."""
+    """An installation without simulators lacks the program."""
     monkeypatch.setattr("palaestra.local.simulators.program_path", lambda: str(tmp_path))
 
     assert (
@@ -128,7 +131,7 @@ def test_the_error_for_a_missing_program_of_mujoco_names_the_package(request_for
 
 
 def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_path):
-    """Its sidecar would find it too, but in a log."""
+    """Its sidecar would find the mistake too, but report it only in a log."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nWorldInfo {\n  basicTimeStep [\n}\n")
 
@@ -139,7 +142,7 @@ def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_
 
 
 def test_a_world_file_that_is_right_passes(request_for, tmp_path):
-    """Also when it names files that lie beside it."""
+    """It may refer to files in its folder."""
     world = tmp_path / "arena.wbt"
     world.write_bytes(builtin("arena"))
 
@@ -147,14 +150,14 @@ def test_a_world_file_that_is_right_passes(request_for, tmp_path):
 
 
 def test_the_error_for_a_missing_world_file_has_its_path(request_for):
-    """And with the system's own words."""
+    """The message also has the system's own words."""
     [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": "/no/such.wbt"})))
 
     assert "/no/such.wbt: No such file or directory" in problem
 
 
 def test_a_world_without_an_end_is_refused(request_for, tmp_path):
-    """A device without an end fills the memory, and opening a pipe blocks the check."""
+    """A device without an end fills the memory, and the opening of a pipe blocks the check."""
     device, pipe = tmp_path / "device.wbt", tmp_path / "pipe.wbt"
     device.symlink_to("/dev/zero")
     os.mkfifo(pipe)
@@ -165,7 +168,7 @@ def test_a_world_without_an_end_is_refused(request_for, tmp_path):
 
 
 def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, tmp_path):
-    """The sidecar refused it too, but only after the start, and was started again for a minute."""
+    """The sidecar refuses it too, but only after the start, and is then restarted for a minute."""
     world = tmp_path / "lab" / "worlds" / "arm.xml"
     world.parent.mkdir(parents=True)
     (tmp_path / "arm.xml").write_text("<mujocoinclude/>")
@@ -180,7 +183,7 @@ def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, 
 
 
 def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
-    """It would end the run in the middle of a checkpoint."""
+    """The disk would be full in the middle of a checkpoint."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
     with pytest.raises(RunRefused, match=r"MiB are free and a run takes .*--dir"):
@@ -188,7 +191,7 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
 
 
 def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_path):
-    """Before the folder of the run is made; the check leaves nothing behind."""
+    """The check comes before the run directory is created, and leaves nothing behind."""
     monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
 
     [problem] = preflight.locks_work(request_for())
@@ -199,7 +202,7 @@ def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_pa
 
 
 def test_all_problems_are_reported_at_once(request_for, monkeypatch):
-    """An author fixes all problems of a job in one go."""
+    """An author can fix all problems of a job at once."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
     with pytest.raises(RunRefused) as refused:
@@ -209,7 +212,7 @@ def test_all_problems_are_reported_at_once(request_for, monkeypatch):
 
 
 def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path):
-    """Found before a simulator starts, as a world would be."""
+    """The check comes before a simulator starts, as that of a world does."""
 
     def problems(path):
         return list(preflight.initial_policy_is_there(request_for(trainer={"initialPolicy": {"path": path}})))
@@ -229,7 +232,7 @@ def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path
 
 
 def test_an_initial_policy_may_be_gone_once_the_run_has_a_checkpoint(request_for):
-    """A run that is prolonged resumes from that, and the run that the policy is of may have been deleted."""
+    """A prolonged run resumes from its checkpoint, and the run of the initial policy may be deleted."""
     request = request_for(trainer={"initialPolicy": {"path": "/deleted/model.zip"}})
     before = list(preflight.initial_policy_is_there(request))
 

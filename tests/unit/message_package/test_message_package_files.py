@@ -1,4 +1,4 @@
-"""The text of the package webots_ros: its md5 sums, and its Python modules."""
+"""The content of the package webots_ros: its md5 sums and its Python modules."""
 
 import ast
 from pathlib import Path
@@ -14,13 +14,13 @@ from tests.tables import for_each
 
 FILES = dict(package_files())
 MESSAGES, SERVICES = ([name for name in names if name.startswith("webots_ros/")] for names in type_names())
-# Those of Debian's ros-sensor-msgs and what that depends on.
+# The messages of Debian's ros-sensor-msgs and of its dependencies.
 INSTALLED = {name: [f"/usr/share/{name}/msg"] for name in ("std_msgs", "geometry_msgs", "sensor_msgs")}
 
 
 @pytest.fixture
 def definitions(tmp_path):
-    """Returns where genmsg looks for messages: ours in a folder, all others as they are installed."""
+    """Return the folders in which genmsg looks for messages: this project's and the installed ones."""
     for name, text in FILES.items():
         if name.endswith(".msg"):
             (tmp_path / Path(name).name).write_text(text)
@@ -28,14 +28,14 @@ def definitions(tmp_path):
 
 
 def md5_of(spec, context, definitions):
-    """Return the md5 that ROS's tools compute from files."""
+    """Return the md5 sum that ROS's tools compute from the files."""
     genmsg.msg_loader.load_depends(context, spec, definitions)
     return genmsg.gentools.compute_md5(context, spec)
 
 
 @for_each("name", MESSAGES)
 def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
-    """A tool that reads the file would otherwise be refused by the simulator."""
+    """Otherwise the simulator would refuse a tool that reads the file."""
     context = genmsg.MsgContext.create_default()
     text = FILES[f"msg/{name.removeprefix('webots_ros/')}.msg"]
 
@@ -46,7 +46,7 @@ def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
 
 @for_each("name", SERVICES)
 def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
-    """Request and response together: the md5 of a service is over both."""
+    """The md5 sum of a service covers request and response together."""
     context = genmsg.MsgContext.create_default()
     text = FILES[f"srv/{name.removeprefix('webots_ros/')}.srv"]
 
@@ -56,7 +56,7 @@ def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
 
 
 def test_the_modules_of_a_kind_are_the_types_of_that_kind():
-    """`webots_ros.srv` without one service would fail in the program that needs it, not in ours."""
+    """If `webots_ros.srv` lacked a service, the user's program would fail, not this one."""
     for kind, names in (("msg", MESSAGES), ("srv", SERVICES)):
         imports = ast.parse(FILES[f"src/webots_ros/{kind}/__init__.py"]).body
 

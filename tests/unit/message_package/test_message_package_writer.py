@@ -1,4 +1,4 @@
-"""`palaestra-webots-ros` in a folder: new, with an earlier package, with another's, and full."""
+"""`palaestra-webots-ros` writes into a new folder, one with another package, and one on a full disk."""
 
 import resource
 import subprocess
@@ -12,12 +12,12 @@ from palaestra_sim.message_package.files import package_files
 from palaestra_sim.message_package.package_writer import make_importable, write
 
 COMMAND = Path(sys.executable).with_name("palaestra-webots-ros")
-SYSTEM_PYTHON = "/usr/bin/python3"  # has genpy and the messages of Debian, and nothing of ours
+SYSTEM_PYTHON = "/usr/bin/python3"  # has genpy and Debian's messages, but no package of Palaestra
 
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
-    """Return a package that is only read."""
+    """Return a package that the tests only read."""
     return write(tmp_path_factory.mktemp("share"))
 
 
@@ -31,7 +31,7 @@ def contents(folder):
 
 
 def python(code, *arguments):
-    """Return what a Python program prints."""
+    """Return the output of a Python program."""
     done = subprocess.run(
         [SYSTEM_PYTHON, "-c", code, *map(str, arguments)],
         capture_output=True,
@@ -49,7 +49,7 @@ def test_the_folder_holds_every_file_of_the_package_and_nothing_besides(package)
 
 
 def test_the_bytecode_names_the_files_where_they_are(package):
-    """In a container it cannot be compiled again, and a traceback shows lines of files."""
+    """In a container it cannot be compiled again, and a traceback shows lines of these files."""
     code = "import sys; sys.path.append(sys.argv[1]); import webots_ros.srv._set_int as module\n"
     code += "print(module.__cached__, module.set_intRequest.serialize.__code__.co_filename)"
 
@@ -60,7 +60,7 @@ def test_the_bytecode_names_the_files_where_they_are(package):
 
 
 def test_a_package_of_an_earlier_release_is_replaced_as_a_whole(tmp_path):
-    """A type that is gone would otherwise stay importable."""
+    """Otherwise a removed type could still be imported."""
     (write(tmp_path) / "srv/gone.srv").write_text("---\n")
 
     package = write(tmp_path)
@@ -70,7 +70,7 @@ def test_a_package_of_an_earlier_release_is_replaced_as_a_whole(tmp_path):
 
 
 def test_a_failed_write_leaves_the_earlier_package_as_it_was(tmp_path):
-    """Here no file may have more than 3,000 bytes, as on a disk that becomes full half-way."""
+    """The test limits files to 3,000 bytes, like a disk that becomes full half-way."""
     earlier = write(tmp_path) / "srv/earlier.srv"
     earlier.write_text("---\n")
 
@@ -117,14 +117,14 @@ IMPORTED += "import webots_ros.srv; print(webots_ros.srv.set_int)"
 
 
 def test_a_python_whose_packages_name_it_imports_it(package, tmp_path):
-    """Without PYTHONPATH, which a notebook or a program in a pod does not have."""
+    """It works without PYTHONPATH, which a notebook or a program in a pod does not have."""
     make_importable(package, tmp_path)
 
     assert python(IMPORTED, tmp_path, tmp_path / "nothing") == "<class 'webots_ros.srv._set_int.set_int'>"
 
 
 def test_an_installed_webots_ros_is_imported_even_if_it_comes_last(package, tmp_path):
-    """In the virtual environment our packages come before those of the distribution."""
+    """In the virtual environment Palaestra's packages come before those of the distribution."""
     make_importable(package, tmp_path)
     installed = tmp_path / "dist-packages/webots_ros"
     (installed / "srv").mkdir(parents=True)

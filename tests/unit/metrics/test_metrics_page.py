@@ -1,6 +1,8 @@
-"""What the programs declare: names by Prometheus' conventions, and the page that is made of them.
+"""The programs' metrics: names by Prometheus' conventions, and the page that is generated from them.
 
-Source of the rules: https://prometheus.io/docs/practices/naming/ and what `promtool check metrics` says.
+Source of the rules: https:
+
+prometheus.io/docs/practices/naming/ and the checks of `promtool check metrics`.
 """
 
 import re
@@ -25,7 +27,8 @@ HOMES = {
     "trainer": ("palaestra_trainer_", "palaestra_simulator_"),
     "sidecar": ("palaestra_sidecar_", "palaestra_simulator_"),
 }
-# Endings that are a unit, or that stand for none; a name with another ending counts the things that it names.
+# These endings are units, or mark a value without one; a name with another ending counts the objects that it
+# names.
 ENDS = ("_seconds", "_bytes", "_ratio", "_steps", "_info", "_per_second", "_total")
 UNITLESS = {
     "palaestra_jobs",
@@ -46,7 +49,7 @@ UNITLESS = {
     "palaestra_trainer_simulators",
 }
 OTHER_UNITS = re.compile(r"_(ms|milliseconds|minutes|hours|kb|mb|gb|kilobytes|megabytes|percent)(_|$)")
-# What Prometheus or its operator adds to a target: a program's own label would be renamed.
+# Prometheus or its operator adds these labels to a target, and would rename a program's own.
 OF_TARGETS = {
     "job", "instance", "namespace", "pod", "container", "endpoint", "service", "training_job", "replica",
 }  # fmt: skip
@@ -55,7 +58,7 @@ each_family = for_each("family", FAMILIES)
 
 
 def test_a_name_is_declared_once():
-    """Else the same name would mean two things, by whom it was scraped."""
+    """Otherwise the meaning of a name would depend on the scraped program."""
     names = [family.name for family in FAMILIES]
 
     assert sorted(names) == sorted(set(names))
@@ -63,20 +66,20 @@ def test_a_name_is_declared_once():
 
 @pytest.mark.parametrize("program", page.PROGRAMS, ids=lambda program: program.name)
 def test_a_name_tells_its_home(program):
-    """And begins with the project's."""
+    """It also begins with the project's prefix."""
     assert all(family.name.startswith(PREFIX) for family in program.families)
     assert [it.name for it in program.families if not it.name.startswith(HOMES[program.name])] == []
 
 
 @each_family
 def test_a_counter_and_nothing_else_ends_in_total(family):
-    """A reader knows by the name whether to take a rate."""
+    """The name shows whether a query needs a rate."""
     assert family.name.endswith("_total") is (family.kind is MetricType.COUNTER)
 
 
 @each_family
 def test_a_name_has_a_base_unit_or_none(family):
-    """Seconds, bytes and ratios: no query has to convert anything."""
+    """With seconds, bytes and ratios no query has to convert anything."""
     assert re.fullmatch(r"[a-z][a-z0-9_]*[a-z0-9]", family.name)
     assert not OTHER_UNITS.search(family.name)
     assert family.name.endswith(ENDS) is not (family.name in UNITLESS)
@@ -84,28 +87,28 @@ def test_a_name_has_a_base_unit_or_none(family):
 
 @each_family
 def test_a_name_ends_in_nothing_that_prometheus_adds(family):
-    """`_sum`, `_count` and `_bucket` are parts of a histogram, and a type is no part of a name."""
+    """`_sum`, `_count` and `_bucket` belong to a histogram, and a type is not a part of a name."""
     assert not re.search(r"_(sum|count|bucket|created|counter|gauge|histogram)(_|$)", family.name)
 
 
 @each_family
 def test_a_help_text_is_a_line_that_tells_something(family):
-    """It stands beside the metric in Grafana's explorer."""
+    """Grafana's explorer shows it next to the metric."""
     assert re.fullmatch(r"[A-Z1].{14,118}\.", family.meaning)
 
 
 @each_family
 def test_labels_are_bounded_and_not_those_of_a_target(family):
-    """Each has a list of values, or something that there are few of."""
+    """Each label has a list of values, or names objects of which there are few."""
     for label in family.labels:
         assert re.fullmatch(r"[a-z][a-z_]*", label.name)
-        assert label.name not in OF_TARGETS | {"le", "quantile"}  # two that are Prometheus' own
+        assert label.name not in OF_TARGETS | {"le", "quantile"}  # le and quantile are Prometheus' own
         assert label.values or label.bound in page.SIZES
 
 
 @each_family
 def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
-    """Few enough that each of thousands of trainers may have them."""
+    """There are few enough buckets for thousands of trainers."""
     buckets = family.buckets
 
     assert bool(buckets) is (family.kind is MetricType.HISTOGRAM)
@@ -114,14 +117,14 @@ def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
 
 
 def test_the_page_has_every_family_and_no_other():
-    """It is made from the same tables; here it is read as a person does."""
+    """The page is generated from the same tables; this test reads it as a person does."""
     named = re.findall(r"^\| `(palaestra_\w+)` \|", PAGE.read_text(), re.MULTILINE)
 
     assert named == [family.name for family in FAMILIES]
 
 
 def test_the_queries_of_the_page_name_metrics_that_there_are():
-    """A name that was changed is found here."""
+    """The test finds a renamed metric."""
     text = PAGE.read_text()
     known = {family.name for family in FAMILIES}
 
@@ -130,5 +133,5 @@ def test_the_queries_of_the_page_name_metrics_that_there_are():
 
 
 def test_the_series_of_a_large_cluster_are_few_enough_for_one_prometheus():
-    """A thousand jobs at once; a server takes some millions of series."""
+    """With a thousand jobs at once they must stay below the millions of series that a server handles."""
     assert sum(program.series * program.count for program in page.PROGRAMS) < 600_000

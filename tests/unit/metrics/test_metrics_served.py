@@ -1,7 +1,9 @@
-"""The histograms that operator and trainer serve, by the rules of Prometheus' text format and OpenMetrics.
+"""The histograms of operator and trainer keep the rules of Prometheus' text format and OpenMetrics.
 
-Sources: https://prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some
-readers are stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
+Sources: https:
+
+prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some readers are
+stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
 """
 
 from collections import defaultdict
@@ -20,7 +22,7 @@ from palaestra_trainer.telemetry.progress import Progress
 
 
 def operator():
-    """Return the text of an operator that has counted one event of each kind."""
+    """Return the metrics of an operator that has counted one event of each kind."""
     metrics = Metrics()
     metrics.request("get", "pods", 200, 0.02)
     metrics.waited(0.3)
@@ -29,7 +31,7 @@ def operator():
 
 
 def trainer():
-    """Return the text of a trainer with episodes of negative and positive returns, and a checkpoint."""
+    """Return the metrics of a trainer with episodes of negative and positive returns, and a checkpoint."""
     progress = Progress(100, [("collect-0", "Collect")], lambda: 0.0)
     progress.collected(7, [{"episode": {"r": number, "l": 3}} for number in (-2000.0, -7.0, 0.5, 3.0)])
     progress.figures.saves.observe(0.2)
@@ -37,7 +39,10 @@ def trainer():
 
 
 def series(text):
-    """Return the samples of each histogram's series: by family and labels, the values by suffix or bound."""
+    """Return the samples of each histogram's series by family and labels.
+
+    A series maps suffix or bound to value.
+    """
     found = defaultdict(dict)
     for family in text_string_to_metric_families(text):
         for sample in family.samples if family.type == "histogram" else ():
@@ -49,7 +54,7 @@ def series(text):
 
 @pytest.mark.parametrize(("served", "declared"), [(operator, of_operator), (trainer, of_trainer)])
 def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, declared):
-    """Ascending buckets up to infinity, an equal count, and a sum unless it may fall."""
+    """These are ascending buckets up to infinity, an equal count, and a sum unless it may decrease."""
     text = served()
     found = series(text)
 
@@ -67,7 +72,7 @@ def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, decla
 
 
 def test_an_episode_of_each_return_is_in_the_count():
-    """Also one below the lowest bound."""
+    """A return below the lowest bound is counted, too."""
     samples = series(trainer())["palaestra_trainer_episode_return",]
 
     assert samples["palaestra_trainer_episode_return_count"] == 4

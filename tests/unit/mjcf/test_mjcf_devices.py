@@ -1,4 +1,4 @@
-"""Actuators, sensors and cameras of a model as devices of Webots."""
+"""Actuators, sensors and cameras of a model become devices of Webots."""
 
 import math
 
@@ -11,7 +11,7 @@ from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 
 def kinds(simulation):
-    """Return the types of the nodes of all devices by name."""
+    """Return the node types of all devices by name."""
     return {name: kind.node for name, (kind, _) in simulation.robots[0].parts.devices.rows.items()}
 
 
@@ -21,7 +21,7 @@ def value(simulation, name):
 
 
 def test_every_actuator_sensor_and_camera_is_a_device(load):
-    """A model needs no mapping; a sensor without a name has that of its joint and its type."""
+    """A model needs no mapping; a sensor without a name gets that of its joint and its type."""
     assert kinds(load()) == {
         "push": "LinearMotor",
         "cart position": "PositionSensor",
@@ -38,7 +38,7 @@ def test_every_actuator_sensor_and_camera_is_a_device(load):
 
 
 def test_a_name_that_ros_refuses_gets_underscores(load):
-    """MuJoCo takes any characters, and the names of models are not the author's to change."""
+    """MuJoCo allows any character, and a user may be unable to change the names of a model."""
     found = kinds(load(FORCE.replace('"push"', '"/cart::pushé"')))
 
     assert found["cart__push_"] == "LinearMotor"
@@ -53,7 +53,7 @@ def test_names_of_one_topic_are_refused_with_the_text_that_renames_one(load):
 
 
 def test_a_text_renames_a_device_or_leaves_it_out(load):
-    """Programs of users look for names of their own."""
+    """Users' programs expect names of their own."""
     texts = '<text name="device:actuator/push" data="motor"/><text name="device:camera/eye" data="-"/>'
 
     found = kinds(load(FORCE, "", ("<custom>", f"<custom>{texts}")))
@@ -63,7 +63,7 @@ def test_a_text_renames_a_device_or_leaves_it_out(load):
 
 
 def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
-    """Blue comes first; the camera looks down on a red plate, and moves with its body."""
+    """The color order begins with blue; the camera looks down on a red plate and moves with its body."""
     plate = '<geom type="box" pos="0 0 0.1" size="0.5 0.5 0.01" rgba="1 0 0 1" contype="0" conaffinity="0"/>'
     simulation = load(FORCE, "", ('<geom name="floor"', f'{plate}<geom name="floor"'))
     _, camera = simulation.robots[0].parts.devices.rows["eye"]
@@ -81,7 +81,7 @@ def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
 
 
 def test_a_force_accelerates_its_joint(load):
-    """Through the gear: 1.1 N move 1.1 kg by 1 m/s2 for half a second."""
+    """The gear counts: 1.1 N accelerate 1.1 kg to 1 m/s2, for half a second."""
     simulation = load(FORCE, "", ('damping="0.01"', 'damping="1000"'))
     simulation.robots[0].motors["push"].set_effort(1.1)
 
@@ -92,7 +92,7 @@ def test_a_force_accelerates_its_joint(load):
 
 
 def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
-    """As a motor of Webots, whose target of infinity means a velocity."""
+    """A motor of Webots does the same; its target of infinity means a velocity."""
     simulation = load(VELOCITY)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(math.inf)
@@ -107,7 +107,7 @@ def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
 
 
 def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
-    """Without a velocity it goes as fast as its force allows."""
+    """Without a commanded velocity it moves as fast as its force allows."""
     simulation = load(POSITION)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(1.0)
@@ -136,7 +136,7 @@ def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
     ],
 )
 def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command, message):
-    """A success without an effect would let a policy learn from a robot that stands still."""
+    """If the command succeeded without an effect, a policy would learn from a robot that stands still."""
     motor = load(actuator).robots[0].motors["push"]
 
     with pytest.raises(UnsimulatedError, match=message):
@@ -144,7 +144,7 @@ def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command
 
 
 def test_sensors_have_the_values_of_the_moment(load):
-    """MuJoCo computes them at the beginning of its step; here they are those after it."""
+    """MuJoCo computes them at the beginning of a step; the devices have those after it."""
     simulation = load()
     simulation.robots[0].motors["push"].set_effort(5.0)
 
@@ -156,7 +156,7 @@ def test_sensors_have_the_values_of_the_moment(load):
 
 
 def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(load):
-    """MuJoCo's -1 would be nearer than everything."""
+    """MuJoCo's value of -1 would be nearer than any object."""
     simulation = load(FORCE, '<rangefinder name="up" site="skin" cutoff="7"/>')
 
     simulation.step(10)
@@ -166,7 +166,7 @@ def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(l
 
 
 def test_the_other_sensors_have_the_units_of_webots(load):
-    """Gravity is upward in an accelerometer; a quaternion ends with w."""
+    """Gravity points up in an accelerometer, and a quaternion ends with w."""
     simulation = load()
 
     simulation.step(10)
@@ -200,7 +200,7 @@ def test_what_cannot_be_a_device_is_refused_before_anything_starts(load, texts, 
 
 
 def test_devices_of_one_name_are_told_apart(load):
-    """Names are unique in a section of a model; servos have a position and a velocity term without names."""
+    """A name is unique only in a section of a model; the velocity term of a servo has no name of its own."""
     servo = '<position joint="slider" kp="20"/><velocity joint="slider" kv="1"/>'
 
     found = kinds(load(servo + FORCE, '<jointpos name="push" joint="hinge"/>'))
@@ -209,7 +209,7 @@ def test_devices_of_one_name_are_told_apart(load):
 
 
 def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
-    """An included file may name files too."""
+    """An included file may name further files."""
     (tmp_path / "part.xml").write_text('<mujoco><asset><mesh file="/etc/x.obj"/></asset></mujoco>')
 
     with pytest.raises(WorldError, match=r"part\.xml:1:16: '/etc/x.obj' does not count from the folder"):
@@ -217,7 +217,7 @@ def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
 
 
 def test_a_part_of_the_model_that_is_missing_is_refused(load):
-    """MuJoCo would not say where it looked."""
+    """MuJoCo's error does not show where it looked."""
     with pytest.raises(
         WorldError, match=r"the file 'part\.xml', of which the model consists too, is missing"
     ):

@@ -1,4 +1,4 @@
-"""Models of several files: where MuJoCo finds them, and what they hold."""
+"""Models of several files: where MuJoCo finds them, and their content."""
 
 import mujoco
 import pytest
@@ -20,7 +20,7 @@ ARGUMENTS = '<custom><text name="controllerArgs" data="--name=cell --synchronize
 
 @pytest.fixture
 def world(tmp_path):
-    """`world(head, body, **files)`: the path of a world in a project, with more files from its folder."""
+    """`world(head, body, **files)` returns the path of a world in a project with these files."""
 
     def write(head="", body="", files=()):
         folder = tmp_path / "project" / "worlds"
@@ -33,7 +33,10 @@ def world(tmp_path):
 
 
 def test_files_are_found_where_mujoco_finds_them(world):
-    """Beside the world, then beside the file that includes them; one that leads back inside is no stray."""
+    """The world's folder comes first, then that of the including file.
+
+    A path with `..` may lead back into the project.
+    """
     path = world(
         ARGUMENTS.format(""),
         '<include file="arm/arm.xml"/>',
@@ -51,7 +54,7 @@ def test_files_are_found_where_mujoco_finds_them(world):
 
 
 def test_what_an_included_file_holds_counts(world):
-    """The timestep, the basic step and names of devices were those of the main file alone."""
+    """Only the main file was read for the timestep, the basic step and the names of devices."""
     custom = '<numeric name="basicTimeStep" data="6"/><text name="device:actuator/push" data="arm"/>'
     inner = f"<mujocoinclude><option timestep='0.003'/>{ARGUMENTS.format(custom)}</mujocoinclude>"
     path = world('<include file="defaults.xml"/>', files={"defaults.xml": inner})
@@ -63,7 +66,7 @@ def test_what_an_included_file_holds_counts(world):
 
 
 def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
-    """The last of several options decides, wherever it is."""
+    """The last option in the model wins, in whichever file it is."""
     head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'
     inner = '<mujocoinclude><option timestep="0.003"/></mujocoinclude>'
 
@@ -84,7 +87,7 @@ def test_the_project_is_the_nearest_folder_that_holds_all_files(world, tmp_path)
 
 
 def test_a_file_outside_of_the_root_that_the_user_names_is_refused(world, tmp_path):
-    """With the file that names it, and what to do."""
+    """The message has the file that names it, and the remedy."""
     (tmp_path / "shared.xml").write_text(OUTSIDE)
     inner = '<mujocoinclude><include file="../../shared.xml"/></mujocoinclude>'
     path = world("", '<include file="inner.xml"/>', {"inner.xml": inner})
@@ -98,7 +101,7 @@ def test_a_file_outside_of_the_root_that_the_user_names_is_refused(world, tmp_pa
 
 
 def test_the_whole_file_system_is_no_project(world):
-    """A model of a stranger must not read files of the pod."""
+    """A model from somebody else must not read files of the pod."""
     path = world("", f'<include file="{"../" * 20}etc/passwd"/>')
 
     with pytest.raises(WorldError, match="etc/passwd' leads to the root of the file system; copy it"):
@@ -107,7 +110,10 @@ def test_the_whole_file_system_is_no_project(world):
 
 @pytest.mark.parametrize("element", ['<include file="inner.xml"/>', '<geom type="mesh" mesh="inner"/>'])
 def test_a_link_out_of_the_project_is_refused(world, tmp_path, element):
-    """As a name that leads there is; one inside is fine, such as those of a mounted ConfigMap."""
+    """It is treated like a name that leads out.
+
+    Links inside are allowed, such as those of a mounted ConfigMap.
+    """
     (tmp_path / "shared.xml").write_text(OUTSIDE)
     path = world(f'<asset><mesh name="inner" file="inner.xml"/></asset>{ARGUMENTS.format("")}', element)
     (path.parent / "inner.xml").symlink_to(tmp_path / "shared.xml")
@@ -123,7 +129,7 @@ def test_a_link_out_of_the_project_is_refused(world, tmp_path, element):
 
 
 def test_a_rounded_timestep_is_made_exact(world):
-    """A joint that turns at 1 rad/s has turned by 1 after 1 s, or the clock runs away from the physics."""
+    """A joint at 1 rad/s must turn by 1 rad in 1 s; otherwise the clock and the physics drift apart."""
     turning = """<option timestep="0.0041667" gravity="0 0 0"/>
         <keyframe><key name="home" qvel="1"/></keyframe>
         <sensor><jointpos joint="hinge"/></sensor>"""

@@ -34,13 +34,13 @@ def device(simulation, name):
 
 @pytest.fixture
 def ros():
-    """An empty ROS."""
+    """Return a ROS without nodes."""
     return FakeRos()
 
 
 @pytest.fixture
 def robot(ros, cartpole):
-    """`robot(actuator, sensor)`: the node of the robot of a world that runs."""
+    """`robot(actuator, sensor)` returns the robot's node of a running world."""
 
     def start(*texts):
         RunningSimulator(cartpole(*texts), load_mjcf, ros.make_node, mode=Mode.FAST, clock=ros.clock).start()
@@ -50,7 +50,7 @@ def robot(ros, cartpole):
 
 
 def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
-    """In three poses; MuJoCo itself computes them for the same state."""
+    """In three poses the values are those that MuJoCo itself computes for the same state."""
     simulation = load(FORCE, SENSORS)
     model = mujoco.MjModel.from_xml_path(str(cartpole(FORCE, SENSORS)))
     data = mujoco.MjData(model)
@@ -65,7 +65,7 @@ def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
         mujoco.mj_forward(model, data)
         for name in NAMES:
             number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
-            number = model.nsensor - 1 if number < 0 else number  # the one without a name
+            number = model.nsensor - 1 if number < 0 else number  # -1: the sensor without a name
             start = model.sensor_adr[number]
             expected = data.sensordata[start : start + model.sensor_dim[number]]
             value = simulation.robots[0].sensors[f"mujoco/{name}"].value
@@ -73,14 +73,14 @@ def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
 
 
 def test_a_sensor_of_one_number_stays_a_position_sensor(load):
-    """Worlds of before keep their devices."""
+    """One number fits the message of that device."""
     simulation = load(FORCE, '<user name="one" dim="1"/>')
 
     assert "one" in simulation.robots[0].sensors
 
 
 def test_its_messages_have_the_numbers_once_it_is_enabled(robot):
-    """The facade of the trainer reads what the simulator sends."""
+    """The trainer's facade reads the messages of the simulator."""
     node = robot(FORCE, VELOCITY)
     messages = node.inbox("mujoco/cart_velocity/value")
     node.call("robot/time_step", value=10)
@@ -99,7 +99,7 @@ def test_its_messages_have_the_numbers_once_it_is_enabled(robot):
 
 
 def test_services_name_it_below_mujoco(robot):
-    """The list of devices has the name that its services have."""
+    """The list of devices has the name that is in the paths of its services."""
     node = robot(FORCE, VELOCITY)
 
     assert "mujoco/cart velocity" in node.get("robot/get_device_list")
@@ -108,7 +108,7 @@ def test_services_name_it_below_mujoco(robot):
 
 
 def test_a_reset_returns_its_numbers_and_the_control(load):
-    """An actuator has no command then, as at the start."""
+    """As at the start, an actuator has no command then."""
     simulation = load(FORCE + GRIP, VELOCITY)
     simulation.robots[0].motors["push"].set_effort(5.0)
     simulation.step(10)
@@ -128,7 +128,7 @@ def test_a_reset_returns_its_numbers_and_the_control(load):
     ("actuator", "name"), [(GRIP, "grip"), (MUSCLE, "arm"), (GENERAL, "any")], ids=["grip", "arm", "any"]
 )
 def test_an_actuator_without_a_motor_takes_mujocos_control(robot, actuator, name):
-    """A muscle, an adhesion, and an actuator that integrates its control."""
+    """These are a muscle, an adhesion, and an actuator that integrates its control."""
     node = robot(FORCE + actuator)
     path = f"mujoco/{name}"
     assert node.get(f"{path}/get_control") == 0.0
@@ -140,7 +140,7 @@ def test_an_actuator_without_a_motor_takes_mujocos_control(robot, actuator, name
 
 
 def test_an_adhesion_keeps_its_control_within_its_range(load):
-    """As MuJoCo does; NaN would be a fault of the simulator that a client causes."""
+    """MuJoCo does the same. NaN is refused, because a client must not cause a fault of the simulator."""
     simulation = load(FORCE + GRIP)
     grip = device(simulation, "mujoco/grip")
 
@@ -153,7 +153,7 @@ def test_an_adhesion_keeps_its_control_within_its_range(load):
 
 
 def test_an_adhesion_pulls(load):
-    """The ball sticks to the floor, so its touch sensor feels more than its weight."""
+    """The ball sticks to the floor, so its touch sensor measures more than its weight."""
     pull = '<adhesion name="pull" body="ball" ctrlrange="0 1" gain="100"/>'
     simulation = load(FORCE + pull)
     simulation.step(2000)
@@ -176,7 +176,7 @@ def test_an_adhesion_pulls(load):
     ids=["sensor", "adhesion", "muscle", "general"],
 )
 def test_leave_out_leaves_out_a_type(load, texts, type_name, name):
-    """The trainer logs it, and the status of the job has it."""
+    """The trainer logs the left-out devices, and the job's status shows them."""
     simulation = load(*texts, leave_out=[type_name])
 
     assert name not in simulation.robots[0].parts.devices.rows
@@ -185,7 +185,7 @@ def test_leave_out_leaves_out_a_type(load, texts, type_name, name):
 
 
 def test_a_text_renames_it_or_leaves_it_out(load):
-    """The new name is below `mujoco/` too."""
+    """The new name begins with `mujoco/` too."""
     texts = '<text name="device:sensor/cart velocity" data="v"/><text name="device:actuator/grip" data="-"/>'
 
     rows = load(FORCE + GRIP, VELOCITY, ("<custom>", f"<custom>{texts}")).robots[0].parts.devices.rows
@@ -195,14 +195,14 @@ def test_a_text_renames_it_or_leaves_it_out(load):
 
 
 def test_a_sensor_and_an_actuator_of_one_name_are_told_apart(load):
-    """Names in a model are unique in a section only."""
+    """A name in a model is unique only in its section."""
     rows = load(FORCE + GRIP, VELOCITY.replace("cart velocity", "grip")).robots[0].parts.devices.rows
 
     assert {"mujoco/grip", "mujoco/grip_framelinvel"} <= set(rows)
 
 
 def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
-    """The remedy has the name in the model."""
+    """The remedy has the name that the model uses."""
     texts = '<text name="device:sensor/cart velocity" data="grip"/>'
 
     with pytest.raises(WorldError, match="a second device 'mujoco/grip'"):
@@ -210,7 +210,7 @@ def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
 
 
 def test_the_check_counts_and_names_them(cartpole, capsys, caplog):
-    """A program for Webots would look for other devices."""
+    """A program for Webots would expect other devices."""
     caplog.set_level(logging.WARNING)
 
     assert main([str(cartpole(FORCE + GRIP, SENSORS)), "--check"]) == 0
@@ -222,7 +222,7 @@ def test_the_check_counts_and_names_them(cartpole, capsys, caplog):
 
 
 def test_a_number_that_is_not_finite_reaches_the_sensor(load):
-    """A trainer takes it as a fault of the simulator."""
+    """A trainer treats it as a fault of the simulator."""
     simulation = load(FORCE, VELOCITY)
     simulation._model.data.qvel[0] = math.nan
     simulation._model.changed()

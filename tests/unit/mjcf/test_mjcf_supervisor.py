@@ -1,4 +1,4 @@
-"""Bodies and joints of a model as nodes, resets, and what a supervisor may change."""
+"""Bodies and joints of a model become nodes; resets, and the changes that a supervisor may make."""
 
 import math
 
@@ -15,7 +15,7 @@ def positions(simulation):
 
 
 def play(simulation, steps=20):
-    """Push the cart back and forth; return every value on the way."""
+    """Push the cart back and forth, and return every value on the way."""
     seen = []
     robot = simulation.robots[0]
     for step in range(steps):
@@ -27,7 +27,7 @@ def play(simulation, steps=20):
 
 
 def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_the_robot(load):
-    """A supervisor finds all of them; joints have their names too."""
+    """A supervisor finds all bodies; joints have their names too."""
     simulation = load()
     of_def = simulation.tree.of_def
 
@@ -40,7 +40,7 @@ def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_t
 
 
 def test_a_reset_returns_to_the_start_bit_for_bit(load):
-    """It depends neither on the past nor on readings between steps."""
+    """The state does not depend on the past, nor on readings between steps."""
     simulation = load()
     first = play(simulation)
     simulation.reset()
@@ -52,7 +52,7 @@ def test_a_reset_returns_to_the_start_bit_for_bit(load):
 
 
 def test_looking_changes_nothing(load):
-    """Poses are computed when they are asked for, and the next step starts from the same numbers."""
+    """Poses are computed on request, and the next step starts from the same values."""
     watched, other = load(), load()
     for simulation in (watched, other):
         simulation.robots[0].motors["push"].set_effort(3.0)
@@ -65,7 +65,7 @@ def test_looking_changes_nothing(load):
 
 
 def test_a_world_begins_at_its_keyframe(load):
-    """Legged robots stand there; at their model's own positions they would fall."""
+    """Legged robots stand at it; at the default positions of their model they would fall."""
     changes = (
         ("<custom>", '<custom><text name="keyframe" data="tilted"/>'),
         ("<sensor>", '<keyframe><key name="tilted" qpos="0.5 0.3 1 1 0.5 1 0 0 0"/></keyframe><sensor>'),
@@ -81,7 +81,7 @@ def test_a_world_begins_at_its_keyframe(load):
 
 
 def home(control):
-    """Return the changes that let the world begin with the cart at 1 m and with that control."""
+    """Return the changes that start the world with the cart at 1 m and with that control."""
     keyframe = f'<keyframe><key name="home" qpos="1 0 1 1 0.5 1 0 0 0" ctrl="{control}"/></keyframe>'
     named = '<custom><text name="keyframe" data="home"/>'
     return ("<custom>", named), ("<sensor>", f"{keyframe}<sensor>")
@@ -90,7 +90,7 @@ def home(control):
 @pytest.mark.parametrize("velocity", [None, 5.0])
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, velocity, reset):
-    """A velocity alone is not a target: a robot that stands would stretch its legs to 0."""
+    """A velocity alone is not a target: a standing robot would move its legs to position 0."""
     simulation = load(POSITION, "", *home(control=1))
     motor = simulation.robots[0].motors["push"]
     if reset:
@@ -108,7 +108,7 @@ def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, 
 
 
 def test_a_servo_for_a_velocity_holds_where_the_world_begins(load):
-    """A motor of Webots turns to the position in the world file, until it gets a target."""
+    """A motor of Webots turns to the position in the world file until it gets a target."""
     simulation = load(VELOCITY, "", *home(control=0))
     simulation.robots[0].motors["push"].set_velocity(5.0)
 
@@ -119,7 +119,7 @@ def test_a_servo_for_a_velocity_holds_where_the_world_begins(load):
 
 @pytest.mark.parametrize("name", ["ball", "target"])
 def test_a_field_moves_what_is_free_or_stands(load, name):
-    """Tasks put their targets somewhere at each reset; a reset of the world returns them."""
+    """Tasks move their targets at each reset, and a reset of the world moves them back."""
     simulation = load()
     node = simulation.tree.of_def(name)
     start = node.place.world_position
@@ -134,7 +134,7 @@ def test_a_field_moves_what_is_free_or_stands(load, name):
 
 
 def test_a_field_does_not_move_what_joints_move(load):
-    """The write would be read back, and change nothing."""
+    """The physics would overwrite the write at once."""
     simulation = load()
     field = simulation.tree.field_of(simulation.tree.of_def("cart"), "translation", simulation)
 
@@ -155,7 +155,7 @@ def test_a_joint_is_put_within_its_range(load):
 
 
 def test_velocities_and_forces_of_free_bodies(load):
-    """3 m/s2 for a tenth of a second, on a ball of 4.19 kg."""
+    """The force accelerates a ball of 4.19 kg by 3 m/s2, for a tenth of a second."""
     simulation = load(FORCE, "", ("<option", '<option gravity="0 0 0"'))
     ball = simulation.tree.of_def("ball")
     simulation.motion.set_velocity(ball, (1.0, 0.0, 0.0), (0.0, 0.0, 2.0))
@@ -172,7 +172,7 @@ def test_velocities_and_forces_of_free_bodies(load):
 
 
 def test_a_body_on_joints_takes_no_velocity(load):
-    """Its joints have speeds; those of a client would not fit."""
+    """Its joints have their own speeds, and a client's velocity would contradict them."""
     simulation = load()
 
     with pytest.raises(UnsimulatedError, match="'pole' is on joints or stands, so it takes no velocity"):
@@ -180,7 +180,7 @@ def test_a_body_on_joints_takes_no_velocity(load):
 
 
 def test_contact_points_are_where_a_body_touches(load):
-    """The ball lies on the floor after a while, and nowhere before."""
+    """The ball first falls, and then lies on the floor."""
     simulation = load()
     ball = simulation.tree.of_def("ball")
     assert simulation.contact_points(ball, descendants=False) == []
@@ -193,7 +193,7 @@ def test_contact_points_are_where_a_body_touches(load):
 
 
 def test_a_state_of_a_node_is_saved_and_loaded(load):
-    """Only the joints inside the node return."""
+    """Only the joints inside the node return to their saved state."""
     simulation = load()
     cart = simulation.tree.of_def("cart")
     simulation.set_joint_position(simulation.tree.of_def("slider"), 0.5, 1)
@@ -212,9 +212,9 @@ def test_a_state_of_a_node_is_saved_and_loaded(load):
 
 
 def test_the_same_follows_from_a_loaded_state_each_time(load):
-    """To the last bit: the solver keeps no memory of what was before."""
+    """The results are equal to the last bit, because the solver keeps nothing from before."""
     simulation = load()
-    simulation.step(2000)  # the ball lies on the floor, so that the solver has contacts to begin from
+    simulation.step(2000)  # the ball then lies on the floor, so the solver starts with contacts
     simulation.save_state(simulation.tree.root, "lying")
     played = []
     for _ in range(2):
@@ -236,7 +236,7 @@ def test_nothing_is_added_to_or_removed_from_a_model(load):
 
 
 def test_a_model_that_explodes_has_values_that_are_no_numbers(load):
-    """MuJoCo would start again without a word; a client takes NaN as a fault."""
+    """MuJoCo would silently restart the simulation; a client treats NaN as a fault."""
     simulation = load(VELOCITY)
     simulation._model.data.qvel[0] = math.nan
 

@@ -1,4 +1,4 @@
-"""Displays on top of what a camera sees."""
+"""Displays over the pictures of cameras."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ WHITE = (255, 255, 255, 255)
 
 @pytest.fixture
 def devices():
-    """`devices(fields)`: a camera before a red wall, and a display with these fields."""
+    """`devices(fields)` returns a camera in front of a red wall, and a display with these fields."""
 
     def load(fields=SIZE):
         simulation = Simulation.load(WORLD.format(fields).encode(), MujocoPhysics(), "world", Mode.FAST)
@@ -33,7 +33,7 @@ def devices():
 
 
 def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
-    """Its black pixels become transparent when the camera is attached; what is drawn stays on top."""
+    """The display's black pixels become transparent when the camera is attached; drawings stay on top."""
     camera, display = devices()
     display.picture.draw([(3, 2)], WHITE)
 
@@ -47,7 +47,7 @@ def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
 
 
 def test_a_display_without_its_camera_is_transparent_where_nothing_was_drawn(devices):
-    """As in Webots."""
+    """Webots does the same."""
     _, display = devices()
     display.attach("eye")
     display.picture.draw([(3, 2)], WHITE)
@@ -59,7 +59,7 @@ def test_a_display_without_its_camera_is_transparent_where_nothing_was_drawn(dev
 
 
 def test_a_camera_of_another_size_is_not_attached(devices):
-    """Webots would read pixels that are not the camera's."""
+    """Webots would read pixels that do not belong to the camera."""
     _, display = devices("width 8 height 8")
 
     with pytest.raises(UnsimulatedError, match="give both one size"):

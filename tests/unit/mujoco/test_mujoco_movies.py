@@ -1,4 +1,4 @@
-"""Movies by a supervisor: read back with the library that has written them."""
+"""Movies of a supervisor are read back with the library that wrote them."""
 
 import errno
 import math
@@ -26,7 +26,7 @@ WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor
   device RotationalMotor { name "%s" maxVelocity 50 }
   endPoint Solid { translation 0 %s 0.05 rotation 1 0 0 1.5707963
     boundingObject Cylinder { radius 0.05 height 0.01 } } }"""
-# A red robot drives to the right of a picture from above.
+# A red robot drives to the right; the picture is from above.
 WORLD = f"""#VRML_SIM R2023b utf8
 WorldInfo {{ basicTimeStep 20 }}
 Viewpoint {{ position 0 0 3 orientation -0.577 0.577 0.577 2.0944 }}
@@ -51,20 +51,20 @@ def movie(path, **changes):
 
 
 def frames(path):
-    """The pictures of a file, (height, width, 3) each, and its frames in a second."""
+    """Return the pictures of a file, each (height, width, 3), and its frames per second."""
     with av.open(str(path)) as file:
         rate = file.streams.video[0].average_rate
         return [frame.to_ndarray(format="bgr24") for frame in file.decode(video=0)], rate
 
 
 def place(picture):
-    """The mean row and column of what is red."""
+    """Return the mean row and the mean column of the red pixels."""
     red, others = picture[:, :, RED].astype(int), picture[:, :, [BLUE, GREEN]].max(axis=2)
     return np.argwhere(red > 60 + others).mean(axis=0)
 
 
 def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation, tmp_path):
-    """25 frames a second; nothing has its name before it is whole."""
+    """It has 25 frames a second, and gets its name only when it is complete."""
     path = tmp_path / "drive.mp4"
     assert simulation.movies.ready
     assert simulation.movies.start(movie(path))
@@ -82,7 +82,7 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
 
 
 def test_a_movie_follows_the_viewpoint(tmp_path):
-    """A client that moves it makes a panorama; the robot stands."""
+    """A client that moves the viewpoint makes a panorama; the robot stands still."""
     simulation = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
     viewpoint = next(node for node in simulation.tree.root.nodes() if node.type_name == "Viewpoint")
     path = tmp_path / "panorama.mp4"
@@ -99,7 +99,7 @@ def test_a_movie_follows_the_viewpoint(tmp_path):
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """It keeps the hidden files of other movies, and those that another simulator is writing."""
+    """It keeps the hidden files of other movies, and those that another simulator writes."""
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
@@ -126,7 +126,7 @@ def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path
 
 
 def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_path, monkeypatch):
-    """There a hidden file of a killed simulator looks like one that is being written."""
+    """Without locks, the hidden file of a killed simulator looks like one that is being written."""
     unfinished = tmp_path / ".drive.mp4-x.unfinished"
     unfinished.touch()
     monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
@@ -140,7 +140,7 @@ def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
-    """Four seconds of the simulation in one of the movie."""
+    """Four seconds of the simulation become one second of the movie."""
     simulation.movies.start(movie(tmp_path / "fast.mp4", acceleration=4))
     simulation.step(1600)
     simulation.movies.stop()
@@ -154,12 +154,12 @@ def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
     [(1, 20, 40), (1, 32, 32), (1, 64, 64), (1, 16, 32), (1, 15, 45), (4, 32, 160)],
 )
 def test_a_frame_comes_after_whole_steps(acceleration, basic_step_ms, expected_ms):
-    """As near to 40 ms of the movie as they allow; the frames in a second follow from that."""
+    """The interval is as near to 40 ms of the movie as whole steps allow, and sets the frame rate."""
     assert frame_step_ms(acceleration, basic_step_ms) == expected_ms
 
 
 def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
-    """So a movie is neither too fast nor too slow."""
+    """The movie must be neither too fast nor too slow."""
     source = WORLD.replace("basicTimeStep 20", "basicTimeStep 32").encode()
     simulation = Simulation.load(source, MujocoPhysics(), "world", Mode.FAST)
     simulation.movies.start(movie(tmp_path / "it.mp4"))
@@ -170,7 +170,7 @@ def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
 
 
 def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path, caplog):
-    """With a line in the log."""
+    """The log has one line about it."""
     assert not simulation.movies.start(movie(tmp_path / "none" / "it.mp4"))
 
     assert simulation.movies.failed
@@ -178,7 +178,7 @@ def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path,
 
 
 def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
-    """And leaves no file."""
+    """No file is left."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
     simulation.movies.stop()
 
@@ -189,7 +189,7 @@ def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
 
 
 def test_a_movie_whose_folder_is_gone_fails_at_its_end(simulation, tmp_path, caplog):
-    """The steps of the simulation go on."""
+    """The simulation continues."""
     folder = tmp_path / "films"
     folder.mkdir()
     simulation.movies.start(movie(folder / "it.mp4"))
@@ -212,14 +212,14 @@ def test_a_movie_whose_folder_is_gone_fails_at_its_end(simulation, tmp_path, cap
     ],
 )
 def test_what_cannot_be_recorded_is_refused(simulation, changes, fact):
-    """With what can."""
+    """The message has the supported values."""
     with pytest.raises(UnsimulatedError, match=fact):
         simulation.movies.start(movie(**{"path": "it.mp4", **changes}))
     assert simulation.movies.failed
 
 
 def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
-    """The first one goes on."""
+    """The first movie continues."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
 
     with pytest.raises(UnsimulatedError, match="stop it first"):
@@ -227,7 +227,7 @@ def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
 
 
 def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_path, monkeypatch):
-    """It is loaded for the first movie."""
+    """The library is loaded for the first movie."""
     monkeypatch.setitem(sys.modules, "av", None)
 
     with pytest.raises(UnsimulatedError, match=r"install palaestra-sim\[mujoco\]"):
@@ -235,7 +235,7 @@ def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_p
 
 
 def test_a_simulator_without_pictures_records_none(tmp_path):
-    """As Webots with --no-rendering; to stop is no mistake."""
+    """Webots does the same with --no-rendering; a request to stop is not an error."""
     simulation = Simulation.load(WORLD.encode(), StubPhysics(), "world", Mode.FAST)
 
     assert not simulation.movies.start(movie(tmp_path / "it.mp4"))

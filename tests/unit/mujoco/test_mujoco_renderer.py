@@ -1,4 +1,4 @@
-"""Pictures of MuJoCo, pixel by pixel: where things are, in which color, and how far away."""
+"""Pictures of MuJoCo, pixel by pixel: position, color and distance of objects."""
 
 import math
 import subprocess
@@ -39,7 +39,7 @@ class Request(NamedTuple):
 
 @pytest.fixture
 def load():
-    """`load(nodes, device)`: a simulation with a robot, which stands at the origin and has that device."""
+    """`load(nodes, device)` returns a simulation with a robot at the origin that has that device."""
 
     def load(nodes, device=CAMERA, parts=""):
         world = f"""#VRML_SIM R2023b utf8
@@ -54,19 +54,19 @@ DEF ROBOT Robot {{ name "robot" children [ {device} {parts} ] }}
 
 
 def look(simulation, name="eye"):
-    """Return the picture of a camera: (height, width, 4)."""
+    """Return the picture of a camera, (height, width, 4)."""
     device = simulation.robots[0].parts.devices.rows[name][1]
     return np.frombuffer(device.value, np.uint8).reshape(HEIGHT, WIDTH, 4)
 
 
 def depths(simulation):
-    """Return the distances of the range finder: (height, width)."""
+    """Return the distances of the range finder, (height, width)."""
     device = simulation.robots[0].parts.devices.rows["depth"][1]
     return np.frombuffer(device.value, np.float32).reshape(HEIGHT, WIDTH)
 
 
 def reds(picture):
-    """Return where a picture is red: (height, width) of bool."""
+    """Return the mask of the red pixels of a picture, (height, width) of bool."""
     red, others = picture[:, :, RED].astype(int), picture[:, :, [BLUE, GREEN]].astype(int)
     return red > 60 + others.max(axis=2)
 
@@ -77,7 +77,7 @@ def middle(mask):
 
 
 def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
-    """Its front is 1.5 m away and 1 m wide; a pixel of the picture is 1 / 58.6 rad there."""
+    """Its front is 1.5 m away and 1 m wide, and a pixel covers 1 / 58.6 rad there."""
     picture = look(load(BOX))
 
     across = WIDTH / 2.0 / math.tan(0.5) / 1.5
@@ -87,7 +87,7 @@ def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
 
 
 def test_a_color_is_blue_green_red_alpha(load):
-    """The order of Webots; alpha is full everywhere."""
+    """This is the order of Webots; alpha is at its maximum everywhere."""
     picture = look(load(BOX))
     blue, green, red, _ = picture[HEIGHT // 2, WIDTH // 2]
 
@@ -106,7 +106,7 @@ def test_left_is_left_and_up_is_up(load):
 
 
 def test_a_wall_is_as_far_away_as_it_stands_to_the_millimeter(load):
-    """In every pixel: distances are along the axis of the lens."""
+    """This holds for every pixel, because distances are measured along the axis of the lens."""
     seen = depths(load(WALL, FINDER))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.0), abs=0.001)
@@ -114,21 +114,21 @@ def test_a_wall_is_as_far_away_as_it_stands_to_the_millimeter(load):
 
 @pytest.mark.parametrize("away_m", [0.45, 5.2])
 def test_a_distance_outside_of_the_range_is_infinite(load, away_m):
-    """Nearer than `minRange`, or beyond `maxRange`."""
+    """It is nearer than `minRange` or beyond `maxRange`."""
     seen = depths(load(WALL.replace("2.05", str(away_m + 0.05)), FINDER))
 
     assert np.isinf(seen).all()
 
 
 def test_distances_have_the_resolution_of_the_finder(load):
-    """They are multiples of it."""
+    """They are multiples of the resolution."""
     seen = depths(load(WALL, FINDER.replace("minRange", "resolution 0.3 minRange")))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.1), abs=1e-6)
 
 
 def test_a_thing_that_a_supervisor_moves_moves_in_the_picture(load):
-    """From the next step on, also one that nothing runs into; a reset puts it back."""
+    """It moves from the next step on, even if it has no boundingObject; a reset moves it back."""
     simulation = load(BOX)
     before = middle(reds(look(simulation)))
 
@@ -152,7 +152,7 @@ def test_a_color_that_a_supervisor_writes_is_seen(load):
 
 
 def test_a_thing_that_a_supervisor_removes_is_gone(load):
-    """From then on."""
+    """It disappears from the next picture on."""
     simulation = load(BOX)
 
     assert reds(look(simulation)).any()
@@ -162,7 +162,7 @@ def test_a_thing_that_a_supervisor_removes_is_gone(load):
 
 
 def test_a_camera_turns_with_its_robot(load):
-    """A robot that turns to the left sees what was ahead to its right."""
+    """For a robot that turns to the left, objects move to the right."""
     simulation = load(BOX, parts=WHEEL % ("0.1", "left", "0.1") + WHEEL % ("-0.1", "right", "-0.1"))
     before = middle(reds(look(simulation)))
     motors = simulation.robots[0].motors
@@ -178,7 +178,7 @@ def test_a_camera_turns_with_its_robot(load):
 
 
 def test_a_shape_on_a_joint_moves_with_its_motor(load):
-    """So a camera sees an arm."""
+    """A camera must see the arm of a robot."""
     arm = """SliderJoint { jointParameters JointParameters { axis 0 1 0 }
       device LinearMotor { name "arm" maxVelocity 10 }
       endPoint Solid { translation 2 0 0.5 children [ Shape {
@@ -204,7 +204,7 @@ def test_a_shape_on_a_joint_moves_with_its_motor(load):
     ],
 )
 def test_every_geometry_is_drawn_where_it_is(load, geometry):
-    """In the middle, where the box is in the other tests; meshes are centered by MuJoCo, and put back."""
+    """Each is in the middle, like the box of the other tests; MuJoCo centers meshes, and this is undone."""
     picture = look(load(BOX.replace("Box { size 1 1 1 }", geometry)))
     rows, columns = np.nonzero(reds(picture))
 
@@ -214,7 +214,7 @@ def test_every_geometry_is_drawn_where_it_is(load, geometry):
 
 
 def test_a_spherical_camera_sees_nothing(load):
-    """Its picture would not be flat; `enable` then fails, as in a simulator that does not draw."""
+    """Its picture would not be flat; `enable` fails, as in a simulator that cannot draw."""
     simulation = load(BOX, CAMERA.replace("fieldOfView", "spherical TRUE fieldOfView"))
     kind, camera = simulation.robots[0].parts.devices.rows["eye"]
 
@@ -232,7 +232,7 @@ def recognized(simulation):
 
 
 def test_a_solid_with_recognition_colors_is_recognized(load):
-    """Where it is, as large as it looks, in its colors."""
+    """The message has its position, its size in the picture and its colors."""
     (found,) = recognized(load(OBJECT, RECOGNITION))
 
     assert found["position"] == pytest.approx((2.0, 0.0, 0.0))
@@ -244,7 +244,7 @@ def test_a_solid_with_recognition_colors_is_recognized(load):
 
 
 def test_what_is_behind_a_wall_is_not_recognized(load):
-    """Nor what has no colors, or is out of reach."""
+    """The same holds for an object without colors or out of range."""
     wall = WALL.replace("2.05", "1")
     near = RECOGNITION.replace("segmentation TRUE", "maxRange 1")
     none = RECOGNITION.replace("segmentation TRUE", "maxObjects 0")
@@ -256,7 +256,7 @@ def test_what_is_behind_a_wall_is_not_recognized(load):
 
 
 def test_the_image_of_segments_has_plain_colors(load):
-    """The first recognition color of each object, and black."""
+    """It has the first recognition color of each object, and black."""
     simulation = load(OBJECT, RECOGNITION)
     recognition = simulation.robots[0].parts.devices.rows["eye"][1].recognition
     picture = np.frombuffer(recognition.picture, np.uint8).reshape(HEIGHT, WIDTH, 4)
@@ -266,7 +266,7 @@ def test_the_image_of_segments_has_plain_colors(load):
 
 
 def test_the_view_of_the_world_is_saved_as_a_file(load, tmp_path):
-    """From its Viewpoint, wherever the robots look."""
+    """The picture is from the Viewpoint, independent of the robots."""
     simulation = load(f"Viewpoint {{ position 0 0 0.5 }} {BOX}")
 
     assert simulation.export_image(str(tmp_path / "world.png"), 100)
@@ -301,7 +301,7 @@ print(hashlib.sha256(eye.colors()).hexdigest(), hashlib.sha256(eye.depths(0.0, 0
 
 
 def test_two_processes_draw_the_same_bytes():
-    """On one machine; another version of Mesa, or a graphics card, may round differently."""
+    """This holds on one machine; another version of Mesa or a graphics card may round differently."""
     found = {
         subprocess.run([sys.executable, "-c", HASH], capture_output=True, check=True).stdout for _ in "ab"
     }
@@ -332,7 +332,7 @@ except SimError as error:
     ],
 )
 def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
-    """OpenGL is loaded with the first camera, and the refusal says what to install."""
+    """OpenGL is loaded with the first camera, and the error names the missing package."""
     done = subprocess.run(
         [sys.executable, "-c", BLIND % environment], capture_output=True, text=True, check=True
     )
@@ -341,7 +341,7 @@ def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
 
 
 def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
-    """The warning at the start is about devices that a client would wait for in vain."""
+    """The warning at the start lists only devices for which a client would wait in vain."""
     simulation = load(
         "",
         f"{CAMERA} {FINDER}",
@@ -352,7 +352,7 @@ def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
 
 
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):
-    """The physics moves it, and no client."""
+    """The physics moves it, not a client."""
     simulation = load(
         BOX.replace("children [", "physics Physics { } boundingObject Box { size 1 1 1 } children [").replace(
             "2 0 0.5", "3 0 1.5"
@@ -386,7 +386,7 @@ def test_a_camera_of_an_old_file_looks_along_minus_z_with_y_up():
 
 
 def _with(simulation, name, **fields):
-    """Return a node with other numbers in its fields."""
+    """Return a node with other numbers in some fields."""
     node = simulation.tree.of_def(name)
     for field, numbers in fields.items():
         node.fields[field].items[:] = list(numbers)

@@ -1,4 +1,4 @@
-"""A job and the raw objects of its one replica, as an API server holds them."""
+"""A job and the raw objects of its one replica, as an API server stores them."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -41,7 +41,7 @@ def raw_job() -> dict[str, Any]:
 
 @pytest.fixture
 def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
-    """Return a pod of it that nobody has started."""
+    """Return a pod of the replica that has not started."""
     template = deepcopy(raw_job["spec"]["template"])
     named: dict[str, Any] = {"name": "job-0-x", "uid": "pod-1", "creationTimestamp": "2026-01-31T12:00:00Z"}
     named["ownerReferences"] = [{"kind": "Job", "uid": raw_job["metadata"]["uid"]}]
@@ -50,5 +50,5 @@ def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def look(raw_job: dict[str, Any]) -> Callable[..., Observed]:
-    """`look(pods=[...])`: the observation of the job; its Job exists unless `jobs` replaces it."""
+    """`look(pods=[...])` returns the observation of the job; its Job exists unless `jobs` replaces it."""
     return lambda **objects: observe(_make_job(), Objects(**({"jobs": [raw_job]} | objects)))

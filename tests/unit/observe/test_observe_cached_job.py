@@ -1,4 +1,4 @@
-"""A TrainingJob in a cache: small whatever its author wrote, and never taken for the whole."""
+"""A cached TrainingJob is small whatever its spec, and is never mistaken for the whole job."""
 
 import json
 
@@ -11,7 +11,7 @@ COLLECT, EVALUATE = {"name": "collect", "role": "Collect"}, {"name": "evaluate",
 WORLD = "x" * 180_000
 ENV = [{"name": f"V{number}", "value": "x" * 4096} for number in range(32)]
 MOST_CHARACTERS = 34_000
-# What may be large, each with what an API server lets through.
+# Fields that may be large, with the size that an API server allows.
 LARGE = {
     "worlds": {"simulators": [{**COLLECT, "world": {"inline": WORLD}}, EVALUATE]},
     "variables": {"trainer": {"env": ENV}},
@@ -37,7 +37,7 @@ def raw_job(metadata=None, **spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
-    """Refused jobs are cached like all others: a few of 1.4 MB each ended the operator for everybody."""
+    """Refused jobs are cached like all others; a few of 1.4 MB each ended the operator for everybody."""
     kept = trimmed(raw_job(**spec))
 
     assert len(json.dumps(kept)) < MOST_CHARACTERS
@@ -46,7 +46,7 @@ def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_what_decides_is_kept_of_every_job(spec):
-    """Counts, deadlines and suspension are read at every look; the rest of the spec while planning."""
+    """Each reconcile reads counts, deadlines and suspension; only the plan needs the rest of the spec."""
     job = validate({**trimmed(raw_job(**spec)), "status": {}})
 
     assert (job.spec.replicas, job.spec.suspend, job.spec.ttl_seconds_after_finished) == (3, True, 9)
@@ -57,7 +57,7 @@ def test_what_decides_is_kept_of_every_job(spec):
 
 
 def test_labels_do_not_make_a_cached_job_large():
-    """No definition bounds them."""
+    """The definition does not limit their size."""
     kept = trimmed(raw_job({"labels": {f"label-{number}": "x" * 63 for number in range(4000)}}))
 
     assert len(json.dumps(kept)) < MOST_CHARACTERS
@@ -65,7 +65,7 @@ def test_labels_do_not_make_a_cached_job_large():
 
 
 def test_a_digest_stands_for_each_world():
-    """With the length: enough to see in a dump whether two are the same."""
+    """Together with the length it shows in a dump whether two worlds are equal."""
     kept = trimmed(raw_job(**LARGE["worlds"]))
     text = kept["spec"]["simulators"][0]["world"]["inline"]
 
@@ -75,7 +75,7 @@ def test_a_digest_stands_for_each_world():
 
 
 def test_a_usual_job_is_kept_whole():
-    """Nothing has to be read to plan it."""
+    """The plan of a usual job needs no request."""
     whole = raw_job(simulators=[COLLECT, EVALUATE], trainer={"steps": 5})
 
     assert trimmed(whole) == whole
@@ -84,5 +84,5 @@ def test_a_usual_job_is_kept_whole():
 
 @pytest.mark.parametrize("mark", ["texts", "fields", "nonsense"])
 def test_only_the_cache_says_that_a_copy_lacks_something(mark):
-    """An annotation of its author's would have it read anew for ever."""
+    """Otherwise an annotation of the author could make the operator read the job again for ever."""
     assert lacking(trimmed(raw_job({"annotations": {"palaestra.dev/lacks": mark}}))) is None

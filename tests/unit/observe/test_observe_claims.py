@@ -1,4 +1,4 @@
-"""Which claims hold nothing, so that they may go with their TrainingJob."""
+"""Unused claims are found, so that they can be deleted with their TrainingJob."""
 
 import pytest
 
@@ -35,5 +35,5 @@ def test_a_claim_that_was_never_bound_is_unused(kept):
     ],
 )
 def test_every_other_claim_may_hold_a_run(change):
-    """A doubt keeps it."""
+    """If it is not certain, the claim stays."""
     assert not is_unused(trimmed(PENDING | change))

@@ -1,4 +1,4 @@
-"""What a Workload says of its Job, as Kueue 0.19 writes it."""
+"""The reason of a wait is read from a Workload, as Kueue 0.19 writes it."""
 
 import pytest
 
@@ -29,7 +29,7 @@ def workload(*conditions, created="2026-01-31T12:00:00Z", active=True, checks=()
 
 
 def test_what_a_job_waits_for_is_in_the_words_of_the_quota():
-    """An author may read a TrainingJob, and no Workload."""
+    """An author may be able to read TrainingJobs, but not Workloads."""
     assert why_not_admitted([workload(condition("QuotaReserved", "False", SHORT))]) == SHORT
 
 
@@ -47,7 +47,7 @@ def test_the_message_for_a_job_without_a_workload_names_what_to_check():
 
 
 def test_a_workload_that_somebody_deactivated_is_named_with_the_remedy():
-    """Its condition may still have the words of the time before."""
+    """Its condition may still have an old message."""
     stopped = workload(condition("QuotaReserved", "False", SHORT), active=False)
 
     assert why_not_admitted([stopped]) == (
@@ -56,7 +56,7 @@ def test_a_workload_that_somebody_deactivated_is_named_with_the_remedy():
 
 
 def test_checks_that_have_not_passed_are_named():
-    """The quota is there, and a controller beside Kueue has the last word."""
+    """The quota is reserved, but an admission check of another controller may still refuse the job."""
     checks = [
         {"name": "budget", "state": "Ready", "message": "paid"},
         {"name": "machines", "state": "Pending", "message": "2 nodes are on order"},
@@ -79,7 +79,7 @@ def test_checks_that_have_not_passed_are_named():
     ids=["new", "admitted", "text", "list", "number"],
 )
 def test_nothing_is_said_of_a_workload_that_gives_no_reason(found):
-    """It is about to; or what it holds cannot be read."""
+    """Kueue has not written it yet, or its content cannot be read."""
     assert why_not_admitted([found]) == ""
 
 

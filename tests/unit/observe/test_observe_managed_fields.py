@@ -6,19 +6,19 @@ from palaestra.observe.managed_fields import suspends
 
 
 def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
-    """Return what one field manager has written."""
+    """Return the fields that one field manager has written."""
     return {"manager": manager, "operation": "Update", "time": time, "fieldsV1": {"f:spec": {field: {}}}}
 
 
 def test_the_manager_of_the_field_is_found():
-    """Others own other fields."""
+    """Other managers own other fields."""
     fields = [entry("palaestra", "f:backoffLimit"), entry("kueue"), entry("kubectl-edit", "f:parallelism")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
 
 
 def test_of_several_managers_it_is_the_last():
-    """Two that apply the same value share a field."""
+    """Two managers that apply the same value share a field."""
     fields = [entry("kueue", time="2026-01-31T12:00:01Z"), entry("palaestra")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
@@ -30,5 +30,5 @@ def test_of_several_managers_it_is_the_last():
     ids=["absent", "no list", "no entries", "no fields"],
 )
 def test_what_does_not_tell_is_nobody(fields):
-    """Anything may stand in the cluster."""
+    """The cluster may store any content there."""
     assert suspends({"metadata": {"managedFields": fields}}) == ""

@@ -1,4 +1,4 @@
-"""A pod as it is read: containers in order, the words of others cut, nothing believed."""
+"""A pod is read with its containers in order and its messages shortened; no value in it is trusted."""
 
 import pytest
 
@@ -7,17 +7,17 @@ from palaestra_protocol.pod.status import Termination
 
 
 def state(name, **status):
-    """Return what a kubelet says of a container."""
+    """Return a container's status as a kubelet writes it."""
     return {"name": name, **status}
 
 
 def pod(look, raw):
-    """Return the pod that is seen."""
+    """Return the observed pod."""
     return look(pods=[raw]).replicas[0].pod
 
 
 def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
-    """What each is stands in the pod's spec, how it is in its status."""
+    """The kind of each container comes from the pod's spec, its state from the status."""
     seen = pod(look, raw_pod)
 
     assert [(each.name, each.kind) for each in seen.containers] == [
@@ -29,7 +29,7 @@ def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
 
 
 def test_a_sidecar_without_its_restart_policy_is_a_plain_init_container(look, raw_pod):
-    """Something between us and the kubelet has dropped the field."""
+    """A program between the operator and the kubelet has dropped the field."""
     del raw_pod["spec"]["initContainers"][0]["restartPolicy"]
 
     assert pod(look, raw_pod).containers[0].kind is ContainerKind.INIT
@@ -37,14 +37,14 @@ def test_a_sidecar_without_its_restart_policy_is_a_plain_init_container(look, ra
 
 @pytest.mark.parametrize("created", ["noon", "9999-12-31T23:59:59-23:59", None, 3])
 def test_a_pod_without_a_readable_time_is_the_oldest(look, raw_pod, created):
-    """It is there all the same."""
+    """The pod still exists."""
     raw_pod["metadata"]["creationTimestamp"] = created
 
     assert pod(look, raw_pod).created.year == 1970
 
 
 def test_a_container_that_runs_again_still_tells_how_it_ended_before(look, raw_pod):
-    """A crash loop is seen in the times between, too."""
+    """So a crash loop is visible also while the container runs."""
     running = {"running": {"startedAt": "2026-01-31T12:00:05Z"}}
     ended = {"terminated": {"exitCode": 137, "reason": "OOMKilled"}}
     raw_pod["status"]["initContainerStatuses"] = [
@@ -58,7 +58,7 @@ def test_a_container_that_runs_again_still_tells_how_it_ended_before(look, raw_p
 
 
 def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
-    """They end in a status that has a largest size, and on somebody's terminal."""
+    """They are shown in a status of limited size and on terminals."""
     waiting = {"waiting": {"reason": "ErrImagePull", "message": "a\n\x1b[31mred" + "x" * 5000}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=waiting)]
 
@@ -92,7 +92,7 @@ def test_conditions_say_why(look, raw_pod, condition, field, value):
 
 
 def test_the_last_word_is_of_our_protocol(look, raw_pod):
-    """JSON, strictly read."""
+    """It is JSON, and strictly parsed."""
     word = Termination(step=7, reason="Completed", success_rate=0.5, attempt=2, restarts=1)
     ended = {"terminated": {"exitCode": 0, "message": word.to_message()}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
@@ -104,7 +104,7 @@ def test_the_last_word_is_of_our_protocol(look, raw_pod):
     "message", ["Traceback: it", "{}", '{"step": -1, "reason": ""}', "[" * 5000, None, 3, ""]
 )
 def test_anything_else_is_no_last_word(look, raw_pod, message):
-    """The end of a log, or what a pod's author likes."""
+    """It may be the end of a log, or any text of the program's author."""
     ended = {"terminated": {"exitCode": 1, "message": message}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
 
@@ -112,7 +112,7 @@ def test_anything_else_is_no_last_word(look, raw_pod, message):
 
 
 def test_a_termination_message_is_cut_where_kubernetes_cuts_it(look, raw_pod):
-    """A cache must not grow by what a pod writes."""
+    """A cache must not grow with the output of a pod."""
     raw_pod["status"]["containerStatuses"] = [
         state("trainer", state={"terminated": {"exitCode": 1, "message": "x" * 100_000}})
     ]

@@ -1,4 +1,4 @@
-"""Which objects a job refers to, and where."""
+"""The objects that a job refers to, each with its fields."""
 
 from palaestra.observe import ReferenceKind, references
 
@@ -6,12 +6,12 @@ SECRET = {"env": [{"name": "A", "secretKeyRef": {"name": "keys", "key": "a"}}]}
 
 
 def test_a_job_of_defaults_refers_to_nothing(make_job):
-    """Its worlds ship, its claims are made."""
+    """Its worlds are in the images, and its claims are created."""
     assert references(make_job()) == ()
 
 
 def test_worlds_secrets_and_claims_are_named_with_their_fields(make_job):
-    """To fix a missing object, the author has to know which field refers to it."""
+    """To fix a missing object, the author must know the field that refers to it."""
     job = make_job(
         simulators=[
             {"name": "a", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "a.wbt"}}},

@@ -1,4 +1,4 @@
-"""What belongs to a replica, and what is only called so."""
+"""The objects that belong to a replica, as opposed to those that only have its name."""
 
 from copy import deepcopy
 from datetime import UTC, datetime
@@ -13,7 +13,7 @@ NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 
 
 def test_every_replica_of_the_spec_is_there(make_job):
-    """Also one of which nothing is."""
+    """A replica without any object is included."""
     seen = observe(make_job(replicas=3), Objects())
 
     assert [each.index for each in seen.replicas] == [0, 1, 2]
@@ -21,7 +21,7 @@ def test_every_replica_of_the_spec_is_there(make_job):
 
 
 def test_a_job_is_ours_by_the_uid_of_its_owner(look, raw_job):
-    """Names are used again; uids are not."""
+    """Names are reused, but uids are not."""
     other = deepcopy(raw_job)
     other["metadata"]["ownerReferences"][0]["uid"] = "another"
 
@@ -32,14 +32,14 @@ def test_a_job_is_ours_by_the_uid_of_its_owner(look, raw_job):
 
 
 def test_pods_of_a_job_of_the_same_name_are_not_ours(look, raw_pod):
-    """The TrainingJob before this one was called the same; its pods may still be ending."""
+    """The earlier TrainingJob had the same name, and its pods may still be ending."""
     raw_pod["metadata"]["labels"]["palaestra.dev/job-uid"] = "another"
 
     assert look(pods=[raw_pod]).replicas[0].pod is None
 
 
 def test_the_newest_pod_is_the_last(look, raw_pod):
-    """In a list of an API server's they come in any order."""
+    """An API server lists pods in any order."""
     newer = deepcopy(raw_pod)
     newer["metadata"] |= {"name": "a", "uid": "pod-2", "creationTimestamp": "2026-01-31T12:00:09Z"}
 
@@ -50,7 +50,7 @@ def test_the_newest_pod_is_the_last(look, raw_pod):
 
 
 def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
-    """One at a time: the other has ended before this one was made."""
+    """Only one pod runs at a time, so the other one had ended before this one was created."""
     ended = deepcopy(raw_pod)
     ended["metadata"] |= {"name": "zzz", "uid": "pod-2"}
     ended["status"] = {"phase": "Failed"}
@@ -59,7 +59,7 @@ def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
 
 
 def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
-    """And to nobody once that has ended: its last word says more."""
+    """The status of a pod that has ended is ignored, because its last word has more."""
     answer = Polled(status=TrainerStatus(step=1, target=2, episodes=0, phase="training"), at_s=5.0)
     other = look(pods=[raw_pod], polled={"another": answer}).replicas[0]
     alive = look(pods=[raw_pod], polled={"pod-1": answer}).replicas[0]
@@ -81,21 +81,21 @@ def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     ],
 )
 def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
-    """The early conditions are enough: a lost node keeps the last pod from ending."""
+    """The early conditions are enough, because the last pod may never end on a lost node."""
     raw_job["status"] = {"conditions": conditions}
 
     assert look(jobs=[raw_job]).replicas[0].job.end is end
 
 
 def test_failures_that_are_about_to_be_booked_count(look, raw_job):
-    """The Job controller books them in two steps."""
+    """The Job controller counts them in two steps."""
     raw_job["status"] = {"failed": 2, "uncountedTerminatedPods": {"failed": ["uid-3"]}}
 
     assert look(jobs=[raw_job]).replicas[0].job.failures == 3
 
 
 def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
-    """Of this Job, by its uid: the Job before it had the same name."""
+    """It must be of this Job by uid, because an earlier Job may have had the same name."""
 
     def event(words, second, uid="job-uid"):
         return {
@@ -111,7 +111,7 @@ def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
 
 
 def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
-    """As the newer events API writes it."""
+    """The newer events API writes series."""
     event = {
         "reason": "FailedCreate",
         "message": "quota",
@@ -134,7 +134,10 @@ def test_what_is_there_is_known_by_kind_and_name(make_job):
 
 
 def test_a_config_map_or_policy_of_somebody_else_is_not_there(make_job):
-    """Our label on it does not make it ours; a claim outlives its job, so it has no owner."""
+    """The operator's label alone does not make it the operator's.
+
+    A claim has no owner, because it outlives its job.
+    """
     named = {"metadata": {"name": "x"}}
 
     seen = observe(make_job(), Objects(claims=[named], policies=[named], config_maps=[named]))
@@ -143,14 +146,14 @@ def test_a_config_map_or_policy_of_somebody_else_is_not_there(make_job):
 
 
 def test_of_other_kinds_only_who_wrote_them_is_forgotten():
-    """Events are read field by field."""
+    """Events are read field by field, so their other fields stay."""
     event = {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x", "managedFields": [1]}}
 
     assert trimmed(event) == {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x"}}
 
 
 def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
-    """Trimming takes away what nobody reads, and that is most of it."""
+    """Trimming removes only unread fields, which are most of the object."""
     raw_job |= {"status": {"failed": 1}}
     raw_job["metadata"] |= {
         "annotations": {
@@ -178,7 +181,7 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
 
 
 def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
-    """A user with the right to create pods may give them our labels."""
+    """A user who may create pods can give them the operator's labels."""
     raw_pod["metadata"]["ownerReferences"] = [{"kind": "Job", "name": "job-0", "uid": "another"}]
 
     replica = look(pods=[raw_pod]).replicas[0]
@@ -187,7 +190,7 @@ def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
 
 
 def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(make_job, raw_pod):
-    """Somebody deleted the Job; its pod still saves a checkpoint."""
+    """A user deleted the Job, but its pod still saves a checkpoint."""
     named = {"name": "job-0-x", "uid": "pod-1", "created": NOW}
     job = make_job()
     status = job.status.model_copy(
@@ -200,7 +203,7 @@ def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(m
 
 
 def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
-    """In the API server's words, on one line."""
+    """The message is that of the API server, on one line."""
     seen = observe(make_job(replicas=2), Objects(denied={1: "over\nquota"}))
     of_all = observe(make_job(replicas=2), Objects(denied={None: "no policy"}))
 
@@ -209,7 +212,7 @@ def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
 
 
 def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, raw_pod):
-    """The last of those that speak of volumes, while the pod waits for them."""
+    """The last event about volumes counts, while the pod waits for them."""
 
     def event(reason, words, second, uid="pod-1"):
         return {
@@ -233,7 +236,7 @@ def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, ra
 
 
 def test_the_event_about_the_probe_is_read_and_not_one_about_another_container():
-    """After the trainer the kubelet ends the other containers, and writes that too."""
+    """After the trainer the kubelet ends the other containers, and emits events about that too."""
     probe = {"reason": "Killing", "message": "Container trainer failed startup probe, will be restarted"}
     other = {"reason": "Killing", "message": "Stopping container sim-collect-0"}
     events = [

@@ -1,4 +1,4 @@
-"""What no watch reports: how much of it is remembered, of which TrainingJobs, and how long."""
+"""Knowledge that no watch delivers is kept in a bounded cache, by TrainingJob."""
 
 import pytest
 
@@ -29,14 +29,14 @@ TRAINING_JOB = {
 
 @pytest.fixture
 def full():
-    """Return a memory that another TrainingJob has filled."""
+    """Return a cache that another TrainingJob has filled."""
     memory = BoundedCache()
     memory.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED), "words"))
     return memory
 
 
 def test_what_a_look_leaves_takes_the_place_of_what_was_known():
-    """Nothing stays of an object that the look did not meet, so nobody has to forget it."""
+    """Keys that the last reconcile did not return are dropped, so nobody has to remove them."""
     memory = BoundedCache()
     memory.keep(KEY, UID, {"a": 1, "b": 2})
 
@@ -46,7 +46,7 @@ def test_what_a_look_leaves_takes_the_place_of_what_was_known():
 
 
 def test_nothing_is_known_of_a_job_that_was_made_again():
-    """It has the names of the one before, and its uid tells them apart."""
+    """The new job has the same name but another uid."""
     memory = BoundedCache()
     memory.keep(KEY, UID, {"a": 1})
 
@@ -55,7 +55,7 @@ def test_nothing_is_known_of_a_job_that_was_made_again():
 
 
 def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
-    """Were the oldest pushed out, then none of 5,000 that are looked at in turn would be remembered."""
+    """If the oldest were dropped, nothing would be remembered of 5,000 jobs that are reconciled in turn."""
     assert full.keep(KEY, UID, {"a": 1}) == {}
 
     assert full.known(KEY, UID) == {}
@@ -63,7 +63,7 @@ def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
 
 
 def test_what_is_known_keeps_its_place_when_a_job_brings_more_than_there_is_room_for(full):
-    """An answer that was waited for is not lost to a newcomer that happens to come first."""
+    """A known response must not be dropped for a new key that happens to come first."""
     full.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED - 1), "words"))
 
     kept = full.keep(OTHER, UID, {"new": "a", "newer": "b", **dict.fromkeys(range(REMEMBERED - 1), "words")})
@@ -72,7 +72,7 @@ def test_what_is_known_keeps_its_place_when_a_job_brings_more_than_there_is_room
 
 
 def test_what_is_forgotten_makes_room(full):
-    """A TrainingJob that is deleted leaves nothing behind."""
+    """A deleted TrainingJob leaves nothing behind."""
     full.forget(OTHER)
 
     assert full.keep(KEY, UID, {"a": 1}) == {"a": 1}
@@ -80,18 +80,18 @@ def test_what_is_forgotten_makes_room(full):
 
 
 class Cluster:
-    """An API server and the caches beside it: one Job that somebody else has resumed, and lacks its pod."""
+    """An API server and the caches: somebody else has resumed its one Job, which lacks a pod."""
 
     def __init__(self):
         self.asked = 0
 
     def get(self, *_):
-        """Return the Job with who wrote its fields."""
+        """Return the Job with the managers of its fields."""
         self.asked += 1
         return self.children(None, KEY)[0]
 
     def children(self, resource, _):
-        """Return the Job; there is nothing else."""
+        """Return the Job, the only object."""
         if resource is not None and resource.kind != "Job":
             return []
         metadata = {
@@ -102,7 +102,7 @@ class Cluster:
 
 
 def test_nothing_stays_of_a_job_that_is_gone():
-    """Whatever was remembered goes with it, so that memory holds no more than the cluster."""
+    """Everything about it is dropped with it, so the memory holds no more than the cluster."""
     cluster, strangers, denials = Cluster(), ForeignJobs(Cluster()), RejectedCreations()
     checking = WorldChecker(dict, print)
     looking = JobObserver(cluster, cluster, strangers, denials, dict, checking)

@@ -1,4 +1,4 @@
-"""Which conditions a status is written with: those that the definition in the cluster takes."""
+"""A status is written only with the conditions that the definition in the cluster accepts."""
 
 import pytest
 
@@ -11,7 +11,10 @@ NOW = [*BEFORE, "Reconciling", "Stalled"]
 
 
 class Server:
-    """An API server that publishes a definition with these types of conditions; None: it does not answer."""
+    """An API server that publishes a definition with these types of conditions.
+
+    With None, it does not respond.
+    """
 
     def __init__(self, types):
         self.types = types
@@ -32,13 +35,13 @@ class Server:
 
 @pytest.fixture
 def looks():
-    """One item for each time that all jobs were to be looked at again."""
+    """Return a list with one item for each time that all jobs were queued again."""
     return []
 
 
 @pytest.fixture
 def definition(looks):
-    """`definition(types)`: one that was compared once, with its server."""
+    """`definition(types)` returns a check that has compared the definition once, and its server."""
 
     def make(types):
         server = Server(types)
@@ -55,7 +58,7 @@ def status(*types):
 
 
 def test_a_definition_of_this_release_takes_every_condition(definition, looks):
-    """And every job is looked at, as its status may lack one."""
+    """Every job is also queued, because its status may lack a condition."""
     made, _ = definition(NOW)
 
     assert made.accepted({}, status("Running", "Stalled")) == status("Running", "Stalled")
@@ -63,7 +66,7 @@ def test_a_definition_of_this_release_takes_every_condition(definition, looks):
 
 
 def test_an_older_definition_gets_no_condition_that_it_would_refuse(definition, looks):
-    """An API server refuses the whole status for it: no job would be accepted any more."""
+    """An API server would refuse the whole status for it, and no job would be accepted any more."""
     made, server = definition(BEFORE)
 
     assert made.accepted(status("Stalled"), status("Running", "Stalled")) == status("Running")
@@ -77,7 +80,10 @@ def test_an_older_definition_gets_no_condition_that_it_would_refuse(definition, 
 
 
 def test_a_status_keeps_its_conditions_while_the_definition_cannot_be_read(definition):
-    """An operator that starts beside a busy API server took them from every job, and gave them back later."""
+    """Otherwise an operator would remove them from every job and restore them later.
+
+    That happened while the API server was busy at the operator's start.
+    """
     made, _ = definition(None)
 
     assert made.accepted(status("Stalled"), status("Running", "Stalled")) == status("Running", "Stalled")

@@ -1,4 +1,4 @@
-"""Creating an object whose name is taken."""
+"""The creation of an object whose name is already used."""
 
 import pytest
 
@@ -28,7 +28,7 @@ def a_job(*owners):
 
 
 class Server:
-    """An API server that has an object of that name already."""
+    """An API server that already has an object of that name."""
 
     pods = ()
 
@@ -36,7 +36,7 @@ class Server:
         self.there = there
 
     def get(self, resource, *_):
-        """Return the TrainingJob, or what is there."""
+        """Return the TrainingJob, or the existing object."""
         if resource.kind == "TrainingJob":
             return RAW
         if self.there is None:
@@ -48,7 +48,7 @@ class Server:
         return list(self.pods)
 
     def create(self, *_):
-        """Refuse."""
+        """Refuse the creation."""
         raise AlreadyExists(409, "AlreadyExists", "it is there")
 
 
@@ -63,7 +63,7 @@ class Server:
     ids=["ours, of a moment ago", "other content", "of somebody else", "not immutable"],
 )
 def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(change, wrong):
-    """Pods would train whatever it says, now or later."""
+    """Otherwise pods would train with whatever it contains, now or later."""
     api, denials = Server({**WANTED, **change}), RejectedCreations()
     acting = Executor(api, FencedClient(api, lambda: True), None, denials)
 
@@ -79,7 +79,7 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
     ids=["ours, which the cache has not heard of", "of an earlier job", "of nobody", "gone by now"],
 )
 def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there, made):
-    """Else an event would say that it was created; whose the name is, the next look tells."""
+    """Otherwise an event would report its creation; the next reconcile finds out the owner."""
     api = Server(there)
     acting = Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations())
 
@@ -107,7 +107,7 @@ def a_pod(uid="old", claim="shared", phase="Running"):
     ids=["an earlier one's, on a claim of both", "an earlier one's", "its own", "one that has ended"],
 )
 def test_a_job_is_not_created_beside_a_pod_that_may_write_to_its_volume(pod, waits):
-    """The last look before a creation is at the cluster, not at a cache that may lag."""
+    """The last check before a creation reads the cluster, because a cache may be late."""
     job = a_job("ours")
     job["metadata"]["labels"] = a_pod(uid="new")["metadata"]["labels"]
     job["spec"] = {"template": {"spec": a_pod()["spec"]}}

@@ -1,4 +1,4 @@
-"""A comparison that only informs people must not end the operator."""
+"""The comparison of definitions only informs people and must not end the operator."""
 
 import threading
 
@@ -6,7 +6,7 @@ from palaestra.operator.crd_check import CrdCheck
 
 
 class Server:
-    """An API server whose document on TrainingJobs is none that anybody foresaw."""
+    """An API server with an unexpected schema of TrainingJobs."""
 
     def __init__(self):
         self.asked = threading.Event()
@@ -22,7 +22,7 @@ class Server:
 
 
 def test_a_document_that_nobody_foresaw_does_not_end_the_operator(monkeypatch):
-    """A thread that ends by mistake ends the whole operator, and it would do so again at every start."""
+    """A thread that fails ends the whole operator, and would do so again after every start."""
     broken = []
     monkeypatch.setattr(threading, "excepthook", broken.append)
     server, stopping = Server(), threading.Event()

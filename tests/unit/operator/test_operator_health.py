@@ -1,4 +1,4 @@
-"""The operator's own port: what kubelets and Prometheus read."""
+"""The operator's own port, which kubelets and Prometheus read."""
 
 import socket
 import urllib.error
@@ -19,7 +19,7 @@ PHASES = [("robots", "Running"), ("robots", "Running"), ("home", "Failed")]
 
 @pytest.fixture
 def told():
-    """The current problems; empty if there is none."""
+    """The current problems; empty if everything is fine."""
     return []
 
 
@@ -57,7 +57,7 @@ def test_a_probe_fails_with_the_reason(path, ask, told):
 
 
 def test_nothing_else_is_served(ask):
-    """No index, no file, no profile."""
+    """The port serves no index, no file and no profile."""
     assert ask("/../etc/passwd")[0] == 404
 
 
@@ -81,7 +81,7 @@ def test_what_the_operator_counts(line, ask):
 
 
 def test_the_error_for_a_taken_address_names_the_option():
-    """Two operators on one machine."""
+    """Two operators may run on one machine."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         where = Address(*taken.getsockname()[:2])
 
@@ -91,12 +91,12 @@ def test_the_error_for_a_taken_address_names_the_option():
 
 @pytest.mark.parametrize("text", ["8080", ":8080", "localhost:", "localhost:http", "localhost:65536"])
 def test_what_is_no_address_is_refused(text):
-    """With what one looks like."""
+    """The message has an example of an address."""
     with pytest.raises(PalaestraError, match=r"write it as 0\.0\.0\.0:8080"):
         address(text)
 
 
 def test_an_address_may_be_of_either_kind():
-    """IPv6 has brackets."""
+    """IPv6 addresses have brackets."""
     assert address("[::1]:8080") == ("::1", 8080)
     assert address("0.0.0.0:0") == ("0.0.0.0", 0)

@@ -1,4 +1,4 @@
-"""What an operator has in memory is what it uses: it runs for months beside the work of others."""
+"""An operator keeps in memory only what it uses, because it runs for months next to other programs."""
 
 import json
 import subprocess

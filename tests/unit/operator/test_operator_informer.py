@@ -1,4 +1,4 @@
-"""What the command line makes of namespaces; that they are followed is tested with a real API server."""
+"""The command line's namespaces; a test with a real API server shows that they are watched."""
 
 import argparse
 
@@ -12,7 +12,7 @@ from palaestra.cli import operator
     [([], []), (["--namespace=a"], ["a"]), (["--namespace=a", "--namespace", "b"], ["a", "b"])],
 )
 def test_the_namespaces_may_be_named_one_by_one(typed, namespaces):
-    """None means all of them."""
+    """An empty list means all namespaces."""
     parser = argparse.ArgumentParser()
     operator.add(parser.add_subparsers())
 

@@ -1,4 +1,4 @@
-"""When the operator asks why Kueue does not admit a Job, and when it does not."""
+"""When the operator requests the reason why Kueue does not admit a Job, and when it does not."""
 
 import pytest
 
@@ -15,7 +15,7 @@ WAITS = {"status": {"conditions": [{"type": "QuotaReserved", "status": "False", 
 
 
 class Server:
-    """An API server that has one Workload, and a clock beside it."""
+    """An API server with one Workload, and a clock."""
 
     def __init__(self):
         self.now, self.asked, self.refusal = 100.0, [], None
@@ -31,7 +31,7 @@ class Server:
 
 @pytest.fixture
 def server():
-    """A server that counts what it is asked."""
+    """A server that counts its requests."""
     return Server()
 
 
@@ -45,7 +45,7 @@ def job(uid="u", *, suspend=True, labels=QUEUED, status=None):
 
 
 def asked(server, *jobs, pods=()):
-    """Return what is known of Jobs once the first seconds are over."""
+    """Return the cache, and the reasons that it knows after the first seconds."""
     admissions = KueueWorkloads(server, lambda: server.now)
     admissions.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
@@ -53,7 +53,7 @@ def asked(server, *jobs, pods=()):
 
 
 def test_the_workload_of_a_job_is_found_by_kueues_label(server):
-    """Its name is a hash; the label holds the uid of the Job."""
+    """Its name is a hash, but the label has the uid of the Job."""
     _, answers = asked(server, job())
 
     assert answers == Answers(facts={"u": SHORT}, again_s=RECHECK_S)
@@ -72,7 +72,7 @@ def test_the_workload_of_a_job_is_found_by_kueues_label(server):
     ids=["admitted", "no queue", "no labels", "ended", "its pod still saves"],
 )
 def test_nobody_is_asked_about_a_job_that_does_not_wait_in_a_queue(queued, pods, server):
-    """While nothing waits, nothing is asked for."""
+    """If no Job waits, no request is sent."""
     _, answers = asked(server, queued, pods=pods)
 
     assert (answers, server.asked) == (Answers(facts={}), [])
@@ -80,7 +80,7 @@ def test_nobody_is_asked_about_a_job_that_does_not_wait_in_a_queue(queued, pods,
 
 @pytest.mark.parametrize("refusal", [Forbidden(403, "Forbidden", "no"), NotFound(404, "NotFound", "no")])
 def test_a_refusal_is_no_word_and_no_error(refusal, server):
-    """The operator's role may be of an earlier release, and Kueue may serve other versions."""
+    """The operator's role may be without Workloads, and Kueue may serve other versions."""
     server.refusal = refusal
 
     _, answers = asked(server, job())
@@ -89,7 +89,7 @@ def test_a_refusal_is_no_word_and_no_error(refusal, server):
 
 
 def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_said_stays(server):
-    """As any other read of a look, it is logged; not every look fails by it."""
+    """The error is logged like that of any other read, and does not fail every reconcile."""
     admissions, _ = asked(server, job())
     server.refusal = ServerError(500, "InternalError", "conversion webhook failed")
     server.now += RECHECK_S
@@ -101,7 +101,7 @@ def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_sai
 
 
 def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(server):
-    """Thousands wait in queues for days, and that is no trouble."""
+    """Thousands of Jobs may wait in queues for days without any problem."""
     admissions, hindrances = (kind(server, lambda: server.now) for kind in (KueueWorkloads, PodEvents))
     for number in range(REMEMBERED):
         admissions.of(("robots", f"job-{number}"), UID, [job(f"u{number}")], [])
@@ -115,7 +115,7 @@ def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(ser
 
 
 def test_a_job_that_was_admitted_and_taken_back_is_asked_about_anew(server):
-    """What its Workload said before is no longer true."""
+    """The old message of its Workload no longer holds."""
     admissions, _ = asked(server, job())
     admissions.of(KEY, UID, [job(suspend=False)], [])
 

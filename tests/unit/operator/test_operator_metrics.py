@@ -1,4 +1,4 @@
-"""What the operator counts of its jobs, by the statuses that it writes."""
+"""The operator counts its jobs by the statuses that it writes."""
 
 import pytest
 
@@ -9,12 +9,12 @@ CREATED = "2026-01-31T12:00:00Z"
 
 @pytest.fixture
 def metrics():
-    """Metrics of an operator that has just started."""
+    """Return the metrics of an operator that has just started."""
     return Metrics()
 
 
 def job(**status):
-    """Return a TrainingJob of noon with this status."""
+    """Return a TrainingJob that was created at noon, with this status."""
     return {
         "metadata": {"name": "job", "namespace": "robots", "creationTimestamp": CREATED},
         "status": status,
@@ -28,18 +28,18 @@ def replica(phase="Running", reason="Training", **restarts):
 
 
 def status(*replicas, phase="Running", at="2026-01-31T12:01:30Z"):
-    """Return the status of a job that runs since then."""
+    """Return the status of a job that has been running since `at`."""
     running = {"type": "Running", "status": "True", "reason": "Training", "lastTransitionTime": at}
     return {"phase": phase, "conditions": [running], "replicas": list(replicas)}
 
 
 def value(metrics, name, **labels):
-    """Return the value of a sample, None if there is none."""
+    """Return the value of a sample, or None."""
     return metrics.registry.get_sample_value(name, labels)
 
 
 def test_a_job_is_timed_from_its_creation_until_it_first_runs(metrics):
-    """Once, however often the status is written afterwards."""
+    """The time is recorded once, however often the status is written later."""
     metrics.written(job(phase="Pending", replicas=[replica("Pending")]), status(replica()))
     metrics.written(job(**status(replica())), status(replica() | {"step": 7}))
 
@@ -51,7 +51,7 @@ def test_a_job_is_timed_from_its_creation_until_it_first_runs(metrics):
 
 @pytest.mark.parametrize("trace", [{"attempt": 2}, {"target": 5000}], ids=["a second pod", "it was polled"])
 def test_a_job_that_runs_again_is_not_timed_again(metrics, trace):
-    """After a node was lost, or a pod replaced, it runs long after its creation."""
+    """After a node was lost or a pod replaced, the job runs again long after its creation."""
     before = job(phase="Pending", replicas=[replica("Pending") | trace])
     metrics.written(before, status(replica() | trace))
 
@@ -59,7 +59,7 @@ def test_a_job_that_runs_again_is_not_timed_again(metrics, trace):
 
 
 def test_restarts_are_counted_by_cause_when_they_are_written(metrics):
-    """Only what is new: the status has the sum."""
+    """Only new restarts count, because the status has the sum."""
     before = job(**status(replica(trainer=1, simulator=5)))
     metrics.written(before, status(replica(trainer=2, simulator=5, disruption=1)))
 
@@ -71,7 +71,7 @@ def test_restarts_are_counted_by_cause_when_they_are_written(metrics):
 
 
 def test_a_replica_ends_once_and_for_its_reason(metrics):
-    """An alert on Diverged wants the first of them, so the count is there, as 0, from the start."""
+    """The counter starts at 0, so that an alert on Diverged sees the first case."""
     before = value(metrics, "palaestra_replica_ends_total", reason="Diverged")
     ended = status(replica("Failed", "Diverged"), phase="Failed")
     metrics.written(job(**status(replica())), ended)
@@ -82,14 +82,14 @@ def test_a_replica_ends_once_and_for_its_reason(metrics):
 
 
 def test_a_success_is_an_end_too(metrics):
-    """And the share of them is a question that people ask."""
+    """People query the share of successes."""
     metrics.written(job(), status(replica("Succeeded", "Succeeded"), phase="Succeeded"))
 
     assert value(metrics, "palaestra_replica_ends_total", reason="Succeeded") == 1
 
 
 def test_an_end_for_a_reason_that_ends_nothing_is_counted_as_unknown(metrics):
-    """A mark on a Job may say anything; labels stay bounded."""
+    """A mark on a Job may have any reason, but the labels must stay bounded."""
     metrics.written(job(), status(replica("Failed", "Queued"), phase="Failed"))
 
     assert value(metrics, "palaestra_replica_ends_total", reason="JobFailed") == 1
@@ -117,7 +117,7 @@ def test_only_the_operator_that_leads_exports_jobs(metrics, leads, jobs):
 
 @pytest.mark.parametrize(("outdated", "shown"), [(True, 1), (False, 0), (None, None)])
 def test_an_outdated_definition_is_a_gauge_that_has_no_value_before_it_was_read(metrics, outdated, shown):
-    """An alert must not clear only because an operator has just started."""
+    """An alert must not be cleared only because an operator has just started."""
     metrics.watch(depth=lambda: 0, leads=lambda: True, phases=list, waits=list, outdated=lambda: outdated)
 
     assert value(metrics, "palaestra_operator_crd_outdated") == shown
@@ -125,7 +125,7 @@ def test_an_outdated_definition_is_a_gauge_that_has_no_value_before_it_was_read(
 
 @pytest.mark.parametrize(("leads", "replicas"), [(True, 2), (False, None)])
 def test_replicas_that_wait_are_counted_by_what_they_wait_for(metrics, leads, replicas):
-    """A typo in an image must not hold a quota in silence."""
+    """A typo in an image must not silently hold quota."""
     waiting = [("robots", "ImagePull"), ("robots", "ImagePull"), ("home", "Unschedulable")]
     metrics.watch(
         depth=lambda: 0, leads=lambda: leads, phases=list, waits=lambda: waiting, outdated=lambda: None

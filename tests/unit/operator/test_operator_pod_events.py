@@ -1,4 +1,4 @@
-"""When the operator asks why a Job has no pod, and when it does not."""
+"""When the operator requests the events of a Job or pod, and when it does not."""
 
 import pytest
 
@@ -15,14 +15,14 @@ LAST = {"involvedObject": {"uid": "u"}, **FAILED}
 
 
 class Server:
-    """An API server of Jobs and events, and a clock beside it."""
+    """An API server of Jobs and events, and a clock."""
 
     def __init__(self):
         self.now, self.asked, self.jobs, self.times = 100.0, 0, {}, []
         self.about = "reason=FailedCreate"
 
     def list(self, resource, namespace, *, fields):
-        """Return the one event that there is."""
+        """Return the only event."""
         assert (resource.plural, namespace) == ("events", "robots")
         assert fields.startswith("involvedObject.uid=u")
         assert fields.endswith(f",{self.about}")
@@ -41,7 +41,7 @@ class Server:
 
 @pytest.fixture
 def server():
-    """A server that counts what it is asked."""
+    """A server that counts its requests."""
     return Server()
 
 
@@ -56,7 +56,7 @@ def job(**changes):
 
 
 def pod(phase):
-    """Return its pod."""
+    """Return the pod of the Job."""
     return {
         "metadata": {"uid": "p", "namespace": "robots", "ownerReferences": [{"uid": "u"}]},
         "status": {"phase": phase},
@@ -64,12 +64,12 @@ def pod(phase):
 
 
 def events(answers):
-    """Return the events that are known."""
+    """Return the known events."""
     return list(answers.facts.values())
 
 
 def test_a_new_job_is_given_some_seconds(server):
-    """Nearly all have a pod at once; nobody is asked."""
+    """Nearly every Job has a pod at once, so no request is sent."""
     hindrances = PodEvents(server, lambda: server.now)
 
     found = hindrances.of(KEY, UID, [job()], [])
@@ -79,7 +79,7 @@ def test_a_new_job_is_given_some_seconds(server):
 
 
 def test_after_that_its_events_are_read_now_and_then(server):
-    """Not at every look: a job is looked at many times a second while its pods change."""
+    """Not every reconcile reads them: a job is reconciled many times a second while its pods change."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -90,7 +90,7 @@ def test_after_that_its_events_are_read_now_and_then(server):
 
 
 def test_the_pauses_grow_to_five_minutes(server):
-    """A quota that is spent for a night is no news."""
+    """A quota that is used up for a night needs no frequent requests."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -105,14 +105,14 @@ def test_the_pauses_grow_to_five_minutes(server):
 
 
 def look_at(hindrances, number):
-    """Return what is known about the Job, which should have a pod, of one of many TrainingJobs."""
+    """Return the known events of a Job without a pod, which belongs to one of many TrainingJobs."""
     name, uid = f"job-{number}", f"u{number}"
     raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
     return hindrances.of(("robots", name), f"job-{uid}", [raw], [])
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
-    """Whatever a namespace does; a look before the turn asks nobody."""
+    """No namespace can exceed this; a reconcile before its turn sends no request."""
     hindrances = PodEvents(server, lambda: server.now)
     due = {number: look_at(hindrances, number).again_s for number in range(1500)}
     looks = 0
@@ -133,7 +133,7 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
 
 
 def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
-    """Those that are remembered keep their place, so that each gets its answer."""
+    """Those that are remembered keep their place, so that each gets its events."""
     hindrances = PodEvents(server, lambda: server.now)
     for number in range(REMEMBERED):
         look_at(hindrances, number)
@@ -148,7 +148,7 @@ def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
 
 
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
-    """The second pod may be refused though the first was not."""
+    """The second pod may be refused although the first was not."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [pod("Failed")])
     server.now += PATIENCE_S
@@ -167,7 +167,7 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     ids=["no Job", "a pod", "suspended", "ended"],
 )
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
-    """While nothing changes, nothing is asked for."""
+    """If nothing changes, no request is sent."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
@@ -177,7 +177,7 @@ def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
 
 
 def waiting_pod(**status):
-    """Return a pod that a node has taken."""
+    """Return a pod that is scheduled to a node."""
     return {
         "metadata": {"uid": "u", "namespace": "robots"},
         "spec": {"nodeName": "node-1"},
@@ -186,7 +186,7 @@ def waiting_pod(**status):
 
 
 def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
-    """After some seconds, as a Job: most volumes come at once."""
+    """The operator waits some seconds first, as for a Job: most volumes are mounted at once."""
     server.about = "type=Warning"
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [], [waiting_pod()])
@@ -208,7 +208,7 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     ids=["no node", "runs", "pulls images", "deleted"],
 )
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
-    """Its own status has the reason."""
+    """The pod's own status has the reason."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S
@@ -218,7 +218,7 @@ def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
 
 
 def test_a_job_that_is_made_again_is_asked_about_anew(server):
-    """What the events of the one before said is not about it, even if a test or a backup gives it its uid."""
+    """The events of the earlier job do not count, even if a test or a backup reuses the old uid."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -228,7 +228,7 @@ def test_a_job_that_is_made_again_is_asked_about_anew(server):
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
-    """A name becomes free without any event that reaches us."""
+    """No watch reports to the operator that the name is free."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")
@@ -241,7 +241,7 @@ def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
 
 
 def test_who_is_in_the_cache_is_no_stranger(server):
-    """The name was taken by our own Job, which the cache had not heard of yet."""
+    """The object was the operator's own Job, which the cache did not have yet."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")

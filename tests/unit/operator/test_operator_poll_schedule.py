@@ -1,4 +1,4 @@
-"""The schedule of polls: slow pods take places from each other only."""
+"""The schedule of polls: slow pods take slots only from each other."""
 
 import heapq
 from collections import defaultdict
@@ -10,7 +10,7 @@ PERIOD_S, PROMPT_S, DEADLINE_S = 10.0, 1.0, 3.0
 
 
 def targets(count, *, namespace="robots", name="answers"):
-    """Return so many trainers of one job."""
+    """Return some trainers of one job."""
     return [
         PollTarget(key=(namespace, name), uid=f"{namespace}-{name}-{index}", host="10.0.0.1", port=1)
         for index in range(count)
@@ -18,14 +18,17 @@ def targets(count, *, namespace="robots", name="answers"):
 
 
 def simulated(followed, *, until_s, seconds=0.01):
-    """Return when each target was asked, by uid; one of a job `silent` is waited for until the deadline."""
+    """Return the times of the polls by uid.
+
+    A pod of the job `silent` does not respond before the deadline.
+    """
     schedule, asked, under_way = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.5), defaultdict(list), []
     schedule.follow(followed, 0.0)
     now_s, met = 0.0, set()
     while now_s < until_s:
         for entry in schedule.due(now_s):
             uid = entry.target.uid
-            silent_s = DEADLINE_S if uid in met else PROMPT_S  # a first question is shorter
+            silent_s = DEADLINE_S if uid in met else PROMPT_S  # the first poll has a shorter deadline
             took_s = silent_s if entry.target.key[1] == "silent" else seconds
             met.add(uid)
             asked[uid].append(now_s)
@@ -38,7 +41,7 @@ def simulated(followed, *, until_s, seconds=0.01):
 
 
 def test_each_trainer_is_asked_every_period():
-    """A thousand of them, from the first second on."""
+    """This holds for a thousand trainers, from the first second on."""
     asked = simulated(targets(1000), until_s=60.0)
 
     assert len(asked) == 1000
@@ -47,7 +50,7 @@ def test_each_trainer_is_asked_every_period():
 
 
 def test_silent_pods_do_not_delay_the_trainers_that_answer():
-    """640 of them in the same job's namespace: once they are known as such, nobody waits for them."""
+    """The job has 640 silent pods in the same namespace; once they are known, they delay nobody."""
     ten = targets(10)
 
     asked = simulated([*targets(640, name="silent"), *ten], until_s=200.0)
@@ -58,7 +61,7 @@ def test_silent_pods_do_not_delay_the_trainers_that_answer():
 
 
 def test_a_namespace_full_of_silent_pods_does_not_delay_the_first_question_to_others():
-    """After a restart nobody is known yet; the turn goes from namespace to namespace."""
+    """After a restart no pod is known yet, so the namespaces take turns."""
     ten = targets(10)
 
     asked = simulated([*targets(640, namespace="theirs", name="silent"), *ten], until_s=5.0)
@@ -67,7 +70,7 @@ def test_a_namespace_full_of_silent_pods_does_not_delay_the_first_question_to_ot
 
 
 def test_a_silent_pod_is_asked_again():
-    """A node's network may be away for an hour, and come back."""
+    """A node's network may fail for an hour and return."""
     silent = targets(1, name="silent")
 
     asked = simulated(silent, until_s=60.0)
@@ -76,7 +79,7 @@ def test_a_silent_pod_is_asked_again():
 
 
 def test_no_more_are_asked_at_once_than_there_are_places():
-    """Each of them may send 64 KiB."""
+    """Each pod may send 64 KiB."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1000), 0.0)
 
@@ -87,7 +90,7 @@ def test_no_more_are_asked_at_once_than_there_are_places():
 
 
 def test_the_answer_of_a_pod_that_went_meanwhile_is_not_used():
-    """Its place is free again all the same."""
+    """Its slot still becomes free again."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1), 0.0)
     (entry,) = schedule.due(0.0)

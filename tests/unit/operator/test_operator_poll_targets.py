@@ -1,4 +1,4 @@
-"""Which pods are asked as trainers, from event to event."""
+"""Pods are polled as trainers according to the events about them."""
 
 import pytest
 
@@ -22,7 +22,7 @@ def pod(state="running", address="10.1.2.3", owner="job-uid", **metadata):
 
 @pytest.fixture
 def trainers():
-    """Return what is known of one TrainingJob with one Job."""
+    """Return the known objects of one TrainingJob with one Job."""
     known = PollTargets()
     known.training_job(named("job", "tj-uid"), exists=True)
     known.job(named("job-r0", "job-uid", "tj-uid"), exists=True)
@@ -30,7 +30,7 @@ def trainers():
 
 
 def test_a_pod_whose_trainer_runs_is_asked(trainers):
-    """At its address, for the job that it belongs to."""
+    """The poll goes to the pod's address, for the job that the pod belongs to."""
     trainers.pod(pod(), exists=True)
 
     (target,) = trainers.targets()
@@ -64,7 +64,7 @@ def test_a_pod_whose_trainer_runs_is_asked(trainers):
     ],
 )
 def test_any_other_pod_is_not_asked(trainers, other):
-    """A label is set by anybody; an address that is a name would have to be resolved."""
+    """Any user can set a label, and an address that is a name would have to be resolved."""
     trainers.pod(pod(), exists=True)
     trainers.pod(other, exists=True)
 
@@ -72,7 +72,7 @@ def test_any_other_pod_is_not_asked(trainers, other):
 
 
 def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
-    """Whichever of the three goes first."""
+    """It does not matter which of the three is deleted first."""
     trainers.pod(pod(), exists=True)
 
     trainers.job(named("job-r0", "job-uid", "tj-uid"), exists=False)
@@ -87,7 +87,7 @@ def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
 
 
 def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(trainers):
-    """A user with the right to create Jobs could otherwise make the operator poll a thousand pods."""
+    """Otherwise a user who may create Jobs could make the operator poll a thousand pods."""
     trainers.job(named("job-r0", "job-uid", "stranger"), exists=True)
     trainers.pod(pod(), exists=True)
 
@@ -95,7 +95,7 @@ def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(traine
 
 
 def test_an_address_of_ipv6_is_one(trainers):
-    """Clusters have them."""
+    """Clusters may use IPv6."""
     trainers.pod(pod(address="fd00::1"), exists=True)
 
     assert [each.host for each in trainers.targets()] == ["fd00::1"]

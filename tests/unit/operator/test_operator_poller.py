@@ -1,4 +1,4 @@
-"""A pod is not to be trusted: what a poller takes from it, and how long it lets it take."""
+"""Pods are not trusted: a poller limits the size and the time of their responses."""
 
 import json
 import socketserver
@@ -20,7 +20,7 @@ WAIT_S = 60.0
 
 
 class Trainer(socketserver.ThreadingTCPServer):
-    """Answers every connection with the same bytes, and then sends nothing for the given time."""
+    """A server that sends the same bytes on every connection, and then waits until `silent` is set."""
 
     daemon_threads = True
     block_on_close = False
@@ -33,22 +33,22 @@ class Trainer(socketserver.ThreadingTCPServer):
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
 
     def target(self, uid="pod", key=JOB):
-        """Return it as one of the trainers to ask."""
+        """Return the server as a poll target."""
         return PollTarget(key=key, uid=uid, host="127.0.0.1", port=self.server_address[1])
 
     def asked(self, count):
-        """Wait until so many more questions are over: the next one begins after them."""
+        """Wait for `count` further polls to end; the start of the next poll shows that the last has ended."""
         while self.questions.acquire(blocking=False):
-            pass  # asked before this call, which a busy machine delayed
+            pass  # polled before this call, which a busy machine delayed
         for _ in range(count + 1):
             assert self.questions.acquire(timeout=WAIT_S)
 
 
 class Answering(socketserver.BaseRequestHandler):
-    """One connection."""
+    """Handle one connection."""
 
     def handle(self):
-        """Answer it."""
+        """Send the response."""
         self.request.recv(4096)
         self.server.questions.release()
         try:
@@ -61,7 +61,7 @@ class Answering(socketserver.BaseRequestHandler):
 
 @contextmanager
 def trainer(answer, silent=None):
-    """Serve one answer."""
+    """Serve one response."""
     server = Trainer(answer, silent)
     try:
         yield server
@@ -74,7 +74,7 @@ def trainer(answer, silent=None):
 
 @contextmanager
 def polling(*targets, deadline_s=3.0):
-    """Poll often; yields the poller, whose targets may be exchanged."""
+    """Poll often, and yield the poller, whose targets may be replaced."""
     poller = Poller(lambda: poller.asks, lambda _: poller.changed.set(), period_s=0.01, deadline_s=deadline_s)
     poller.asks, poller.changed = targets, threading.Event()
     poller.start()
@@ -85,7 +85,7 @@ def polling(*targets, deadline_s=3.0):
 
 
 def test_a_running_trainer_says_where_it_stands():
-    """The numbers of `kubectl get tj`."""
+    """`kubectl get tj` shows these numbers."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
 
@@ -107,7 +107,7 @@ def test_a_running_trainer_says_where_it_stands():
     ids=["nothing", "another protocol", "redirect", "endless head", "list", "deep", "negative", "endless"],
 )
 def test_what_is_no_answer_is_unknown(answer):
-    """No exception, no guess, and nothing is followed."""
+    """There is no exception and no guess, and no redirect is followed."""
     with trainer(answer) as pod, polling(pod.target()) as poller:
         pod.asked(2)
 
@@ -115,7 +115,7 @@ def test_what_is_no_answer_is_unknown(answer):
 
 
 def test_a_trainer_that_drips_does_not_hold_the_others_up():
-    """The deadline is for the whole answer, not for the next byte."""
+    """The deadline holds for the whole response, not for the next byte."""
     silent = threading.Event()
     with (
         trainer(OK + BODY[:20], silent) as slow,
@@ -128,7 +128,10 @@ def test_a_trainer_that_drips_does_not_hold_the_others_up():
 
 
 def test_silent_pods_delay_nobody():
-    """640 of them: each of ten others is asked every period, and its answer is used when it comes."""
+    """There are 640 of them.
+
+    Each of ten other pods is polled every period, and its response is used at once.
+    """
     silent, quick = threading.Event(), [trainer(OK + BODY) for _ in range(10)]
     with ExitStack() as stack:
         ten = [stack.enter_context(each) for each in quick]
@@ -143,7 +146,7 @@ def test_silent_pods_delay_nobody():
 
 
 def test_who_stops_answering_becomes_unknown_again():
-    """An old answer is no sign of life; only the trainer reports that it stalled."""
+    """An old response does not show that the trainer lives; only the trainer itself reports a stall."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         before = set(poller.known())
@@ -154,7 +157,7 @@ def test_who_stops_answering_becomes_unknown_again():
 
 
 def test_what_a_pod_said_is_forgotten_with_it():
-    """The uid of a pod that went comes never again, and memory is finite."""
+    """The uid of a deleted pod never returns, and memory is finite."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         poller.changed.clear()
@@ -165,7 +168,7 @@ def test_what_a_pod_said_is_forgotten_with_it():
 
 
 def test_an_answer_that_nobody_foresaw_ends_no_other_question(monkeypatch):
-    """One pod's bytes must not end the thread, and with it the operator of everybody."""
+    """The bytes of one pod must not end the thread, and with it the operator for everybody."""
     read = TrainerStatus.from_json
     monkeypatch.setattr(TrainerStatus, "from_json", lambda body: read(body) if body["step"] != 8 else 1 // 0)
     with (
@@ -180,7 +183,7 @@ def test_an_answer_that_nobody_foresaw_ends_no_other_question(monkeypatch):
 
 
 def test_a_pod_that_lies_for_ever_is_logged_once():
-    """A thousand of them would fill the log that everybody reads."""
+    """A thousand such pods would fill the log that everybody reads."""
     with trainer(OK + b"[]") as pod, capture_logs() as logs, polling(pod.target()):
         pod.asked(5)
 
@@ -188,7 +191,7 @@ def test_a_pod_that_lies_for_ever_is_logged_once():
 
 
 def test_a_job_is_looked_at_when_its_trainer_says_something_new_only():
-    """A hundred idle trainers make no work, though they get older."""
+    """A hundred idle trainers cause no work, although their ages grow."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         assert poller.changed.wait(WAIT_S)
         poller.changed.clear()

@@ -1,4 +1,4 @@
-"""Decisions from a stale cache are not carried out: a read and preconditions detect them."""
+"""Decisions from an outdated cache are not carried out: a read and preconditions detect them."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def a_pod(uid="pod-1", version="30", owner="job-uid", replica="0"):
 
 
 class Server:
-    """An API server with one TrainingJob, its pods, and what was written."""
+    """An API server with one TrainingJob and its pods, which records the writes."""
 
     def __init__(self, version="7", pods=(), *, conflict=False):
         self.version, self.pods, self.conflict = version, pods, conflict
@@ -54,7 +54,7 @@ class Server:
 
 
 def carry_out(api, *actions):
-    """Do something, and return whether it was done."""
+    """Carry out actions, and return whether they were done."""
     try:
         Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations()).carry_out(
             RAW, actions
@@ -82,7 +82,7 @@ def carry_out(api, *actions):
     ],
 )  # fmt: skip
 def test_a_replica_is_stopped_only_if_all_is_as_it_was_when_that_was_decided(there, done):
-    """A watch that is frozen for 90 s must not end a pod that has come up in the meantime."""
+    """A watch that hangs for 90 s must not end a pod that has started in the meantime."""
     api = Server(**there)
 
     assert carry_out(api, STOP) is done
@@ -90,7 +90,7 @@ def test_a_replica_is_stopped_only_if_all_is_as_it_was_when_that_was_decided(the
 
 
 def test_a_job_is_changed_only_in_the_version_that_was_decided_about():
-    """Between the read and the patch it may be resumed, or made again under its name."""
+    """Between the read and the patch the job may be resumed, or created again under its name."""
     api = Server(pods=[a_pod()])
 
     carry_out(api, STOP)
@@ -111,7 +111,7 @@ def test_a_job_is_changed_only_in_the_version_that_was_decided_about():
     ids=["a TrainingJob whose time to live is over", "a suspended Job"],
 )
 def test_a_deletion_is_of_one_version(action, expected):
-    """A person may remove or prolong the time to live, and a queue admit the Job, until the last moment."""
+    """Until the last moment a person may change the time to live, and a queue may admit the Job."""
     api, late, refusing = Server(), Server(version="8"), Server(conflict=True)
 
     assert carry_out(api, action)

@@ -1,4 +1,4 @@
-"""What the operator remembers of time: on its monotonic clock, and not longer than it leads."""
+"""The operator keeps times on its monotonic clock, and only as long as it leads."""
 
 from datetime import UTC, datetime
 
@@ -15,14 +15,14 @@ WAITS = ReconcileRecord(waits={(0, "trainer", "uid"): 5.0})
 
 
 class Notes:
-    """A writer and a recorder that note what they are asked to write."""
+    """A writer and a recorder that keep the patches."""
 
     def __init__(self):
         self.patches = []
         self.prunes = False
 
     def status(self, job, patch):
-        """Note the patch of a status, and return the job as stored: unchanged where all was pruned."""
+        """Keep a patch of the status, and return the stored job. It is unchanged if everything was pruned."""
         self.patches.append(patch)
         version = job["metadata"]["resourceVersion"] if self.prunes else str(len(self.patches) + 1)
         return {"metadata": {"resourceVersion": version}}
@@ -30,13 +30,13 @@ class Notes:
 
 @pytest.fixture
 def notes():
-    """Return where the patches of statuses are noted."""
+    """Return the object that keeps the patches."""
     return Notes()
 
 
 @pytest.fixture
 def tell(notes, monkeypatch):
-    """`tell(step=11, clock_s=30)`: tell a step, and return the seconds until it is written."""
+    """`tell(step=11, clock_s=30)` reports a step, and returns the seconds until it is written."""
     reporting = StatusWriter(notes, None, lambda *_: None, lambda _, status: status)
     raw = {"metadata": {"namespace": "default", "name": "job", "resourceVersion": "1"}, "status": OLD}
 
@@ -49,7 +49,7 @@ def tell(notes, monkeypatch):
 
 
 def test_progress_is_held_back_by_the_monotonic_clock(tell, notes):
-    """By a wall clock that is set back an hour there would be no progress for an hour."""
+    """If a wall clock were set back by an hour, no progress would be written for an hour."""
     assert tell(11, 100.0) is None
     assert tell(12, 120.0) == 10
     assert tell(13, 130.0) is None
@@ -57,7 +57,7 @@ def test_progress_is_held_back_by_the_monotonic_clock(tell, notes):
 
 
 def test_a_status_that_the_api_server_prunes_is_sent_once(tell, notes):
-    """An older definition drops fields that it does not have: each look would send the same patch again."""
+    """An older definition drops unknown fields, so each reconcile would send the same patch again."""
     notes.prunes = True
 
     assert [tell(11, clock_s) for clock_s in (100.0, 200.0, 300.0)] == [None, None, None]
@@ -65,7 +65,7 @@ def test_a_status_that_the_api_server_prunes_is_sent_once(tell, notes):
 
 
 def test_a_job_that_is_made_again_begins_every_wait_anew():
-    """Its replicas have the numbers of those before."""
+    """Its replicas have the same numbers as the earlier ones."""
     records = ReconcileRecords()
     records.keep(KEY, "first", WAITS)
 
@@ -84,7 +84,7 @@ def test_nothing_is_remembered_of_the_time_before_this_operator_led():
 
 
 def test_the_clock_of_waits_is_not_the_wall():
-    """Nobody can set it; a stamp has a time zone."""
+    """Nobody can set that clock; a timestamp has a time zone."""
     times = now(WAITS)
 
     assert times.record == WAITS

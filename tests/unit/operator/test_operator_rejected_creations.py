@@ -22,7 +22,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
     ],
 )
 def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(error):
-    """By replica, in the words of the API server or webhook that refused."""
+    """It is kept by replica, with the message of the API server or the webhook."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})
@@ -41,7 +41,7 @@ def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(e
     ],
 )
 def test_what_passes_by_itself_changes_nothing(error):
-    """Such an error is not reported, and an earlier one is not forgotten."""
+    """Such an error is not reported, and does not replace an earlier one."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})
@@ -53,7 +53,7 @@ def test_what_passes_by_itself_changes_nothing(error):
 
 
 def test_words_are_kept_as_long_as_the_status_shows_them():
-    """A webhook may answer with a page; four thousand of them would be memory that nobody reads."""
+    """A webhook may send a whole page, and four thousand of them would fill memory that nobody reads."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {0: Forbidden(403, "Forbidden", "no " * 100_000)})

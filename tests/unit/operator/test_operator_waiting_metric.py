@@ -1,4 +1,4 @@
-"""Which replicas count as waiting, and for what."""
+"""The metric of waiting replicas, with their reasons."""
 
 import pytest
 
@@ -7,12 +7,12 @@ from palaestra.operator.waiting_metric import waits
 
 
 def status(*replicas):
-    """Return a TrainingJob whose replicas are in these states."""
+    """Return a TrainingJob whose replicas have these states."""
     return {"status": {"replicas": list(replicas)}}
 
 
 def test_each_replica_that_waits_counts_with_its_reason():
-    """Those of one job may wait for different things."""
+    """Replicas of one job may wait for different reasons."""
     job = status(
         {"phase": "Pending", "reason": "ImagePull"},
         {"phase": "Pending", "reason": "Unschedulable"},
@@ -38,15 +38,15 @@ def test_each_replica_that_waits_counts_with_its_reason():
     ids=["trains", "mends", "ended", "queued", "starts", "list", "empty", "text"],
 )
 def test_no_other_replica_counts(replica):
-    """A queue is no trouble, and what trains or has ended waits for nothing."""
+    """A queue is not a problem, and a replica that trains or has ended waits for nothing."""
     assert waits(status(replica)) == ()
 
 
 def test_a_job_without_a_status_has_no_replica_that_waits():
-    """Nobody has looked at it yet."""
+    """No operator has reconciled it yet."""
     assert waits({}) == ()
 
 
 def test_every_reason_to_wait_is_a_warning():
-    """An alert counts them: each has a remedy in the table of reasons."""
+    """An alert counts these reasons, and each has a remedy in the table of reasons."""
     assert all(ROWS[reason].warning and ROWS[reason].remedy for reason in WAITING)

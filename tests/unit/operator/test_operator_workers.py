@@ -1,4 +1,4 @@
-"""Workers: what happens to a key whose reconciling goes wrong, and to the others."""
+"""Workers: the effect of a failed reconcile on its key and on the others."""
 
 import threading
 
@@ -27,7 +27,7 @@ MODIFIED = 'Operation cannot be fulfilled on jobs.batch "bad-0": the object has 
 
 
 class Desk:
-    """One worker over a queue whose retries come soon, and what it did."""
+    """One worker of a queue with short retries, and its metrics."""
 
     def __init__(self, reconcile):
         self.queue = WorkQueue(again=Backoff(first_s=0.01, cap_s=0.01))
@@ -38,13 +38,13 @@ class Desk:
         self.workers.start()
 
     def counted(self, result):
-        """Return how often reconciling ended so."""
+        """Return the number of reconciles with that result."""
         return self.registry.get_sample_value("seconds_count", {"result": result}) or 0
 
 
 @pytest.fixture
 def desk():
-    """A function that opens a desk; it is closed afterwards."""
+    """Return a function that opens a desk; it is closed afterwards."""
     desks = []
 
     def begin(reconcile, *, opened=True):
@@ -67,7 +67,7 @@ def desk():
     ],
 )
 def test_a_bad_key_delays_no_other(trouble, result, desk):
-    """With one worker only: it lives on, and takes the next."""
+    """Even a single worker survives, and takes the next key."""
     done = threading.Event()
 
     def reconcile(key):
@@ -85,7 +85,7 @@ def test_a_bad_key_delays_no_other(trouble, result, desk):
 
 
 def test_a_key_that_failed_is_tried_again(desk):
-    """Whatever it was may have passed."""
+    """The cause may have passed."""
     tries = threading.Semaphore(0)
 
     def reconcile(key):
@@ -99,7 +99,7 @@ def test_a_key_that_failed_is_tried_again(desk):
 
 
 def test_a_key_is_looked_at_again_when_time_may_have_changed_something(desk):
-    """Deadlines pass without anybody writing anything."""
+    """A deadline passes without any write."""
     looks = threading.Semaphore(0)
 
     def reconcile(key):
@@ -113,7 +113,7 @@ def test_a_key_is_looked_at_again_when_time_may_have_changed_something(desk):
 
 
 def test_nothing_is_begun_while_another_leads(desk):
-    """The key waits; it is not lost."""
+    """The key waits and is not lost."""
     done = threading.Event()
     at_work = desk(lambda _: done.set(), opened=False)
     at_work.queue.add(GOOD)
@@ -125,7 +125,7 @@ def test_nothing_is_begun_while_another_leads(desk):
 
 
 def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
-    """One is harmless; a job that hangs for one must not hang in silence, nor fill the log."""
+    """A single conflict is harmless; a job that keeps failing must be logged, but not fill the log."""
     tries = threading.Semaphore(0)
 
     def reconcile(key):
@@ -155,7 +155,7 @@ class Refusing:
         return []
 
     def merge(self, *_, **__):
-        """Refuse."""
+        """Refuse the patch."""
         raise Conflict(409, "Conflict", MODIFIED)
 
     evict = merge
@@ -172,7 +172,7 @@ class Refusing:
     ids=["stop", "suspend", "mark", "evict"],
 )
 def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_words(action, desk):
-    """A replica that is past its deadline and is not stopped must not train on in silence."""
+    """A replica past its deadline that cannot be stopped must not silently train on."""
     api = Refusing()
     acting = Executor(api, FencedClient(api, lambda: 1), None, RejectedCreations())
     tries = threading.Semaphore(0)
@@ -186,5 +186,5 @@ def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_
         assert all(tries.acquire(timeout=WAIT_S) for _ in range(10))
 
     repeated = [line for line in lines if line["event"] == "conflict repeats"]
-    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]  # it goes on
+    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]  # it continues
     assert MODIFIED in repeated[0]["error"]

@@ -1,4 +1,4 @@
-"""Whose worlds are checked when: one job of a namespace at a time, and no worker waits for it."""
+"""Worlds are checked for one job of a namespace at a time, and no worker waits for a check."""
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,15 +22,15 @@ def world(text: bytes = ROBOT, size: int = 0) -> GivenWorld:
 
 
 def large(number: int = 0) -> GivenWorld:
-    """Return a world that no worker checks itself."""
+    """Return a world that is too large for a worker to check itself."""
     return world(ROBOT + b"# %d" % number, MOST_BYTES_HERE)
 
 
 class Begin(Protocol):
-    """Starts the checks of worlds."""
+    """The type of the function that starts a checker."""
 
     def __call__(self, apart: "Slow") -> WorldChecker:
-        """Return them."""
+        """Return the checker."""
 
 
 class Slow:
@@ -43,7 +43,7 @@ class Slow:
         self.comes_to_nothing = False
 
     def check(self, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return that all worlds are fine, or nothing."""
+        """Return a verdict that all worlds are valid, or nothing."""
         self.asked += [each.source for each in worlds]
         assert self.may_end.acquire(timeout=60)
         return {} if self.comes_to_nothing else {each.digest: WorldVerdict() for each in worlds}
@@ -51,7 +51,7 @@ class Slow:
 
 @pytest.fixture
 def slow() -> Iterator[Slow]:
-    """A process whose checks end with the test at the latest."""
+    """Return a process whose checks end with the test at the latest."""
     process = Slow()
     yield process
     process.may_end.release(100)
@@ -59,7 +59,10 @@ def slow() -> Iterator[Slow]:
 
 @pytest.fixture
 def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Begin]:
-    """A function that starts the checks, which end with the test; a busy machine ends no turn before."""
+    """Return a function that starts a checker.
+
+    It ends with the test, and no turn ends early on a busy machine.
+    """
     monkeypatch.setattr("palaestra.operator.world_verdicts.HANDED_S", 60.0)
     begun: list[WorldChecker] = []
 
@@ -74,7 +77,7 @@ def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Begin]:
 
 
 def hand_over(checking: WorldChecker, slow: Slow, key: tuple[str, str], worlds: Sequence[GivenWorld]) -> None:
-    """Ask for verdicts, and once more when the job is queued to hand its worlds over."""
+    """Request verdicts, and again when the job is queued to hand its worlds over."""
     woken = slow.woken.count(key)
     assert checking.verdicts(key, worlds) == {}
     eventually(lambda: slow.woken.count(key) > woken)
@@ -82,7 +85,7 @@ def hand_over(checking: WorldChecker, slow: Slow, key: tuple[str, str], worlds: 
 
 
 def test_a_small_world_is_checked_at_once(begin: Begin, slow: Slow) -> None:
-    """A process takes longer to start than such a check takes."""
+    """The start of a process takes longer than such a check."""
     checking = begin(slow)
     fine, wrong = world(), world(b"A{}")
 
@@ -94,14 +97,14 @@ def test_a_small_world_is_checked_at_once(begin: Begin, slow: Slow) -> None:
 
 
 def test_many_small_worlds_of_a_job_are_not(begin: Begin, slow: Slow) -> None:
-    """The bound is one of the job, which may have 32 worlds."""
+    """The limit is one for the whole job, which may have 32 worlds."""
     worlds = [world(ROBOT + b"# %d" % number, MOST_BYTES_HERE // 2) for number in range(3)]
 
     assert begin(slow).verdicts(EVIL, worlds) == {}
 
 
 def test_a_verdict_queues_the_job_and_is_remembered(begin: Begin, slow: Slow) -> None:
-    """So the next reconcile plans the job, and later ones cost nothing."""
+    """The next reconcile plans the job, and later ones cost nothing."""
     checking, given = begin(slow), large()
     hand_over(checking, slow, EVIL, [given])
     assert checking.waits(EVIL)
@@ -115,7 +118,7 @@ def test_a_verdict_queues_the_job_and_is_remembered(begin: Begin, slow: Slow) ->
 
 
 def test_one_namespace_does_not_keep_another_waiting(begin: Begin, slow: Slow) -> None:
-    """Its jobs wait behind each other, however many they are."""
+    """Its jobs wait for each other, however many there are."""
     checking = begin(slow)
     hand_over(checking, slow, EVIL, [large(0)])
     for number in range(1, 30):
@@ -129,7 +132,7 @@ def test_one_namespace_does_not_keep_another_waiting(begin: Begin, slow: Slow) -
 
 
 def test_namespaces_take_turns() -> None:
-    """With more namespaces than checks at a time, none comes twice before the others came once."""
+    """If namespaces outnumber the parallel checks, none gets a second turn before the others had one."""
     turns = FairQueue()
     for key in [("a", "1"), ("a", "2"), ("b", "1"), ("b", "2"), ("c", "1")]:
         turns.hand_over(key, [large()])
@@ -145,7 +148,7 @@ def test_namespaces_take_turns() -> None:
 
 
 def test_a_job_that_is_gone_gives_its_turn_up(begin: Begin, slow: Slow) -> None:
-    """The next job of its namespace would wait for worlds that nobody hands over."""
+    """Otherwise the next job of its namespace would wait for worlds that never come."""
     checking = begin(slow)
     checking.verdicts(EVIL, [large()])
     eventually(lambda: slow.woken == [EVIL])
@@ -157,7 +160,7 @@ def test_a_job_that_is_gone_gives_its_turn_up(begin: Begin, slow: Slow) -> None:
 
 
 def test_a_job_that_is_gone_leaves_the_line(begin: Begin, slow: Slow) -> None:
-    """Nothing is kept of it."""
+    """Nothing about it is kept."""
     checking = begin(slow)
     hand_over(checking, slow, EVIL, [large()])
     checking.verdicts(("evil", "b"), [large(1)])
@@ -170,7 +173,7 @@ def test_a_job_that_is_gone_leaves_the_line(begin: Begin, slow: Slow) -> None:
 def test_a_check_without_a_verdict_is_tried_again(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A node that has no time or memory left says nothing about a world."""
+    """A node without time or memory proves nothing about a world."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.PAUSE_S", 0.0)
     checking, slow.comes_to_nothing = begin(slow), True
     hand_over(checking, slow, EVIL, [large()])
@@ -187,7 +190,7 @@ def test_a_check_without_a_verdict_is_tried_again(
 def test_so_many_verdicts_are_remembered_and_no_more(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An author may change a ConfigMap as often as they like."""
+    """An author may change a ConfigMap any number of times."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.REMEMBERED", 1)
     checking = begin(slow)
     for given in (large(0), large(1)):

@@ -1,4 +1,4 @@
-"""One suite for every physics under the scene: what a robot, a sensor and a supervisor may expect of it."""
+"""One suite for every physics under the scene: the common behavior of robots, sensors and supervisors."""
 
 import math
 
@@ -15,13 +15,13 @@ STEP_MS = 192
 
 @pytest.fixture(params=[StubPhysics, MujocoPhysics], ids=["stub", "mujoco"])
 def physics(request):
-    """Return the physics of a new world."""
+    """Return the class of a physics."""
     return request.param
 
 
 @pytest.fixture
 def load(physics):
-    """`load(source)`: the simulation of a world; without one, of the arena."""
+    """`load(source)` returns the simulation of a world, by default of the arena."""
 
     def load(source=None):
         return Simulation.load(source or builtin("arena"), physics(), "world", Mode.FAST)
@@ -31,7 +31,7 @@ def load(physics):
 
 @pytest.fixture
 def drive():
-    """`drive(simulation, vx, vy, omega, steps)`: command the first robot, and step."""
+    """`drive(simulation, vx, vy, omega, steps)` commands the first robot, and steps."""
 
     def drive(simulation, vx, vy, omega, steps=1):
         robot = simulation.robots[0]

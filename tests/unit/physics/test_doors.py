@@ -1,4 +1,4 @@
-"""Joints that are on no robot, under MuJoCo: doors, pendulums, and carts without motors."""
+"""Joints outside robots under MuJoCo: doors, pendulums, and carts without motors."""
 
 import math
 
@@ -32,7 +32,7 @@ DEF FRAME Solid {
 
 @pytest.fixture
 def load():
-    """`load(text)`: the arena with more in it, under MuJoCo."""
+    """`load(text)` returns the arena with more nodes, under MuJoCo."""
 
     def load(text=DOOR):
         return Simulation.load(builtin("arena") + text, MujocoPhysics(), "doors", Mode.FAST)
@@ -41,12 +41,12 @@ def load():
 
 
 def angle(simulation, name="DOOR"):
-    """Return the position of the joint that a Solid is on."""
+    """Return the position of a Solid's joint."""
     return simulation.tree.of_def(name).place.joint.now
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """The knob goes with it, and a door without a push stays shut in its frame."""
+    """The knob moves with the door; a door without a push stays shut in its frame."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)
@@ -60,7 +60,7 @@ def test_a_robot_pushes_a_door_open(load, drive):
 
 
 def test_rays_meet_a_door_where_it_is(load):
-    """A supervisor opens it, though it has been at rest for long, and it stays open."""
+    """A supervisor opens a door that has been at rest for long, and it stays open."""
     simulation = load()
     simulation.step(1920)
     ahead = simulation.robots[0].sensors["ir1"]
@@ -74,7 +74,7 @@ def test_rays_meet_a_door_where_it_is(load):
 
 
 def test_a_door_stops(load):
-    """At the stops of its joint."""
+    """The stops of its joint hold it."""
     simulation = load()
     simulation.tree.of_def("DOOR").place.joint.follow(0.0, 8.0)
 
@@ -84,7 +84,7 @@ def test_a_door_stops(load):
 
 
 def test_a_reset_shuts_a_door(load, drive):
-    """What follows is the same, bit for bit."""
+    """After the reset every value is the same, bit for bit."""
     simulation = load()
 
     def course():
@@ -101,7 +101,7 @@ def test_a_reset_shuts_a_door(load, drive):
 
 
 def test_reset_physics_stops_a_door(load):
-    """And leaves it where it is."""
+    """The door stays at its position."""
     simulation = load()
     simulation.tree.of_def("DOOR").place.joint.follow(0.5, 2.0)
     simulation.step(32)
@@ -114,7 +114,7 @@ def test_reset_physics_stops_a_door(load):
 
 
 def test_an_imported_door_swings_and_another_keeps_its_angle(load, drive):
-    """Making the model anew changes no state; removing a door removes its joint."""
+    """When the model is compiled again, no state changes; the removal of a door removes its joint."""
     simulation = load()
     drive(simulation, 0.3, 0.0, 0.0, steps=12)
     before = angle(simulation)
@@ -133,7 +133,7 @@ def test_an_imported_door_swings_and_another_keeps_its_angle(load, drive):
 
 
 def test_a_pendulum_hangs_from_nothing():
-    """A joint at the top of the world, in a world whose y axis points up."""
+    """The joint is at the top of the world, whose y axis points up."""
     world = b"""#VRML_SIM R2023b utf8
     WorldInfo { basicTimeStep 8 coordinateSystem "NUE" }
     HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 anchor 0 2 0 dampingConstant 1 }
@@ -147,7 +147,7 @@ def test_a_pendulum_hangs_from_nothing():
 
 
 def test_a_lid_swings_on_a_crate(load):
-    """A joint on a loose thing falls with it."""
+    """A joint on a dynamic solid falls with it."""
     crate = b"""DEF CRATE Solid {
       translation 0 1.2 1 boundingObject Box { size 0.3 0.3 0.3 } physics Physics { density -1 mass 5 }
       children [ HingeJoint {
@@ -163,6 +163,6 @@ def test_a_lid_swings_on_a_crate(load):
 
 
 def test_the_stub_refuses_doors():
-    """They would stand like walls."""
+    """They would be as immovable as walls."""
     with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
         Simulation.load(builtin("arena") + DOOR, StubPhysics())

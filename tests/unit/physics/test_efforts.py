@@ -1,4 +1,4 @@
-"""Torques and forces of motors under MuJoCo: set by clients, and measured."""
+"""Torques and forces of motors under MuJoCo: clients set and read them."""
 
 import math
 
@@ -42,7 +42,7 @@ def rows(robot, name):
 
 
 def test_a_torque_speeds_a_cylinder_up(crane):
-    """2 N m on m r^2 / 2 = 0.04 kg m2 are 50 rad/s2."""
+    """2 N m on m r^2 / 2 = 0.04 kg m2 give 50 rad/s2."""
     simulation, motors = crane
     motors["turn"].set_effort(2.0)
 
@@ -53,7 +53,7 @@ def test_a_torque_speeds_a_cylinder_up(crane):
 
 
 def test_a_torque_is_clamped_and_lasts_until_a_position(crane):
-    """A velocity alone does not end it, as in Webots."""
+    """As in Webots, a velocity alone does not end it."""
     simulation, motors = crane
     motors["turn"].set_effort(1000.0)
     motors["turn"].set_velocity(0.0)
@@ -68,7 +68,7 @@ def test_a_torque_is_clamped_and_lasts_until_a_position(crane):
 
 
 def test_a_force_that_carries_the_weight_keeps_it_at_rest(crane):
-    """A newton more lifts it with a third of a meter per second squared."""
+    """One newton more lifts it with a third of a meter per second squared."""
     simulation, motors = crane
     motors["lift"].set_effort(3.0 * G)
     simulation.step(400)
@@ -81,7 +81,7 @@ def test_a_force_that_carries_the_weight_keeps_it_at_rest(crane):
 
 
 def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
-    """In newtons, against gravity; none is left without an available force."""
+    """It is in newtons, against gravity, and 0 without an available force."""
     simulation, motors = crane
     simulation.step(800)
     assert motors["lift"].feedback_nm == pytest.approx(3.0 * G, rel=1e-6)
@@ -94,7 +94,7 @@ def test_the_feedback_of_a_lift_is_the_weight_that_it_holds(crane):
 
 
 def test_a_motor_publishes_its_feedback(crane):
-    """`enable` is below the feedback sensor, and the topic below the motor."""
+    """The service `enable` is below the feedback sensor, the topic below the motor."""
     simulation, _ = crane
     robot = simulation.robots[0]
     simulation.step(800)
@@ -131,7 +131,7 @@ def test_a_driving_wheel_refuses_a_torque():
 
 
 def test_the_stub_has_no_feedback():
-    """Its services answer failure."""
+    """Its services return failure."""
     services, topics = rows(Simulation.load(ARM, StubPhysics()).robots[0], "lift")
 
     with pytest.raises(UnsimulatedError, match="forces are not simulated; set a position or velocity"):

@@ -23,7 +23,7 @@ DEF PUCK Solid {
 
 @pytest.fixture
 def thrown():
-    """`thrown(push)`: velocity and turning of a falling puck, a step after `push(motion, node)`."""
+    """`thrown(push)` returns velocity and rotation of a falling puck, one step after `push(motion, node)`."""
 
     def thrown(push):
         simulation = Simulation.load(WORLD, MujocoPhysics(), "puck", Mode.FAST)
@@ -36,21 +36,21 @@ def thrown():
 
 
 def test_a_force_acts_for_one_basic_step(thrown):
-    """Ten newtons on two kilograms are 0.16 m/s after 32 ms."""
+    """Ten newtons on two kilograms give 0.16 m/s after 32 ms."""
     velocity, _ = thrown(lambda motion, node: motion.add_force(node, (10.0, 0.0, 0.0), relative=False))
 
     assert velocity == pytest.approx((0.16, 0.0, -9.81 * 0.032), abs=1e-6)
 
 
 def test_a_relative_force_turns_with_the_node(thrown):
-    """Its x axis points along y of the world."""
+    """The node's x axis points along y of the world."""
     velocity, _ = thrown(lambda motion, node: motion.add_force(node, (10.0, 0.0, 0.0), relative=True))
 
     assert velocity[:2] == pytest.approx((0.0, 0.16), abs=1e-6)
 
 
 def test_a_force_beside_the_center_turns(thrown):
-    """The offset is in the frame of the node, as in Webots."""
+    """As in Webots, the offset is in the frame of the node."""
     _, turning = thrown(
         lambda motion, node: motion.add_force(node, (1.0, 0.0, 0.0), relative=False, offset=(0.1, 0.0, 0.0))
     )
@@ -67,7 +67,7 @@ def test_a_torque_turns_in_place(thrown):
 
 
 def test_a_velocity_of_a_loose_thing_is_what_was_set(thrown):
-    """But for the fall of one step."""
+    """Only the fall of one step is added."""
     velocity, turning = thrown(
         lambda motion, node: motion.set_velocity(node, (1.0, 2.0, 0.0), (0.0, 0.0, math.pi))
     )
@@ -77,7 +77,7 @@ def test_a_velocity_of_a_loose_thing_is_what_was_set(thrown):
 
 
 def test_halting_stops_a_loose_thing(thrown):
-    """What a supervisor's `reset_physics` does."""
+    """A supervisor's `reset_physics` does this."""
 
     def push(motion, node):
         motion.set_velocity(node, (1.0, 2.0, 0.0), (0.0, 0.0, 1.0))
@@ -87,7 +87,7 @@ def test_halting_stops_a_loose_thing(thrown):
 
 
 def test_the_stub_refuses_forces():
-    """A success that moves nothing would be a lie."""
+    """A successful response without a motion would be false."""
     simulation = Simulation.load(WORLD.replace(b"physics Physics { density -1 mass 2 }", b""), StubPhysics())
     node = simulation.tree.of_def("PUCK")
 

@@ -1,4 +1,4 @@
-"""The gains, multipliers and torques of motors, in every physics."""
+"""Gains, multipliers and torques of motors, in every physics."""
 
 import math
 
@@ -27,7 +27,7 @@ DEF R Robot {
 
 @pytest.fixture
 def arm(physics):
-    """`arm(fields)`: a simulation whose robot has an arm with such a motor."""
+    """`arm(fields)` returns a simulation whose robot has an arm with such a motor."""
     return lambda fields="": Simulation.load(
         ARMS.replace("FIELDS", fields).encode(), physics(), "world", Mode.FAST
     )
@@ -40,7 +40,7 @@ def angle(simulation):
 
 @pytest.mark.parametrize("fields", ["controlPID 1 0 0", ""])
 def test_a_small_gain_needs_longer_to_a_target(arm, fields):
-    """From the file, or from a client."""
+    """The gain is from the file or from a client."""
     simulation = arm(fields)
     motor = simulation.robots[0].motors["arm"]
     if not fields:
@@ -54,7 +54,7 @@ def test_a_small_gain_needs_longer_to_a_target(arm, fields):
 
 
 def test_a_multiplier_moves_the_arm_further(arm):
-    """Of the file alone: no service sets it."""
+    """Only the file sets it: no service does."""
     simulation = arm("multiplier 2")
     simulation.robots[0].motors["arm"].set_position(0.25)
 
@@ -64,7 +64,7 @@ def test_a_multiplier_moves_the_arm_further(arm):
 
 
 def test_a_motor_without_torque_moves_nothing(arm):
-    """Neither by a target nor by a velocity."""
+    """It follows neither a target nor a velocity."""
     simulation = arm()
     motor = simulation.robots[0].motors["arm"]
     motor.set_available_torque(0.0)

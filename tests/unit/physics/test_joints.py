@@ -1,4 +1,4 @@
-"""Joints under MuJoCo: arms with masses, pendulums, and what clients do to them."""
+"""Joints under MuJoCo: arms with masses, pendulums, and the effects of clients on them."""
 
 import math
 
@@ -32,7 +32,7 @@ def arm(device=MOTOR, length=1.0, mass_kg=2.0, parameters="", more="", *, physic
 
 
 def carrying(part):
-    """Return the arena, whose robot carries one more part."""
+    """Return the arena, whose robot has one more part."""
     return builtin("arena").replace(b"supervisor TRUE\n  children [", b"children [" + part.encode(), 1)
 
 
@@ -45,7 +45,7 @@ def load(source, physics=MujocoPhysics):
 @settings(max_examples=5, deadline=None)
 @given(length=st.floats(0.2, 2.0), mass_kg=st.floats(0.1, 20.0))
 def test_a_motor_holds_a_rod_with_the_torque_of_its_weight(length, mass_kg):
-    """A level rod of mass m and length l asks for m g l / 2, against its fall."""
+    """A level rod of mass m and length l needs m g l / 2 to stay level."""
     simulation, robot = load(
         arm('RotationalMotor { name "motor" maxTorque 1000 }', length=length, mass_kg=mass_kg)
     )
@@ -58,7 +58,7 @@ def test_a_motor_holds_a_rod_with_the_torque_of_its_weight(length, mass_kg):
 
 
 def test_a_weak_motor_does_not_hold_a_rod():
-    """Ten newton meters are needed; it has five."""
+    """Ten newton meters are needed, and it has five."""
     simulation, robot = load(arm('RotationalMotor { name "motor" maxTorque 5 }'))
 
     simulation.step(320)
@@ -70,7 +70,7 @@ def test_a_weak_motor_does_not_hold_a_rod():
 @settings(max_examples=5, deadline=None)
 @given(length=st.floats(0.3, 1.2), mass_kg=st.floats(0.1, 20.0))
 def test_a_rod_without_a_motor_swings_as_a_pendulum(length, mass_kg):
-    """Its period is that of small swings, 2 pi sqrt(2 l / 3 g), whatever its mass; 0.1 rad adds 0.1 %."""
+    """The period is 2 pi sqrt(2 l / 3 g) for small swings, whatever the mass; 0.1 rad adds 0.1 %."""
     simulation, robot = load(arm("", length=length, mass_kg=mass_kg))
     hanging = math.pi / 2.0
     simulation.set_joint_position(simulation.tree.of_def("HINGE"), hanging - 0.1, 1)
@@ -88,7 +88,7 @@ def test_a_rod_without_a_motor_swings_as_a_pendulum(length, mass_kg):
 
 
 def test_damping_and_friction_slow_a_pendulum():
-    """A damped one comes to rest below; with enough static friction it does not begin to fall."""
+    """With damping it comes to rest below; with enough static friction it does not begin to fall."""
     damped, swinging = load(arm("", parameters="dampingConstant 5"))
     damped.step(8000)
     stuck, held = load(arm("", parameters="staticFriction 15"))
@@ -99,7 +99,7 @@ def test_damping_and_friction_slow_a_pendulum():
 
 
 def test_a_spring_holds_a_rod_where_the_torques_are_equal():
-    """At the angle a where 100 a is m g l / 2 times the cosine of a."""
+    """It rests at the angle a where 100 a equals m g l / 2 times the cosine of a."""
     simulation, robot = load(arm("", parameters="springConstant 100 dampingConstant 10"))
 
     simulation.step(4000)
@@ -109,7 +109,7 @@ def test_a_spring_holds_a_rod_where_the_torques_are_equal():
 
 
 def test_stops_hold_what_a_motor_turns():
-    """They give way by less than half a degree."""
+    """The stops yield by less than half a degree."""
     simulation, robot = load(arm(parameters="minStop -0.5 maxStop 0.5"))
     motor = robot.motors["motor"]
     motor.set_position(math.inf)
@@ -122,7 +122,7 @@ def test_stops_hold_what_a_motor_turns():
 
 @pytest.mark.parametrize("acceleration", [-1.0, 10.0])
 def test_an_arm_follows_its_commands_as_in_the_stub(acceleration):
-    """To two degrees, with a new position every two seconds; in the end to 2 mrad."""
+    """It follows a new position every two seconds to two degrees, and the last one to 2 mrad."""
     pair = [load(arm(), physics) for physics in (MujocoPhysics, StubPhysics)]
     motors = [robot.motors["motor"] for _, robot in pair]
     for motor in motors:
@@ -140,7 +140,7 @@ def test_an_arm_follows_its_commands_as_in_the_stub(acceleration):
 
 
 def test_a_joint_whose_end_has_no_physics_follows_exactly():
-    """As in Webots, where such a joint is kinematic."""
+    """As in Webots, such a joint is kinematic."""
     (mujoco, strong), (stub, exact) = (load(arm(physics=False), it) for it in (MujocoPhysics, StubPhysics))
     for robot in (strong, exact):
         robot.motors["motor"].set_position(1.0)
@@ -153,7 +153,7 @@ def test_a_joint_whose_end_has_no_physics_follows_exactly():
 
 
 def test_links_on_links_move_together():
-    """The place of the outer one follows both joints."""
+    """The frame of the outer link follows both joints."""
     outer = """DEF WRIST HingeJoint {
       jointParameters HingeJointParameters { axis 0 1 0 anchor 0.5 0 0 }
       device RotationalMotor { name "wrist" maxTorque 50 }
@@ -185,7 +185,7 @@ def test_an_arm_pushes_a_crate_and_not_its_own_robot():
 
 
 def test_rays_pass_the_links_of_their_own_robot():
-    """As they pass its body; another robot's rays meet them."""
+    """They also pass its body, but another robot's rays meet the links."""
     sensor = b"""DistanceSensor { name "ray" type "laser" translation 0.3 0 0.5
       lookupTable [ 0 0 0, 10 10 0 ] } """
     wall = b"Solid { translation 4 0 1.5 boundingObject Box { size 0.2 4 3 } }"
@@ -200,7 +200,7 @@ def test_rays_pass_the_links_of_their_own_robot():
 
 
 def test_a_supervisor_puts_a_joint_where_it_stays():
-    """A motor holds it there; what has no motor falls from there, at rest at first."""
+    """A motor holds it there; a joint without a motor falls from there, starting at rest."""
     simulation, robot = load(arm())
     simulation.set_joint_position(simulation.tree.of_def("HINGE"), -1.0, 1)
 
@@ -210,7 +210,7 @@ def test_a_supervisor_puts_a_joint_where_it_stays():
 
 
 def test_a_saved_state_brings_an_arm_back():
-    """At rest, where it was."""
+    """The arm is at rest at its saved position."""
     simulation, robot = load(arm(""))
     node = robot.parts.node
     simulation.step(80)
@@ -227,7 +227,7 @@ def test_a_saved_state_brings_an_arm_back():
 
 @pytest.mark.parametrize("device", [MOTOR, ""], ids=["motor", "pendulum"])
 def test_a_reset_repeats_the_course_of_an_arm(device):
-    """The same commands give the same numbers, bit for bit, as in a new simulation."""
+    """The same commands give the same values, bit for bit, as in a new simulation."""
 
     def course(simulation, robot):
         simulation.reset()
@@ -247,7 +247,7 @@ def test_a_reset_repeats_the_course_of_an_arm(device):
 
 
 def test_a_pole_falls_when_its_cart_drives_off(drive):
-    """A joint without a motor is moved by forces, and tilts against the motion."""
+    """Only forces move a joint without a motor, so the pole tilts against the motion."""
     pole = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor 0 0 0.3 }
       device PositionSensor { name "tilt" }
       endPoint Solid { translation 0 0 0.6 boundingObject Box { size 0.02 0.02 0.5 }
@@ -262,7 +262,7 @@ def test_a_pole_falls_when_its_cart_drives_off(drive):
 
 
 def test_a_caster_on_the_floor_follows_without_forces(drive):
-    """It would hold a robot whose wheels touch no floor."""
+    """Its contact forces would hold a robot whose wheels touch no floor."""
     caster = """HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 anchor -0.1 0 0.05 }
       endPoint Solid { translation -0.12 0 0.02 boundingObject Sphere { radius 0.02 }
         physics Physics { density -1 mass 0.2 } } }"""
@@ -275,7 +275,7 @@ def test_a_caster_on_the_floor_follows_without_forces(drive):
 
 
 def test_an_arm_does_not_slow_its_robot():
-    """The servos of a base are as much stronger as what is on it is heavy."""
+    """The servos of a base grow with the mass on it."""
     crane = """HingeJoint { jointParameters HingeJointParameters { axis 0 0 1 }
       device RotationalMotor { name "crane" maxTorque 200 }
       endPoint Solid { translation 0.2 0 0.6 boundingObject Box { size 0.6 0.1 0.1 }
@@ -293,7 +293,7 @@ def test_an_arm_does_not_slow_its_robot():
 
 
 def test_an_arm_on_a_table_holds_its_weight():
-    """A robot inside another node has no body, and its joints have forces all the same."""
+    """A robot inside another node has no body, but its joints still have forces."""
     source = arm().replace(b"Robot {", b"Pose { translation 1 2 0.5 rotation 0 0 1 1 children [ Robot {")
     simulation, robot = load(source + b"] }")
     assert robot.body is None

@@ -1,4 +1,4 @@
-"""Frictions, gravity and masses of a world, under MuJoCo."""
+"""Friction, gravity and masses of a world, under MuJoCo."""
 
 import pytest
 from hypothesis import given, settings
@@ -18,20 +18,20 @@ def contact(one, other, coefficient):
 
 
 def box(name, material, where, size="0.2 0.2 0.2"):
-    """Return a loose box of a material."""
+    """Return a dynamic box of a material."""
     return f"""DEF {name} Solid {{ translation {where} name "{name}" contactMaterial "{material}"
       boundingObject Box {{ size {size} }} physics Physics {{ density -1 mass 1 }} }}"""
 
 
 def load(*things, contacts=(), info=""):
-    """Return the simulation of a world with these things and contact properties."""
+    """Return the simulation of a world with these objects and contact properties."""
     head = f"WorldInfo {{ basicTimeStep 8 contactProperties [ {' '.join(contacts)} ] {info} }}"
     source = "\n".join(("#VRML_SIM R2023b utf8", head, *things))
     return Simulation.load(source.encode(), MujocoPhysics(), "materials", Mode.FAST)
 
 
 def slide(simulation, name, speed=2.0):
-    """Return how far a box slides that is pushed along x."""
+    """Return the distance that a box slides after a push along x."""
     place = simulation.tree.of_def(name).place
     simulation.step(400)
     start = place.world_pose.position[0]
@@ -43,7 +43,7 @@ def slide(simulation, name, speed=2.0):
 @settings(max_examples=8, deadline=None)
 @given(coefficient=st.floats(0.1, 0.6))
 def test_a_box_slides_as_far_as_its_friction_lets_it(coefficient):
-    """From 2 m/s it is v^2 / 2 mu g; the box is flat, so it does not tip."""
+    """From 2 m/s the distance is v^2 / 2 mu g; the box is flat, so it does not tip."""
     flat = box("PUCK", "ice", "0 0 0.025", "0.3 0.3 0.05")
 
     distance = slide(load(flat, contacts=[contact("ice", "default", coefficient)]), "PUCK")
@@ -52,7 +52,7 @@ def test_a_box_slides_as_far_as_its_friction_lets_it(coefficient):
 
 
 def test_each_pair_of_materials_has_its_own_friction():
-    """Ice slides on the floor and not on rubber, which no friction of one material says."""
+    """Ice slides on the floor but not on rubber, so a friction per material would not suffice."""
     contacts = [
         contact("ice", "default", 0.1),
         contact("ice", "rubber", 3.0),
@@ -71,7 +71,7 @@ def test_each_pair_of_materials_has_its_own_friction():
 
 
 def test_the_floor_has_a_material():
-    """That of the Plane in its boundingObject."""
+    """The material is that of the Plane in its boundingObject."""
     floor = 'Solid { boundingObject Plane { size 20 20 } contactMaterial "lino" name "floor" }'
     puck = box("PUCK", "default", "0 0 0.025", "0.3 0.3 0.05")
 
@@ -81,7 +81,7 @@ def test_the_floor_has_a_material():
 
 
 def test_things_fall_as_the_gravity_of_the_world_says():
-    """On the Moon, 1.62 t^2 / 2."""
+    """On the Moon the distance is 1.62 t^2 / 2."""
     simulation = load(box("STONE", "default", "0 0 5"), info="gravity 1.62")
 
     simulation.step(1000)
@@ -91,7 +91,7 @@ def test_things_fall_as_the_gravity_of_the_world_says():
 
 @pytest.mark.parametrize(("mass_kg", "moves"), [(5.0, False), (200.0, True)])
 def test_a_heavy_robot_pushes_what_a_light_one_does_not(drive, mass_kg, moves):
-    """The servos of a base are as strong as its mass needs."""
+    """The servos of a base grow with its mass."""
     crate = b"""DEF CRATE Solid { translation 0.6 0 0.15 boundingObject Box { size 0.3 0.3 0.3 }
       physics Physics { density -1 mass 100 } }"""
     source = builtin("arena").replace(b"mass 20\n", f"mass {mass_kg}\n".encode())

@@ -1,4 +1,4 @@
-"""Robots, rays and contacts, alike under the stub and MuJoCo."""
+"""Robots, rays and contacts behave alike under the stub and MuJoCo."""
 
 import math
 import random
@@ -26,19 +26,19 @@ Robot {
 
 
 def place(simulation, x, y, heading_rad=0.0):
-    """Put the first robot somewhere, as a supervisor does."""
+    """Place the first robot, as a supervisor does."""
     robot = simulation.robots[0].place
     robot.translation = (x, y, robot.translation[2])
     robot.rotation = (0.0, 0.0, 1.0, heading_rad)
 
 
 def distances(simulation):
-    """Return how far the infra-red sensors see, as voltages."""
+    """Return the readings of the infra-red sensors, in volts."""
     return [it.value for name, it in simulation.robots[0].sensors.items() if name.startswith("ir")]
 
 
 def test_a_robot_drives_as_it_is_commanded(load, drive):
-    """Half a meter a second ahead is half a meter after a second, but for the start."""
+    """At half a meter a second it drives half a meter in a second, less the acceleration at the start."""
     body = drive(load(), 0.25, 0.0, 0.0, steps=5)
 
     assert (body.x, body.y) == pytest.approx((0.25 * 0.96, 0.0), abs=0.02)
@@ -53,7 +53,7 @@ def test_a_robot_turns_as_it_is_commanded(load, drive):
 
 
 def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
-    """Its wheels go on turning."""
+    """Its wheels keep turning."""
     simulation = load()
     place(simulation, 1.5, 0.0)
 
@@ -76,7 +76,7 @@ def test_a_robot_slides_along_a_wall(load, drive):
 
 
 def test_sensors_see_walls_and_not_their_robot(load):
-    """Every physics gives the voltages of the same distances; noise has the same draws."""
+    """Every physics gives the same voltages for the same distances, and draws the same noise."""
     simulation = load()
     place(simulation, 1.6, 0.0)
     simulation.step(192)
@@ -87,7 +87,7 @@ def test_sensors_see_walls_and_not_their_robot(load):
 
 
 def test_both_physics_see_alike():
-    """A policy that was trained in one reads the same from the other."""
+    """A policy that was trained in one reads the same values in the other."""
     readings = []
     for physics in (StubPhysics, MujocoPhysics):
         simulation = Simulation.load(builtin("arena"), physics(), "arena", Mode.FAST)
@@ -102,7 +102,7 @@ def test_both_physics_see_alike():
 
 
 def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
-    """Layouts are drawn anew in each episode."""
+    """Each episode has a new layout."""
     simulation = load()
     node = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(node, "translation", simulation)
@@ -114,7 +114,7 @@ def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
 
 
 def test_an_obstacle_that_comes_out_of_the_floor_holds_a_robot(load, drive):
-    """An environment hides its cylinders below the floor until an episode has some."""
+    """An environment hides its cylinders below the floor until an episode needs them."""
     simulation = load(builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.8 0.8 -0.7"))
     node = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(node, "translation", simulation)
@@ -126,7 +126,7 @@ def test_an_obstacle_that_comes_out_of_the_floor_holds_a_robot(load, drive):
 
 
 def test_contact_points_name_both_sides(load, drive):
-    """A supervisor asks which wall it is."""
+    """A supervisor needs to know which wall it is."""
     simulation = load()
     place(simulation, 1.7, 0.0)
     drive(simulation, 0.4, 0.0, 0.0, steps=5)
@@ -140,7 +140,7 @@ def test_contact_points_name_both_sides(load, drive):
 
 
 def test_a_push_fades(load, drive):
-    """The motors bring the robot back to their commands."""
+    """The motors return the robot to its commanded velocity."""
     simulation = load()
     body = simulation.robots[0].body
     body.push(0.5, 0.0, 0.0)
@@ -151,7 +151,7 @@ def test_a_push_fades(load, drive):
 
 
 def test_a_reset_forgets_everything(load, drive):
-    """The same commands after it give the same numbers, bit for bit, as in a new simulation."""
+    """The same commands then give the same values, bit for bit, as in a new simulation."""
 
     def course(simulation):
         trace = []
@@ -171,7 +171,7 @@ def test_a_reset_forgets_everything(load, drive):
 
 
 def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
-    """The state of everything else survives the import."""
+    """The import does not change the state of anything else."""
     simulation = load()
     drive(simulation, 0.2, 0.0, 0.0, steps=2)
     before = simulation.robots[0].place.translation
@@ -188,7 +188,7 @@ def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
 
 
 def test_robots_run_into_each_other(load, drive):
-    """Each is an obstacle of the other, also for its rays."""
+    """Each is an obstacle for the other, also for its rays."""
     simulation = load(builtin("arena") + OTHER)
 
     body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
@@ -230,7 +230,7 @@ def test_mujoco_follows_the_stub_through_each_change_of_speed(drive, free_pair):
 
 
 def test_a_robot_that_was_held_back_does_not_jump(load, drive):
-    """The servos make up for their own delay, not for an obstacle."""
+    """The servos compensate for their own delay, not for an obstacle."""
     simulation = load()
     place(simulation, 1.5, 0.0)
     drive(simulation, 0.4, 0.0, 0.0, steps=10)
@@ -242,7 +242,10 @@ def test_a_robot_that_was_held_back_does_not_jump(load, drive):
 
 
 def test_mujoco_follows_the_stub_in_free_space(drive, free_pair):
-    """Ten random courses of ten seconds, a new command every 192 ms: within 1 cm and half a degree."""
+    """Ten random drives of ten seconds agree within 1 cm and half a degree.
+
+    A new command comes every 192 ms.
+    """
     for seed in range(10):
         draw = random.Random(seed)
         pair = free_pair()

@@ -1,4 +1,4 @@
-"""Radar: which Solids it sees, and what it reports of them, in every physics."""
+"""Radar: the Solids that it detects and their values, in every physics."""
 
 import math
 
@@ -13,7 +13,7 @@ WALL = "Solid { translation 1.5 0 0.5 boundingObject Box { size 0.1 1 1 } }"
 
 @pytest.fixture
 def radar(load):
-    """`radar(objects, fields)`: the simulation and the radar at the origin, which looks along x."""
+    """`radar(objects, fields)` returns the simulation and the radar at the origin, which looks along x."""
 
     def begin(objects, fields=ANY):
         source = f"""#VRML_SIM R2023b utf8
@@ -30,14 +30,14 @@ Robot {{ supervisor TRUE controller "ros" controllerArgs [ "--name=r" "--synchro
 
 
 def seen(radar, *arguments):
-    """What the radar sees after one step."""
+    """Return the targets of the radar after one step."""
     simulation, device = radar(*arguments)
     simulation.step(32)
     return device.seen
 
 
 def solid(x, y=0.0, z=0.5, fields=BALL):
-    """A ball of 10 cm that radars see."""
+    """Return a ball of 10 cm that radars detect."""
     return f'Solid {{ translation {x} {y} {z} name "{x} {y}" {fields} }}'
 
 
@@ -81,12 +81,12 @@ def test_a_target_has_the_distance_azimuth_and_power_of_webots(radar):
     ],
 )
 def test_a_target_is_seen_within_the_limits_of_the_radar(radar, objects, fields, count):
-    """As the fields of the node say."""
+    """The fields of the node set these limits."""
     assert len(seen(radar, objects, fields)) == count
 
 
 def test_a_target_at_the_edge_is_where_its_visible_part_is(radar):
-    """A part is enough; the azimuth does not leave the field of view."""
+    """A part of the target is enough; the azimuth stays in the field of view."""
     (echo,) = seen(
         radar, solid(2, 0.88, fields="boundingObject Box { size 0.1 0.2 0.2 } radarCrossSection 1")
     )
@@ -105,14 +105,14 @@ def test_a_target_at_the_edge_is_where_its_visible_part_is(radar):
     ids=["box", "cylinder", "ball"],
 )
 def test_a_target_is_hidden_only_if_the_radar_knows_occlusion(radar, obstacle):
-    """And only by what is between them."""
+    """Only an object between the two hides it."""
     assert len(seen(radar, obstacle + solid(3))) == 1
     assert seen(radar, obstacle + solid(3), f"{ANY} occlusion TRUE") == []
     assert len(seen(radar, obstacle + solid(3, 1.1), f"{ANY} occlusion TRUE")) == 1
 
 
 def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
-    """Also of a Solid that a supervisor moves; it is positive if the target moves away."""
+    """This includes a Solid that a supervisor moves; the speed is positive if the target moves away."""
     simulation, device = radar(f"DEF IT {solid(2)}")
     simulation.step(32)
     assert device.seen[0].speed == 0.0
@@ -124,7 +124,7 @@ def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
 
 
 def test_a_reset_begins_anew(radar):
-    """The way back to the start is no motion."""
+    """The return to the start is not a motion."""
     simulation, device = radar(f"DEF IT {solid(2)}")
     simulation.step(64)
     simulation.tree.of_def("IT").place.translation = (3.0, 0.0, 0.5)
@@ -150,7 +150,7 @@ def test_a_target_that_is_imported_or_removed_comes_and_goes(radar):
 
 
 def test_targets_in_one_cell_are_one_with_the_mean_by_power():
-    """Both distance and speed count, if the radar tells speeds apart."""
+    """Both distance and speed must be near, if the radar distinguishes speeds."""
     near, far, fast = Echo(2.0, 3.0, 0.0, 0.1), Echo(2.4, 1.0, 0.4, 0.5), Echo(2.2, 1.0, 9.0, 0.0)
 
     assert merged([near, far], (0.5, 0.0)) == [Echo(2.1, 4.0, pytest.approx(0.1), pytest.approx(0.2))]
@@ -159,7 +159,7 @@ def test_targets_in_one_cell_are_one_with_the_mean_by_power():
 
 
 def test_noise_is_drawn_for_each_reading(radar):
-    """With the deviations of the node."""
+    """The deviations are those of the node."""
     (echo,) = seen(radar, solid(3), f"{ANY} rangeNoise 0.1 speedNoise 0.1 angularNoise 0.1")
 
     assert 0.0 < abs(echo.distance - 3.0) < 1.0
@@ -168,7 +168,7 @@ def test_noise_is_drawn_for_each_reading(radar):
 
 
 def test_noise_to_a_distance_of_nothing_is_no_error(radar):
-    """The power that comes back from there would be infinite, and the simulator ended."""
+    """The received power at distance 0 was infinite, and ended the simulator."""
     simulation, device = radar(solid(0.2), f"{ANY} minRange 0 rangeNoise 0.2")
     readings = []
     for _ in range(50):

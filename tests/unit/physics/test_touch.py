@@ -33,14 +33,14 @@ def weigh(source):
 
 
 def test_a_plate_weighs_what_lies_on_it():
-    """Its own mass too, as in Webots, which measures the force on a joint to the robot."""
+    """Its own mass counts too: as in Webots, the sensor measures the force on its joint to the robot."""
     _, plate = weigh(scale("force"))
 
     assert plate.value == pytest.approx(5.0 * G, rel=1e-3)
 
 
 def test_a_force_goes_through_the_lookup_table():
-    """That of the node's default has ten steps a newton; this has a resolution too."""
+    """The node's default table has ten steps a newton; this one also has a resolution."""
     _, plate = weigh(scale("force", table=""))
     assert plate.value == pytest.approx(50.0 * G, rel=1e-3)
 
@@ -60,7 +60,7 @@ def test_a_pull_is_no_pressure():
 
 
 def test_three_axes_are_published_as_a_wrench():
-    """With no torque; the type of the sensor is 2."""
+    """Its torque is 0; the type of the sensor is 2."""
     kind, plate = weigh(scale("force-3d"))
     (topic,) = kind.topics(plate)
     codec = message_type(topic.type_name).codec
@@ -79,7 +79,7 @@ def test_a_sensor_without_physics_measures_nothing():
 
 
 def test_a_bumper_on_an_arm_feels_what_the_arm_touches():
-    """The rod falls on the floor, and its tip is a bumper."""
+    """The rod falls to the floor, and its tip is a bumper."""
     arm = b"""#VRML_SIM R2023b utf8
     Robot { name "arm" boundingObject Box { size 0.1 0.1 0.2 } children [ HingeJoint {
       jointParameters HingeJointParameters { axis 0 1 0 anchor 0 0 0.5 }
@@ -99,7 +99,7 @@ def test_a_bumper_on_an_arm_feels_what_the_arm_touches():
 
 
 def test_the_stub_refuses_sensors_of_force():
-    """On a robot that a client reaches."""
+    """This holds on a robot that a client can reach."""
     served = b'name "scale" controller "ros" controllerArgs [ "--name=scale" "--synchronize" ]'
     source = scale("force").partition(b"Solid {")[0].replace(b'name "scale"', served)
 

@@ -1,6 +1,6 @@
-"""What infra-red sensors and lidars see: shapes and their colors, not boundingObjects.
+"""Infra-red sensors and lidars see shapes and their colors, not boundingObjects.
 
-The values are those of formulas. Both simulators are asked.
+The expected values come from formulas, and both simulators must return them.
 """
 
 import math
@@ -32,7 +32,7 @@ LIDAR = """Lidar { name "lidar" fieldOfView 6.2831853 horizontalResolution 36 nu
 
 @pytest.fixture
 def begin(load):
-    """`begin(objects, devices, pose)`: the simulation after a step."""
+    """`begin(objects, devices, pose)` returns the simulation after a step."""
 
     def begin(objects, devices, pose=""):
         simulation = load(WORLD.format(objects=objects, devices=devices, pose=pose).encode())
@@ -51,13 +51,13 @@ def measured(simulation, name="eye"):
 
 
 def scanned(simulation):
-    """Return the distances of the lidar, in meters: (layers, rays)."""
+    """Return the distances of the lidar in meters, (layers, rays)."""
     _, lidar = simulation.robots[0].parts.devices.rows["lidar"]
     return np.frombuffer(lidar.value, np.float32).reshape(3, 36)
 
 
 def wall(appearance="", distance=1.0, outline=""):
-    """Return a wall whose surface is so far ahead of the origin."""
+    """Return a wall whose surface is at that distance in front of the origin."""
     return f"""Solid {{ translation {distance + 0.05} 0 0 {outline} children [
         Shape {{ appearance {appearance or "NULL"} geometry Box {{ size 0.1 3 1 }} }} ] }}"""
 
@@ -84,14 +84,14 @@ POSES = [
 
 @for_each("appearance, factor", COLORS)
 def test_a_dark_or_rough_surface_seems_farther(begin, appearance, factor):
-    """Distance / (0.2 + 0.8 red (1 - roughness / 2)), in every pose; red counts as far as it is opaque."""
+    """In every pose it is distance / (0.2 + 0.8 red (1 - roughness / 2)); red is scaled by the opacity."""
     for pose, distance_m in POSES:
         value = measured(begin(wall(appearance), INFRARED, pose))
         assert value == pytest.approx(distance_m / factor, 1e-6)
 
 
 def test_infrared_rays_meet_what_is_drawn(begin):
-    """A boundingObject alone is not seen, a shape without one is."""
+    """A boundingObject alone is not seen, but a shape without one is."""
     outline = "Solid { translation 0.5 0 0 boundingObject Box { size 0.1 1 1 } }"
 
     assert measured(begin(outline + wall(), INFRARED)) == pytest.approx(1.0)
@@ -100,7 +100,7 @@ def test_infrared_rays_meet_what_is_drawn(begin):
 
 @pytest.mark.parametrize("name", ["infra-red", "infrared", "Infra-Red"])
 def test_several_rays_are_averaged_before_the_color_counts(begin, name):
-    """The average distance is divided by the average share of light; Webots knows the type by both words."""
+    """The mean distance is divided by the mean reflection; Webots knows the type by both names."""
     sensor = f"""DistanceSensor {{ name "eye" type "{name}" numberOfRays 2 aperture 1.0 gaussianWidth 1e6
         lookupTable [ 0 0 0, 40 40 0 ] }}"""
     half = """Solid {{ translation 1.05 0 {} children [ Shape {{
@@ -111,7 +111,7 @@ def test_several_rays_are_averaged_before_the_color_counts(begin, name):
 
 
 def test_a_laser_has_one_ray_whatever_the_file_says(begin):
-    """Webots corrects it with a warning."""
+    """Webots corrects the number with a warning."""
     laser = 'DistanceSensor { name "eye" type "Laser" numberOfRays 5 lookupTable [ 0 0 0, 40 40 0 ] }'
     outlined = wall(outline="boundingObject Box { size 0.1 3 1 }")
 
@@ -125,7 +125,7 @@ HIGH = wall(outline="boundingObject Box { size 0.1 99 99 }")
 
 @for_each("turn", [0.0, 0.1, -0.3, 0.38, 0.41, -0.6, 1.0])
 def test_a_sonar_gets_no_echo_from_a_slanted_wall(begin, turn):
-    """Beyond an angle of incidence of 22.5 degrees the value is that of the greatest distance."""
+    """Beyond an angle of incidence of 22.5 degrees the value is that of the maximum distance."""
     for axis in ("0 0 1", "0 1 0"):
         value = measured(begin(HIGH, SONAR.format(1, f"{axis} {turn}")))
 
@@ -134,7 +134,7 @@ def test_a_sonar_gets_no_echo_from_a_slanted_wall(begin, turn):
 
 
 def test_a_sonar_takes_the_nearest_of_the_rays_that_return(begin):
-    """Of three rays, one meets the wall too far off its normal; the other two are alike."""
+    """Of three rays, one meets the wall too far from its normal; the other two are alike."""
     value = measured(begin(HIGH, SONAR.format(3, "0 0 1 0.2")))
 
     towards = math.cos(0.3) * math.cos(0.2) + math.sin(0.3) / 2 * math.sin(0.2)
@@ -142,7 +142,7 @@ def test_a_sonar_takes_the_nearest_of_the_rays_that_return(begin):
 
 
 def test_a_sonar_hears_a_post(begin):
-    """A round surface returns the ray that meets its middle, and none that meets its side."""
+    """A round surface reflects the ray that meets its middle, but not one that meets its side."""
     post = "Solid {{ translation 1 {} 0 boundingObject Cylinder {{ radius 0.2 height 99 }} }}"
 
     assert measured(begin(post.format(0), SONAR.format(1, "0 0 1 0"))) == pytest.approx(0.8, 1e-5)
@@ -169,7 +169,7 @@ SHAPES = [
 
 @for_each("geometry, turned, distance_m", SHAPES)
 def test_a_lidar_sees_the_shapes(begin, geometry, turned, distance_m):
-    """As Webots, which renders; the middle ray of the middle layer looks along x."""
+    """Webots renders the shapes; the middle ray of the middle layer points along x."""
     pose = "rotation 0 0 1 0.0872665"  # half of the angle between two rays
     shape = f"Solid {{ translation 2 0 0 {turned} children [ Shape {{ geometry {geometry} }} ] }}"
 
@@ -179,7 +179,7 @@ def test_a_lidar_sees_the_shapes(begin, geometry, turned, distance_m):
 
 
 def test_what_moves_is_seen_where_it_is(begin):
-    """Also after a supervisor has moved it."""
+    """This holds also after a supervisor has moved it."""
     simulation = begin("DEF WALL " + wall(), INFRARED + LIDAR, "rotation 0 0 1 0.0872665")
     before = (measured(simulation), scanned(simulation)[1, 18])
 
@@ -193,7 +193,7 @@ def test_what_moves_is_seen_where_it_is(begin):
 
 
 def test_rays_pass_the_robot_and_what_is_around_it(begin):
-    """Its own parts are often rougher here than in Webots; a surface is not drawn from inside."""
+    """Its own parts are often simpler here than in Webots; a surface is not drawn from inside."""
     own = "Solid { translation 0.3 0 0 children [ Shape { geometry Box { size 0.1 1 1 } } ] }"
     around = "Solid { children [ Shape { geometry Sphere { radius 30 } } ] }"
 
@@ -205,7 +205,10 @@ def test_rays_pass_the_robot_and_what_is_around_it(begin):
 
 
 def test_both_simulators_see_the_same():
-    """Twenty shapes of all kinds at random; two implementations, one of them MuJoCo's."""
+    """The world has twenty random shapes of all kinds.
+
+    Two implementations are compared, one of them MuJoCo's.
+    """
     draw = random.Random(7)
     geometries = [geometry for geometry, _, _ in SHAPES]
     solids = "".join(

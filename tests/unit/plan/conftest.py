@@ -1,4 +1,4 @@
-"""One builder of jobs: a test shows what matters to it and the rest has its defaults."""
+"""One builder of jobs: a test sets the fields that matter, and the others have defaults."""
 
 from collections.abc import Callable
 from typing import Any

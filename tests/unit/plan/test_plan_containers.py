@@ -17,13 +17,13 @@ OWN = {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "
 
 
 def containers(planned) -> dict[str, dict]:
-    """Return the containers of the first replica by name, in the order of their start."""
+    """Return the containers of the first replica by name, in their start order."""
     spec = planned.replicas[0].job["spec"]["template"]["spec"]
     return {each["name"]: each for each in (*spec["initContainers"], *spec["containers"])}
 
 
 def environment(container) -> dict[str, object]:
-    """Return a container's variables."""
+    """Return the environment variables of a container."""
     return {each["name"]: each.get("value", each.get("valueFrom")) for each in container["env"]}
 
 
@@ -43,7 +43,7 @@ def test_no_sidecar_of_a_simulator_has_a_startup_probe(in_cluster):
 
 @pytest.mark.parametrize(("spec", "seconds"), [({}, 21_600), ({"startTimeoutSeconds": 605}, 605)])
 def test_a_start_may_take_as_long_as_the_first_step(in_cluster, spec, seconds):
-    """A trainer imports PyTorch for minutes on a busy node; a probe of two minutes ended it each time."""
+    """A trainer imports PyTorch for minutes on a busy node; a probe of two minutes ended it every time."""
     planned = containers(in_cluster(**spec))
 
     for name in ("ros-master", "trainer"):
@@ -54,7 +54,7 @@ def test_a_start_may_take_as_long_as_the_first_step(in_cluster, spec, seconds):
 
 
 def test_a_start_on_a_laptop_has_ten_minutes(on_laptop):
-    """A person waits for it; a ROS master that hangs must not keep the terminal for six hours."""
+    """A person waits for it; a ROS master that hangs must not hold the terminal for six hours."""
     planned = containers(on_laptop())
 
     assert planned["ros-master"]["startupProbe"]["failureThreshold"] == 60
@@ -71,7 +71,7 @@ def test_a_sidecar_may_start_as_long_as_its_simulator(in_cluster, deadline, time
 
 
 def test_sidecars_are_restarted_and_the_trainer_is_not(in_cluster):
-    """The trainer's restart is a new pod, decided by the Job."""
+    """The trainer restarts in a new pod, which the Job makes."""
     policies = {name: each.get("restartPolicy") for name, each in containers(in_cluster()).items()}
 
     assert policies.pop("trainer") is None
@@ -88,14 +88,14 @@ def test_the_ports_of_simulators_count_up(in_cluster):
 
 
 def test_one_simulator_of_a_replica_keeps_the_clock(in_cluster):
-    """Two times on one topic are none."""
+    """One topic must not carry two times."""
     planned = containers(in_cluster(simulators=TWO_GROUPS))
 
     assert [name for name, each in planned.items() if "--clock" in each.get("args", ())] == ["sim-collect-0"]
 
 
 def test_control_ports_are_on_loopback_only(in_cluster):
-    """ROS and the sidecars' control know no authentication."""
+    """ROS and the sidecars' control have no authentication."""
     for container in containers(in_cluster()).values():
         assert not any(
             arg.startswith("--control=") and "127.0.0.1" not in arg for arg in container.get("args", ())
@@ -103,7 +103,7 @@ def test_control_ports_are_on_loopback_only(in_cluster):
 
 
 def test_every_container_knows_master_configuration_run_and_pod(in_cluster):
-    """The pod's contract."""
+    """These variables are the contract of the pod."""
     for container in containers(in_cluster()).values():
         variables = environment(container)
         assert variables["ROS_MASTER_URI"] == "http://127.0.0.1:11311"
@@ -121,7 +121,7 @@ def test_threads_follow_the_cpu_limit(in_cluster):
 
 
 def test_variables_of_the_job_win_and_stand_once(in_cluster):
-    """A list with a name twice is refused by server-side apply."""
+    """Server-side apply refuses a list with a duplicate name."""
     env = [
         {"name": "OMP_NUM_THREADS", "value": "2"},
         {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}},
@@ -135,7 +135,7 @@ def test_variables_of_the_job_win_and_stand_once(in_cluster):
 
 
 def test_two_replicas_of_two_simulators_fit_on_two_cores_with_the_operator(in_cluster):
-    """What a laptop's cluster has."""
+    """A cluster on a laptop has no more."""
     requests = [each["resources"]["requests"]["cpu"] for each in containers(in_cluster()).values()]
 
     assert sum(int(cpu.removesuffix("m")) for cpu in requests) <= 450
@@ -150,7 +150,7 @@ def test_the_jobs_own_program_replaces_the_loop_and_need_not_serve_health(in_clu
 
 
 def test_images_are_the_jobs_or_the_releases(in_cluster):
-    """A job names an image only where it differs."""
+    """A job names an image only if it differs."""
     simulators = [
         {"name": "a", "role": "Collect", "driver": "webots"},
         {"name": "b", "role": "Evaluate", "image": "mine:2"},
@@ -163,7 +163,7 @@ def test_images_are_the_jobs_or_the_releases(in_cluster):
 
 
 def test_mujoco_has_its_image_its_driver_and_memory_for_a_camera(in_cluster):
-    """With a renderer a simulator takes 200 MB, and its sidecar is beside it."""
+    """A simulator with a renderer needs 200 MB, and its container also runs the sidecar."""
     mujoco = {"name": "a", "role": "Collect", "driver": "mujoco", "options": ["--leave-out", "all"]}
 
     planned = containers(in_cluster(simulators=[mujoco, {"name": "b", "role": "Evaluate"}]))
@@ -203,7 +203,7 @@ OF_POD = "$(PALAESTRA_POD_UID)"
 
 @pytest.mark.parametrize("where", ["in_cluster", "on_laptop"])
 def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
-    """A kubelet expands $(NAME) in commands, arguments and values, and the pod has variables of others."""
+    """A kubelet expands $(NAME) in commands, arguments and values, and the pod has variables from others."""
     env = [{"name": "OWN", "value": OF_POD}]
     own = {
         "name": "own",
@@ -234,7 +234,7 @@ def test_no_text_of_a_job_becomes_the_value_of_a_variable(request, where):
 
 
 def test_a_run_directory_may_have_a_dollar_in_its_name(make_job):
-    """Two of them in a plan are one to whoever reads it as a kubelet does."""
+    """In a plan a dollar sign is written twice; a kubelet, and the local runner, read it as one."""
     layout = LocalLayout(images=Images.of_release("1"), job_directory="/runs/$(id)$$/job")
     replica = plan(make_job(), layout).replicas[0]
     pod = read_pod(replica.job["spec"]["template"], "uid")
@@ -246,7 +246,7 @@ def test_a_run_directory_may_have_a_dollar_in_its_name(make_job):
 
 
 def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluster):
-    """Its image need not know Palaestra."""
+    """The user's image need not contain Palaestra."""
     planned = containers(in_cluster(simulators=COMMAND))
 
     assert next(iter(planned)) == "install-sidecar"
@@ -256,7 +256,7 @@ def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluste
 
 
 def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
-    """One volume, written by the init container and read by the simulators."""
+    """The init container writes to a volume, which the simulators read."""
     planned = containers(in_cluster(simulators=COMMAND))
     copied = {"name": "sidecar", "mountPath": "/palaestra"}
 
@@ -268,7 +268,7 @@ def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
 
 
 def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
-    """One that it makes it would give to the owner of the folder above: root, of a pod's volume."""
+    """ROS would create a missing folder for the owner of its parent, which is root for a pod's volume."""
     for planned in (containers(in_cluster()), containers(on_laptop())):
         for container in planned.values():
             mounted = [mount["mountPath"] for mount in container["volumeMounts"]]
@@ -276,7 +276,7 @@ def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
 
 
 def test_on_a_laptop_nothing_is_copied(on_laptop):
-    """The sidecar is installed beside the runner."""
+    """The sidecar is installed together with the runner."""
     planned = containers(on_laptop(simulators=COMMAND))
 
     assert "install-sidecar" not in planned
@@ -284,7 +284,7 @@ def test_on_a_laptop_nothing_is_copied(on_laptop):
 
 
 def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_laptop):
-    """Nothing of a run is found anywhere else on a person's machine."""
+    """A run must leave no files elsewhere on a person's machine."""
     replica = on_laptop().replicas[0]
     planned = containers(on_laptop())
     mounts = [mount["mountPath"] for each in planned.values() for mount in each["volumeMounts"]]
@@ -315,7 +315,7 @@ def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_lap
     ],
 )
 def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
-    """A request above its limit is refused by the API server."""
+    """The API server refuses a request above its limit."""
     default = Resources(requests={"cpu": "1", "memory": "1Gi"}, limits={"cpu": "2"})
 
     assert resources.resources(Resources(**wanted), default) == planned
@@ -331,7 +331,7 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
 )
 @pytest.mark.parametrize("container", ["trainer", "sim-collect-0"])
 def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, requested, limit):
-    """The author of a job could otherwise use all memory of a node, and end the pods of others there."""
+    """Otherwise the author of a job could use all memory of a node, and end the pods of others there."""
     wanted = {"resources": {"requests": {"memory": requested}}}
     group = {"name": "collect", "role": "Collect"} | (wanted if container != "trainer" else {})
     trainer = {"evaluation": {"everySteps": 0}} | (wanted if container == "trainer" else {})
@@ -342,7 +342,7 @@ def test_a_request_for_memory_takes_no_limit_away(in_cluster, container, request
 
 
 def test_every_container_has_a_limit_of_its_memory(in_cluster):
-    """Whatever a job asks for."""
+    """This holds for every request of a job."""
     requests = {"resources": {"requests": {"memory": "1Gi", "cpu": "2"}}}
     groups = [{**group, **requests} for group in TWO_GROUPS]
 
@@ -355,7 +355,7 @@ STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "ev
 
 
 def test_a_sidecar_gets_an_option_for_a_second_simulator_that_stands_by(in_cluster):
-    """It makes that one's world and names itself, of the world that it is given."""
+    """With it, the sidecar generates the second simulator's world from the given one, with its own names."""
     planned = containers(in_cluster(simulators=STANDBY))
 
     assert "--standby" in planned["sim-collect-0"]["args"]
@@ -363,7 +363,10 @@ def test_a_sidecar_gets_an_option_for_a_second_simulator_that_stands_by(in_clust
 
 
 def test_a_simulator_that_stands_by_has_memory_of_its_own_and_shares_the_processor(in_cluster):
-    """A container that holds two with the memory of one would be killed; only one of them computes."""
+    """The container holds two simulators, and the memory of one would not suffice.
+
+    Only one of them computes.
+    """
     one, two = (
         containers(in_cluster(simulators=simulators))["sim-collect-0"]["resources"]
         for simulators in (TWO_GROUPS, STANDBY)
@@ -374,7 +377,7 @@ def test_a_simulator_that_stands_by_has_memory_of_its_own_and_shares_the_process
 
 
 def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
-    """The volume is counted to the container's memory, and Webots keeps its pictures there."""
+    """The container's memory includes this volume, in which Webots keeps its pictures."""
     spec = in_cluster(simulators=STANDBY).replicas[0].job["spec"]["template"]["spec"]
     sizes = {
         volume["name"]: volume["emptyDir"]["sizeLimit"]
@@ -390,13 +393,13 @@ def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
     [("160Mi", "320Mi"), ("1.5Gi", "3Gi"), ("0.3G", "0.6G"), ("500m", "1000m"), ("5", "10"), ("100", "200")],
 )
 def test_a_quantity_is_doubled_in_its_own_unit(quantity, doubled):
-    """What a person wrote stays recognisable in the pod."""
+    """The quantity in the pod stays in the unit that a person wrote."""
     assert resources.twice(quantity) == doubled
 
 
 @given(st.integers(min_value=1, max_value=200_000))
 def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
-    """Rounded up: half a core is good for one thread."""
+    """The number is rounded up: half a core allows one thread."""
     threads = resources.threads({"limits": {"cpu": f"{millis}m"}})
 
     assert threads >= 1
@@ -422,7 +425,7 @@ def test_the_trainer_shares_memory_within_its_limit(in_cluster, wanted, size):
 
 
 def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
-    """A quota on limits.cpu refuses a pod of which one container has no such limit, for ever."""
+    """A quota on limits.cpu always refuses a pod with a container that has no such limit."""
     own = {"requests": {"cpu": "100m", "memory": "128Mi"}, "limits": {"cpu": "200m", "memory": "256Mi"}}
 
     planned = containers(in_cluster(simulators=[OWN, TWO_GROUPS[1]], rosMaster={"resources": own}))
@@ -432,7 +435,7 @@ def test_a_job_sets_the_resources_of_the_ros_master(in_cluster):
 
 
 def test_an_installation_sets_the_resources_of_jobs_that_mention_none(make_job):
-    """So the shortest job fits a namespace with limits of its own; what a job mentions wins."""
+    """The shortest job then fits a namespace with limits of its own; values of a job win."""
     defaults = resources.Defaults(
         ros_master=Resources(limits={"cpu": "200m"}),
         simulator=Resources(limits={"cpu": "1"}),

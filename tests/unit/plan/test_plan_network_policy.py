@@ -1,4 +1,4 @@
-"""Access to the pods of a job."""
+"""The network access to the pods of a job."""
 
 import pytest
 
@@ -13,14 +13,14 @@ def policy(planned):
 
 
 def test_a_laptop_needs_no_policy(make_job):
-    """Everything is on loopback there, and no pod has a network of its own."""
+    """Everything is on loopback there, and no pod has its own network."""
     planned = plan(make_job(), LocalLayout(images=IMAGES, job_directory="/runs/job"))
 
     assert planned.network_policy is None
 
 
 def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
-    """One policy for all replicas, by the label that their pods carry."""
+    """One policy selects the pods of all replicas by their label."""
     planned = in_cluster(replicas=2)
     selected = policy(planned)["podSelector"]["matchLabels"]
 
@@ -30,7 +30,10 @@ def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
 
 
 def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(make_job):
-    """To pods of the operator, not to all of its namespace; ROS and the control ports to nobody."""
+    """Only pods of the operator have access, not its whole namespace.
+
+    ROS and control ports are closed to all.
+    """
     layout = ClusterLayout(images=IMAGES, operator_namespace="ops", monitoring_namespace="eyes")
     (rule,) = plan(make_job(), layout).network_policy["spec"]["ingress"]
 
@@ -48,7 +51,7 @@ def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(ma
 
 
 def test_every_port_that_is_opened_is_one_that_a_container_declares(in_cluster):
-    """A policy for other ports than the pods' would look like one that works."""
+    """A policy for other ports would only seem to work."""
     roles = {"collect": "Collect", "evaluate": "Evaluate"}
     planned = in_cluster(simulators=[{"name": name, "role": roles[name], "count": 16} for name in roles])
     spec = planned.replicas[0].job["spec"]["template"]["spec"]
@@ -72,7 +75,7 @@ def test_every_port_that_is_opened_is_one_that_a_container_declares(in_cluster):
     [({}, ["Ingress"], None), ({"egress": "Closed"}, ["Ingress", "Egress"], [])],
 )
 def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egress):
-    """No rule at all means nothing at all, once the policy is about egress."""
+    """A policy about egress without a rule would block all of it."""
     spec = policy(in_cluster(network=network))
 
     assert spec["policyTypes"] == types
@@ -80,7 +83,7 @@ def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egr
 
 
 def test_a_job_that_is_made_again_has_a_policy_of_its_own(make_job):
-    """The old one is collected with the old job, whenever that happens."""
+    """The old policy is deleted with the old job, whenever that happens."""
     layout = ClusterLayout(images=IMAGES)
     names = {
         plan(make_job(uid=uid), layout).network_policy["metadata"]["name"] for uid in ("aaaa-1", "bbbb-1")
@@ -90,7 +93,7 @@ def test_a_job_that_is_made_again_has_a_policy_of_its_own(make_job):
 
 
 def test_a_job_without_a_uid_has_no_policy(make_job):
-    """It would be owned by no object."""
+    """It would have no owner."""
     job = make_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 

@@ -1,4 +1,4 @@
-"""The objects of a replica: which there are, how they are called, what they promise."""
+"""The objects of a replica: their kinds, their names and their properties."""
 
 import pytest
 import yaml
@@ -9,19 +9,19 @@ LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
 
 def pod(planned, replica=0):
-    """Return the pod's spec of a replica."""
+    """Return the pod spec of a replica."""
     return planned.replicas[replica].job["spec"]["template"]["spec"]
 
 
 def test_a_job_is_a_policy_and_for_each_replica_a_config_map_a_claim_and_a_job(in_cluster):
-    """In this order: a pod waits for its volumes, and is never there before its policy."""
+    """This order makes sure that a pod never exists before its policy; it waits for its volumes."""
     kinds = [each["kind"] for each in in_cluster(replicas=2).objects]
 
     assert kinds == ["NetworkPolicy", *["ConfigMap", "PersistentVolumeClaim", "Job"] * 2]
 
 
 def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_cluster):
-    """A second plan has the same names, so the API server refuses to create its objects twice."""
+    """A second plan has the same names, so the API server refuses to create the objects twice."""
     first, second = in_cluster(replicas=3), in_cluster(replicas=3)
     names = [(each["kind"], each["metadata"]["name"]) for each in first.objects]
 
@@ -30,14 +30,14 @@ def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_clust
 
 
 def test_the_name_of_a_config_map_follows_from_its_content(in_cluster):
-    """It never changes, so another content needs another name."""
+    """A ConfigMap never changes, so another content needs another name."""
     names = {in_cluster(seed=seed).replicas[0].config_map["metadata"]["name"] for seed in (1, 2)}
 
     assert len(names) == 2
 
 
 def test_objects_go_with_the_job_and_the_claim_stays(in_cluster):
-    """Deleting a TrainingJob must not delete what it has learned, unless it says so."""
+    """The deletion of a TrainingJob must not delete its results, unless its spec says so."""
     replica = in_cluster().replicas[0]
 
     assert replica.job["metadata"]["ownerReferences"][0]["controller"]
@@ -46,14 +46,14 @@ def test_objects_go_with_the_job_and_the_claim_stays(in_cluster):
 
 
 def test_a_claim_that_is_not_retained_goes_with_the_job(in_cluster):
-    """`retain: Delete` is an owner reference."""
+    """`retain: Delete` sets an owner reference."""
     claim = in_cluster(storage={"retain": "Delete"}).replicas[0].claim
 
     assert claim["metadata"]["ownerReferences"][0]["kind"] == "TrainingJob"
 
 
 def test_a_job_that_is_made_again_gets_a_new_claim(make_job):
-    """Its uid is in the name: the run of its predecessor is not continued by accident."""
+    """The uid is in the name, so the run of the predecessor is not continued by accident."""
     claims = {plan(make_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"}
 
     assert len(claims) == 2
@@ -67,7 +67,7 @@ def test_a_job_that_is_made_again_gets_a_new_claim(make_job):
     ],
 )
 def test_no_claim_is_made_where_none_is_wanted(in_cluster, storage, volume):
-    """An existing claim is somebody else's, and an ephemeral run needs none."""
+    """An existing claim belongs to somebody else, and an ephemeral run needs none."""
     planned = in_cluster(storage=storage)
 
     assert planned.replicas[0].claim is None
@@ -83,7 +83,7 @@ def test_a_claim_has_the_size_and_class_of_the_job(in_cluster):
 
 
 def test_the_end_of_the_trainer_decides_and_always_by_name(in_cluster):
-    """A rule without a name would match the sidecars' exit codes and hide the trainer's."""
+    """A rule without a container name would match the sidecars' exit codes and hide the trainer's."""
     rules = in_cluster().replicas[0].job["spec"]["podFailurePolicy"]["rules"]
 
     assert [rule["action"] for rule in rules] == ["Ignore", "Ignore", "FailJob"]
@@ -102,7 +102,7 @@ def test_one_pod_at_a_time(in_cluster):
 
 
 def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
-    """It is made suspended, so that no pod starts before Kueue has looked at it."""
+    """It is created suspended, so that no pod starts before Kueue has seen it."""
     queued = in_cluster(scheduling={"queueName": "robots"}).replicas[0].job
     own = in_cluster(suspend=True).replicas[0].job
 
@@ -112,7 +112,7 @@ def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
 
 
 def test_a_job_without_a_uid_has_no_plan(make_job):
-    """Its names and its owner references would be those of no object."""
+    """Its names and owner references would refer to no object."""
     job = make_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 
@@ -121,7 +121,7 @@ def test_a_job_without_a_uid_has_no_plan(make_job):
 
 
 def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(make_job):
-    """Both lie on the same claim, each job in a folder of its own."""
+    """Both are on the same claim, each job in its own folder."""
     job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"}, replicas=2)
 
     planned = plan(job, LAYOUT)
@@ -131,7 +131,7 @@ def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(
 
 
 def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(make_job):
-    """There is no claim, and training that begins anew instead would be found out late."""
+    """There is no claim, and nobody would notice for a long time that the training began at step 0."""
     job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
@@ -143,7 +143,7 @@ INITIAL = {"initialPolicy": {"claim": "policies", "path": "5a0c/0/model.zip"}}
 
 
 def trainer_of(planned):
-    """Return what a trainer reads, and what is mounted for it."""
+    """Return the trainer's configuration and its mounts."""
     replica = planned.replicas[0]
     training = yaml.safe_load(replica.config_map["data"]["training.yaml"])
     (container,) = pod(planned)["containers"]
@@ -151,7 +151,7 @@ def trainer_of(planned):
 
 
 def test_the_claim_of_an_initial_policy_is_mounted_for_the_trainer_alone_to_read(in_cluster):
-    """It is of another job, which may be running."""
+    """The claim belongs to another job, which may be running."""
     planned = in_cluster(trainer=INITIAL)
 
     training, mounts = trainer_of(planned)
@@ -166,7 +166,7 @@ def test_the_claim_of_an_initial_policy_is_mounted_for_the_trainer_alone_to_read
 
 
 def test_an_initial_policy_on_the_run_s_own_claim_needs_no_second_volume(in_cluster):
-    """Some drivers never mount a claim that a pod has twice."""
+    """Some drivers never mount a claim twice in one pod."""
     planned = in_cluster(trainer=INITIAL, storage={"existingClaim": "policies"})
 
     training, mounts = trainer_of(planned)
@@ -176,7 +176,7 @@ def test_an_initial_policy_on_the_run_s_own_claim_needs_no_second_volume(in_clus
 
 
 def test_an_initial_policy_in_the_image_needs_no_volume(in_cluster):
-    """The path is the trainer's."""
+    """The path is in the trainer's own file system."""
     training, mounts = trainer_of(in_cluster(trainer={"initialPolicy": {"path": "/opt/model.zip"}}))
 
     assert training["initialPolicy"] == "/opt/model.zip"
@@ -184,7 +184,7 @@ def test_an_initial_policy_in_the_image_needs_no_volume(in_cluster):
 
 
 def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(make_job):
-    """A run that began from random weights instead would be found out late."""
+    """Nobody would notice for a long time that the run began with random weights."""
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
     with pytest.raises(PlanError, match=r"^spec\.trainer\.initialPolicy\.claim: names a claim .*; remove it"):
@@ -192,7 +192,7 @@ def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(make_job):
 
 
 def test_the_pod_is_restricted(in_cluster):
-    """As Pod Security's *restricted* asks, sidecars included."""
+    """Pod Security's *restricted* applies to sidecars, too."""
     spec = pod(in_cluster())
 
     assert spec["automountServiceAccountToken"] is False
@@ -205,7 +205,7 @@ def test_the_pod_is_restricted(in_cluster):
 
 
 def test_a_cluster_may_choose_the_user_of_a_pod(make_job):
-    """OpenShift refuses a user outside of the namespace's range; all else stays restricted."""
+    """OpenShift refuses a user outside the namespace's range; everything else stays restricted."""
     security = pod(plan(make_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
 
     assert security == {
@@ -216,7 +216,7 @@ def test_a_cluster_may_choose_the_user_of_a_pod(make_job):
 
 
 def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
-    """The installation's is a default for jobs that say nothing: an own image may be for another machine."""
+    """The installation's label is only a default; a user's image may need another kind of node."""
     layout = ClusterLayout(
         images=LAYOUT.images, node_selector={"kubernetes.io/arch": "amd64", "pool": "robots"}
     )
@@ -228,7 +228,7 @@ def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
 
 
 def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(make_job, in_cluster):
-    """A process that leaves its container is then nobody on the node."""
+    """A process that leaves its container then has no permissions on the node."""
     layout = ClusterLayout(images=LAYOUT.images, host_users=False)
 
     assert pod(plan(make_job(), layout))["hostUsers"] is False
@@ -236,7 +236,7 @@ def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(make_job, in
 
 
 def test_scheduling_reaches_the_pod(in_cluster):
-    """What a platform engineer sets is passed on as it is."""
+    """The values of a platform engineer are passed on unchanged."""
     planned = in_cluster(
         scheduling={
             "nodeSelector": {"gpu": "yes"},
@@ -260,7 +260,7 @@ def test_scheduling_reaches_the_pod(in_cluster):
 
 
 def test_every_mount_has_a_volume_and_every_volume_a_mount(in_cluster):
-    """An API server refuses the one, and the other is waste."""
+    """An API server refuses a mount without a volume, and a volume without a mount is useless."""
     spec = pod(in_cluster())
     mounted = {
         mount["name"]
@@ -272,7 +272,7 @@ def test_every_mount_has_a_volume_and_every_volume_a_mount(in_cluster):
 
 
 def test_seeds_of_replicas_differ(in_cluster):
-    """Replicas are the same training with other luck."""
+    """Replicas are the same training with different random numbers."""
     seeds = [
         yaml.safe_load(each.config_map["data"]["training.yaml"])["seed"]
         for each in in_cluster(seed=7, replicas=3).replicas.values()
@@ -294,7 +294,10 @@ def claims_of(planned):
 
 
 def test_no_name_of_a_claim_is_longer_than_a_label(make_job):
-    """Provisioners put it into labels and tags of 63 characters; 46 for the job left 85."""
+    """Provisioners copy it into labels and tags of 63 characters.
+
+    With 46 characters for the job, the name had 85.
+    """
     names = claims_of(plan(make_job(LONG, replicas=12), LAYOUT))
     others = claims_of(plan(make_job(LONG, uid="1" * 36, replicas=12), LAYOUT))
 
@@ -303,16 +306,8 @@ def test_no_name_of_a_claim_is_longer_than_a_label(make_job):
     assert names[0].startswith("quadruped-blind-locomotion-rough-terrain-ppo")
 
 
-def test_a_claim_of_an_earlier_release_is_found_again(make_job):
-    """A run that began on it would silently begin again on another one."""
-    job = make_job(LONG)
-    before = f"{LONG}-0-{job.metadata.uid}"
-
-    assert claims_of(plan(job, LAYOUT, mounted={0: [before]})) == [before]
-
-
 def test_a_short_name_of_a_claim_has_the_whole_uid(make_job):
-    """Nothing that is deployed changes its name."""
+    """Existing deployments keep their names."""
     job = make_job("walk")
 
     assert claims_of(plan(job, LAYOUT)) == [f"walk-0-{job.metadata.uid}"]

@@ -1,4 +1,4 @@
-"""What the plan writes, the trainer reads: the two packages share no code for it."""
+"""The trainer reads the file that the plan writes; the two packages share no code for it."""
 
 from pathlib import Path
 
@@ -16,14 +16,14 @@ LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
 
 def read_back(job):
-    """Return what the trainer reads in the training.yaml of a job's first replica."""
+    """Return the trainer's reading of the training.yaml of a job's first replica."""
     planned = plan(identified(job, "uid"), LAYOUT).replicas[0]
     return parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
-    """A field that one side renames would be found by a run only, minutes later."""
+    """If one side renamed a field, only a run would show it, minutes later."""
     job = load(example.read_text())
 
     read = read_back(job)
@@ -36,7 +36,7 @@ def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
 
 
 def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
-    """Where the section is absent the trainer has a default of its own, which evaluates."""
+    """If the section is absent, the trainer uses its own default, which evaluates."""
     job = make_job(trainer={"evaluation": {"everySteps": 0}})
 
     read = read_back(job)
@@ -45,7 +45,7 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
 
 
 def test_wrappers_and_stacked_frames_are_read_as_they_were_written(make_job):
-    """Without them, a policy would learn in another environment."""
+    """Without them a policy would learn in another environment."""
     wrapper = {"name": "a.b:Own", "options": {"size": 2}}
     job = make_job(trainer={"environment": {"wrappers": [wrapper], "frameStack": 3}})
 
@@ -74,7 +74,7 @@ def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
 
 
 def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_job):
-    """Trainers of older releases log an unknown field."""
+    """A trainer whose release does not know a field logs it."""
     initial = {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}
 
     assert read_back(make_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
@@ -83,7 +83,7 @@ def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_
 
 @pytest.mark.parametrize("cnn", ["small", None])
 def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
-    """A field that a job leaves out is absent, for trainers of older releases."""
+    """A field that a job leaves out is absent."""
     job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
 
     assert read_back(job).algorithm.cnn == cnn
@@ -91,7 +91,7 @@ def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
 
 @pytest.mark.parametrize("callbacks", [None, [{"name": "mine:Bored", "options": {"patience": 3}}]])
 def test_callbacks_are_read_as_they_were_written(make_job, callbacks):
-    """Their options are free, so their names are not changed to those of a TrainingJob's fields."""
+    """Their options are free objects. Their keys stay as written, unlike the fields of a TrainingJob."""
     job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"callbacks": callbacks} if callbacks else {})})
 
     read = read_back(job).algorithm.callbacks
@@ -100,7 +100,7 @@ def test_callbacks_are_read_as_they_were_written(make_job, callbacks):
 
 
 def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
-    """Memory is written in bytes: a trainer compares it with what the kernel says."""
+    """Memory is written in bytes, because a trainer compares it with the kernel's values."""
     group = {
         "name": "collect",
         "role": "Collect",
@@ -130,14 +130,14 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     ids=["stub", "mujoco", "webots", "command", "stored job"],
 )
 def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(make_job, group, read):
-    """Its restarts took a fifth of a training; the paper's simulator ended at the 25th reset."""
+    """Restarts took a fifth of a training; only the simulator of the paper failed at the 25th reset."""
     job = make_job(simulators=[COLLECT | group, EVALUATE])
 
     assert read_back(job).simulators[0].recycle == read
 
 
 def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
-    """Zero resets mean never, in the job as in the file."""
+    """Zero resets mean never, in the job and in the file."""
     read = read_back(make_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
 
     assert read.simulators[0].recycle is None
@@ -155,12 +155,12 @@ def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
     ],
 )
 def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(make_job, resources, device):
-    """Else it would be reserved and paid for, and idle."""
+    """Otherwise the GPU would be reserved and paid for, but idle."""
     assert read_back(make_job(trainer={"resources": resources})).device == device
 
 
 def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(make_job):
-    """Its ConfigMap is named after its content, and older trainers refuse words that they don't know."""
+    """Its ConfigMap is named after its content, so what a job does not ask for is left out."""
     planned = plan(identified(make_job(), "uid"), LAYOUT).replicas[0]
 
     assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])

@@ -1,4 +1,4 @@
-"""The worlds of a replica: checked once, shipped once a group, named by the sidecars alone."""
+"""The worlds of a replica are checked once, stored once per group, and named only by the sidecars."""
 
 import sys
 from itertools import chain
@@ -14,7 +14,6 @@ from palaestra_sim.world import RunIdentity, WorldError, builtin, generate, pars
 
 LAYOUT = ClusterLayout(images=Images.of_release("1"))
 ARENA = builtin("arena").decode()
-EARLIER = "job-0-b4a6144287"  # what a5276f3 called the ConfigMap of the job below
 
 
 def group(name="collect", role="Collect", **fields):
@@ -36,13 +35,13 @@ def training(planned, replica=0):
 
 
 def sidecars(planned, replica=0):
-    """Return the containers of a replica that prepare a world."""
+    """Return the containers of a replica that generate a world."""
     containers = planned.replicas[replica].job["spec"]["template"]["spec"]["initContainers"]
     return [each for each in containers if each["name"].startswith("sim-")]
 
 
 def named(planned, replica=0):
-    """Return the worlds of a replica's simulators, by container, as their sidecars make them."""
+    """Return the worlds of a replica's simulators by container, as their sidecars generate them."""
     worlds = {}
     for container in sidecars(planned, replica):
         given = read_options(container["args"])
@@ -60,7 +59,7 @@ def named(planned, replica=0):
 
 
 def calls_of(function, work):
-    """Return how often a function is called while `work` is done."""
+    """Return the number of calls of a function during `work`."""
     calls = []
 
     def note(frame, event, _):
@@ -76,7 +75,7 @@ def calls_of(function, work):
 
 
 def test_every_simulator_of_every_replica_has_ros_names_of_its_own(in_cluster):
-    """The limit of one simulator a master is what Palaestra removes."""
+    """Without Palaestra, a ROS master can serve only one simulator."""
     planned = in_cluster(replicas=2, simulators=[group(count=3), EVALUATE])
     worlds = chain(*(named(planned, replica).values() for replica in range(2)))
     names = [robot.ros_name for world in worlds for robot in robots(world.encode())]
@@ -85,7 +84,7 @@ def test_every_simulator_of_every_replica_has_ros_names_of_its_own(in_cluster):
 
 
 def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
-    """Seventeen copies that differ in a name are seventeen times the bytes, in etcd and on the wire."""
+    """Seventeen named copies would be seventeen times the bytes, in etcd and on the network."""
     world = {"inline": ARENA}
     planned = in_cluster(simulators=[group(count=16, world=world), group("evaluate", "Evaluate")])
 
@@ -94,7 +93,7 @@ def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
 
 
 def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(make_job):
-    """Thirty replicas of seventeen simulators took the operator fifteen seconds, a look."""
+    """With parsing for each simulator, thirty replicas of seventeen took fifteen seconds per reconcile."""
     world = {"inline": ARENA}
     job = make_job(replicas=3, simulators=[group(count=4, world=world), EVALUATE | {"world": world}])
 
@@ -102,42 +101,23 @@ def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(make_job):
 
 
 def test_a_world_that_ships_is_not_parsed(make_job):
-    """It passes every check in this project's own tests, and parsing it is most of planning a small job."""
+    """It passes every check in this project's own tests.
+
+    Parsing takes most of the time of planning a small job.
+    """
     assert calls_of(parse, lambda: plan(make_job(simulators=[group(), EVALUATE]), LAYOUT)) == 0
 
 
 def test_only_the_replicas_that_are_asked_for_are_planned(make_job):
     """A job with hundred replicas, of which one lacks an object, is planned for that one."""
-    planned = plan(make_job(replicas=3), LAYOUT, mounted={1: ()})
+    planned = plan(make_job(replicas=3), LAYOUT, replicas=[1])
 
     assert planned.replicas.keys() == {1}
     assert planned.replicas[1] == plan(make_job(replicas=3), LAYOUT).replicas[1]
 
 
-def test_a_job_of_an_earlier_version_gets_its_own_config_map_again(make_job):
-    """Those held a world a simulator; the name has a hash of every byte of it and of training.yaml."""
-    stored = {"recycle": {"afterResets": 24}}  # the default then, written out by the API server
-    job = make_job(simulators=[group(count=2, **stored), EVALUATE | stored])
-    planned = plan(job, LAYOUT, mounted={0: {EARLIER}})
-
-    assert planned.replicas[0].config_map["metadata"]["name"] == EARLIER
-    assert data(planned).keys() == {"training.yaml", "collect-0.wbt", "collect-1.wbt", "evaluate-0.wbt"}
-
-
-def test_names_are_those_that_earlier_versions_wrote(make_job):
-    """A sidecar makes the same bytes of a source as of a world that has its names already."""
-    job = make_job(simulators=[group(count=2), EVALUATE])
-    earlier = data(plan(job, LAYOUT, mounted={0: {EARLIER}}))
-
-    assert list(named(plan(job, LAYOUT)).values()) == [
-        earlier["collect-0.wbt"],
-        earlier["collect-1.wbt"],
-        earlier["evaluate-0.wbt"],
-    ]
-
-
 def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
-    """training.yaml says where the world is that the simulator runs."""
+    """training.yaml has the path of the world that the simulator runs."""
     planned = in_cluster()
     told = [each["world"] for each in training(planned)["simulators"]]
 
@@ -147,7 +127,7 @@ def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
 
 
 def test_a_file_is_left_to_the_sidecar(in_cluster):
-    """It lies in the image, with what it refers to beside it."""
+    """The file is in the image, together with the files that it refers to."""
     planned = in_cluster(simulators=[group(world={"file": "/worlds/my.wbt"}), EVALUATE])
 
     assert "collect.wbt" not in data(planned)
@@ -155,7 +135,7 @@ def test_a_file_is_left_to_the_sidecar(in_cluster):
 
 
 def test_a_config_map_is_given_by_who_can_read_it(make_job):
-    """The plan is pure: it reads no cluster."""
+    """The plan is pure, so the caller reads the cluster."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     job = make_job(simulators=[group(world=source), EVALUATE])
 
@@ -167,7 +147,7 @@ def test_a_config_map_is_given_by_who_can_read_it(make_job):
 
 
 def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
-    """A person sees the world's text in the job, and has to find the place."""
+    """A person sees the world's text in the job and must find the position."""
     broken = ARENA.replace("basicTimeStep 32", "basicTimeStep {")
 
     with pytest.raises(WorldError, match=r"^spec\.simulators\[0\]\.world\.inline:\d+:\d+: .*;"):
@@ -175,25 +155,15 @@ def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
 
 
 def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_created(in_cluster):
-    """A simulator that cannot start is found hours later, a refusal at once."""
+    """A refusal is visible at once, a simulator that cannot start only hours later."""
     twice = '#VRML_SIM R2023b utf8\nRobot { controller "ros" }\nRobot { controller "ros" }\n'
 
     with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
         in_cluster(simulators=[group(), group("evaluate", "Evaluate", world={"inline": twice})])
 
 
-def test_a_job_of_an_earlier_version_whose_worlds_did_not_fit_has_its_sources(make_job):
-    """Sixteen copies of a big world were more than a ConfigMap holds."""
-    big = ARENA + "# " + "x" * (MOST_BYTES // 5)
-    job = make_job(simulators=[group(world={"inline": big}, count=8), EVALUATE])
-
-    planned = plan(job, LAYOUT, mounted={0: {"of-an-earlier-version"}})
-
-    assert data(planned).keys() == {"training.yaml", "collect.wbt", "evaluate.wbt"}
-
-
 def test_worlds_that_fit_nowhere_are_refused(make_job):
-    """With what to do instead."""
+    """The message has the remedy."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     huge = ARENA.encode() + b"# " + b"x" * MOST_BYTES
     job = make_job(simulators=[group(world=source), EVALUATE])
@@ -203,7 +173,7 @@ def test_worlds_that_fit_nowhere_are_refused(make_job):
 
 
 def test_what_is_switched_off_is_absent(in_cluster):
-    """Zero resets mean never, and the trainer reads absence as never."""
+    """Zero resets mean never, and the trainer reads an absent field as never."""
     planned = in_cluster(simulators=[group(recycle={"afterResets": 0}), EVALUATE])
 
     assert "recycle" not in training(planned)["simulators"][0]

@@ -1,4 +1,4 @@
-"""Values that travel between trainer, sidecar and operator, and JSON of every kind."""
+"""Values of the messages between trainer, sidecar and operator, and arbitrary JSON."""
 
 import pytest
 from hypothesis import strategies as st
@@ -116,7 +116,7 @@ anything = st.recursive(
 
 @st.composite
 def bent(draw, shape):
-    """Draw a right message in which one field, at any depth, was replaced or taken away."""
+    """Draw a valid message in which one field, at any depth, is replaced or removed."""
     whole = draw(SHAPES[shape]).to_json()
     part = whole
     while True:
@@ -136,7 +136,7 @@ def bent(draw, shape):
 
 @pytest.fixture(scope="session")
 def messages():
-    """Return how to draw messages: of a shape, of a shape and bent, or anything that JSON can say."""
+    """Return strategies for messages: valid ones, damaged ones, and any JSON."""
 
     class Messages:
         right = staticmethod(SHAPES.__getitem__)
@@ -148,7 +148,7 @@ def messages():
 
 @pytest.fixture
 def state():
-    """Return how to make the state of a simulator; the test says what matters."""
+    """Return a function that makes the state of a simulator; the test sets the fields that matter."""
 
     def make(**changes):
         plain = {"state": SidecarState.IDLE, "driver": "stub", "world": "/worlds/collect-0.wbt"}
@@ -159,7 +159,7 @@ def state():
 
 @pytest.fixture
 def status():
-    """Return how to make the status of a trainer; the test says what matters."""
+    """Return a function that makes the status of a trainer; the test sets the fields that matter."""
 
     def make(**changes):
         return TrainerStatus(**{"step": 0, "target": 1, "episodes": 0, "phase": "training"} | changes)

@@ -7,7 +7,7 @@ from palaestra_protocol.http import Address
 
 @pytest.mark.parametrize("text", ["127.0.0.1:7100", "0.0.0.0:0", "[::1]:65535"])
 def test_an_address_is_written_as_it_is_read(text) -> None:
-    """The first line that a sidecar prints is read by programs."""
+    """Programs parse the first line that a sidecar prints."""
     assert str(Address.parse(text)) == text
 
 
@@ -15,6 +15,6 @@ def test_an_address_is_written_as_it_is_read(text) -> None:
     "text", ["", "7100", ":7100", "localhost:1", "127.0.0.1:65536", "127.0.0.1:x", "::1"]
 )
 def test_what_is_no_address_with_a_port_is_refused(text) -> None:
-    """A name could be anybody's address tomorrow, so there are none."""
+    """A name could resolve to another machine tomorrow, so names are refused."""
     with pytest.raises(ValueError, match=r"is no address such as 127\.0\.0\.1:7100$"):
         Address.parse(text)

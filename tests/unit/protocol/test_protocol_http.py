@@ -1,4 +1,4 @@
-"""The server of operator, trainer and sidecar: what it answers, and its bounds."""
+"""The HTTP server of operator, trainer and sidecar: its responses and its limits."""
 
 import contextlib
 import json
@@ -28,12 +28,12 @@ DEADLINE_S = 0.5
 
 
 def echo(body):
-    """Return what was sent."""
+    """Return the request's body."""
     return Response(status=HTTPStatus.OK, body=body, content_type="text/plain")
 
 
 def fails(_):
-    """Raise what only a mistake in a route raises."""
+    """Raise an error that only a bug in a route raises."""
     raise RuntimeError("no such attribute")
 
 
@@ -50,14 +50,14 @@ EVERY = Address("0.0.0.0", 0)
 
 
 def peered(host, server):
-    """Return a connection to the server by another address of this machine."""
+    """Return a connection to the server through another address of this machine."""
     return socket.create_connection((host, server.address.port), timeout=DEADLINE_S)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 @pytest.mark.parametrize("peer", ["127.0.0.1", "::1"])
 def test_every_address_is_one_of_ipv6_and_of_ipv4(host, peer):
-    """A kubelet of a cluster with IPv6 only asks [podIP]:8080, and no answer came."""
+    """In a cluster with IPv6 only, a kubelet sent its probes to [podIP]:8080 and got no response."""
     with Server(Address(host, 0), ROUTES, name="test") as listening, peered(peer, listening) as connection:
         connection.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
         answer = connection.makefile("rb").read()
@@ -75,7 +75,7 @@ def test_a_node_without_ipv6_listens_on_ipv4(monkeypatch):
 
 @pytest.fixture
 def server():
-    """A server with the usual bounds."""
+    """A server with the default limits."""
     with Server(LOOPBACK, ROUTES, name="palaestra-test") as server:
         yield server
 
@@ -86,7 +86,7 @@ def connect(server):
 
 
 def ask(server, request):
-    """Return the answer to bytes that need not be HTTP: status, head, body; None: closed unanswered."""
+    """Return status, head and body of the response to any bytes, or None if the connection was closed."""
     with connect(server) as connection:
         try:
             connection.sendall(request)
@@ -100,7 +100,7 @@ def ask(server, request):
 
 
 def is_closed(connection, piece):
-    """Send a piece more, and return whether the server has closed the connection."""
+    """Send one more piece, and return whether the server has closed the connection."""
     try:
         connection.sendall(piece)
         return connection.recv(1) == b""
@@ -121,7 +121,7 @@ def is_closed(connection, piece):
     ],
 )
 def test_a_route_answers(server, request_, status, content_type, body) -> None:
-    """The head says how long the body is, and what sort of program serves."""
+    """The head has the length of the body, and the kind of program that serves it."""
     answered, head, text = ask(server, request_)
 
     assert (answered, text) == (status, body)
@@ -179,7 +179,7 @@ def test_a_refusal_names_field_and_fact(server, request_, status, error) -> None
     ],
 )
 def test_other_methods_and_heads_that_are_too_long_are_refused(server, request_, status) -> None:
-    """By http.server itself."""
+    """The class http.server refuses them itself."""
     with connect(server) as connection:
         connection.sendall(request_)
         assert connection.makefile("rb").readline().split()[1] == str(status).encode()
@@ -187,7 +187,7 @@ def test_other_methods_and_heads_that_are_too_long_are_refused(server, request_,
 
 @pytest.mark.parametrize("piece", [b"", b"x"], ids=["silent", "slow"])
 def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(piece) -> None:
-    """One byte now and then does not keep a place."""
+    """A client must not hold a slot by sending a byte now and then."""
     short = Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=DEADLINE_S)
     with short as server, connect(server) as connection:
         begin = time.monotonic()
@@ -199,7 +199,7 @@ def test_a_request_that_is_not_complete_at_its_deadline_is_closed_unanswered(pie
 
 
 def test_a_head_without_end_is_closed_unanswered(server) -> None:
-    """Each line and their number are bounded, and all of them together."""
+    """The length of a line, the number of lines and their total are limited."""
     lines = b"".join(b"X-%d: %s\r\n" % (number, b"x" * 50_000) for number in range(10))
     assert len(lines) > MOST_REQUEST_BYTES
 
@@ -211,7 +211,7 @@ REQUEST = b"GET /healthz HTTP/1.1\r\n\r\n"
 
 @contextlib.contextmanager
 def half_open(server, count, host="127.0.0.1"):
-    """Keep connections of one peer that begin a request and never end it."""
+    """Hold open some connections of one client that begin a request and never end it."""
     with contextlib.ExitStack() as stack:
         kept = [
             stack.enter_context(socket.create_connection(server.address, source_address=(host, 0)))
@@ -219,13 +219,13 @@ def half_open(server, count, host="127.0.0.1"):
         ]
         for connection in kept:
             connection.settimeout(60.0)
-            with contextlib.suppress(OSError):  # its place is another's already
+            with contextlib.suppress(OSError):  # another connection may have its slot already
                 connection.sendall(REQUEST[:9])
         yield kept
 
 
 def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
-    """Forty renewed ones starved every probe, and a kubelet restarts what does not answer."""
+    """Forty such connections starved every probe. A kubelet restarts a container that does not respond."""
     with Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server:
         for host in ("127.0.0.1", "127.0.0.2", "127.0.0.3"):
             with half_open(server, 2 * MOST_OF_PEER, host):
@@ -233,7 +233,10 @@ def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
 
 
 def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
-    """Its own oldest one is closed, and the half request of the other is answered when it is whole."""
+    """Its own oldest connection is closed.
+
+    The other client's request gets its response when it is complete.
+    """
     with (
         Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server,
         half_open(server, 1, "127.0.0.2") as [other],
@@ -247,7 +250,7 @@ def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
 
 
 def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
-    """An answer may take long; without a place for it, a new connection of its peer is closed."""
+    """A response may take long; if all slots are busy, a new connection of the same client is closed."""
     begun, going_on = threading.Semaphore(0), threading.Event()
 
     def answer(_):
@@ -271,7 +274,7 @@ def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
 
 
 def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) -> None:
-    """A client that goes away is no error."""
+    """A client that disconnects is not an error."""
     with caplog.at_level(logging.ERROR):
         assert ask(server, b"GET /wrong HTTP/1.1\r\n\r\n") is None
         assert ask(server, b"GET /healthz HTTP/1.1\r\n\r\n")[0] == 200
@@ -281,7 +284,7 @@ def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) ->
 
 
 def test_a_closed_server_frees_its_address() -> None:
-    """Also one that was never started."""
+    """This holds also for a server that was never started."""
     server = Server(LOOPBACK, ROUTES, name="palaestra-test")
     address = server.address
     with pytest.raises(OSError, match="Address already in use"):

@@ -1,4 +1,4 @@
-"""Passwords in addresses: they leave no process."""
+"""Passwords in addresses never leave a process."""
 
 import json
 
@@ -27,7 +27,7 @@ SECRET = "S3CR"
     ],
 )
 def test_the_user_information_of_each_address_is_masked(text, wanted):
-    """The rest tells what was asked for."""
+    """The rest of the address shows which host was requested."""
     assert masked(text) == wanted
 
 
@@ -38,7 +38,7 @@ def test_no_password_is_left_whatever_it_is_made_of(password):
 
 
 def test_no_text_that_leaves_a_trainer_has_it(capsys):
-    """Neither its log, nor its last lines, nor its termination message with faults."""
+    """Its log, its last lines and its termination message with faults are all masked."""
     before = structlog.get_config()
     try:
         logs.configure_logs()
@@ -56,5 +56,5 @@ def test_no_text_that_leaves_a_trainer_has_it(capsys):
 
 @pytest.mark.parametrize("shorten", [lambda text: one_line(text, 200), printable, clipped])
 def test_no_text_that_a_command_prints_or_a_status_keeps_has_it(shorten):
-    """It may come from a pod of an older release."""
+    """It may come from a program of one's own."""
     assert shorten(ADDRESS) == masked(ADDRESS)

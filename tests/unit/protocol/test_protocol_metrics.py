@@ -1,4 +1,4 @@
-"""Families of metrics as data, and what happens thousands of times a second."""
+"""Families of metrics as data, and the cost of counting thousands of times a second."""
 
 import time
 
@@ -13,17 +13,17 @@ MOST_S = 2e-6
 
 
 class Shown(Collector):
-    """One family with some values, and the text that Prometheus gets of it."""
+    """A family with some values, which Prometheus' client collects."""
 
     def __init__(self, family, values):
         self.family, self.values = family, values
 
     def collect(self):
-        """Yield it."""
+        """Yield the family with its values."""
         yield self.family.metric(self.values)
 
     def samples(self):
-        """Return what a reader finds, by name and labels."""
+        """Return the samples that a reader parses, by name and labels."""
         registry = CollectorRegistry()
         registry.register(self)
         text = generate_latest(registry).decode()
@@ -35,7 +35,7 @@ class Shown(Collector):
 
 
 def test_the_samples_of_a_counter_have_its_labels():
-    """In their order; its name is the one that was declared."""
+    """The labels are in their declared order, and the name is the declared one."""
     colors = Label(name="color", values=("red", "blue"))
     family = Family(name="balls_total", kind=MetricType.COUNTER, meaning="Balls.", labels=(colors,))
 
@@ -43,7 +43,7 @@ def test_the_samples_of_a_counter_have_its_labels():
 
 
 def test_a_family_without_a_value_is_there_with_its_meaning():
-    """Unknown is not zero, and a dashboard finds the name."""
+    """Unknown differs from zero, and a dashboard finds the name."""
     family = Family(name="height_metres", kind=MetricType.GAUGE, meaning="How high.")
     registry = CollectorRegistry()
     registry.register(Shown(family, {}))
@@ -54,7 +54,7 @@ def test_a_family_without_a_value_is_there_with_its_meaning():
 
 
 def test_a_histogram_counts_what_is_up_to_each_bound():
-    """A value at a bound belongs to it, as Prometheus has it."""
+    """As in Prometheus, a value at a bound belongs to it."""
     family = Family(name="wait_seconds", kind=MetricType.HISTOGRAM, meaning="Wait.", buckets=(1.0, 2.0))
     tally = family.tally()
     for value in (0.5, 1.0, 1.5, 9.0):
@@ -70,7 +70,7 @@ def test_a_histogram_counts_what_is_up_to_each_bound():
 
 
 def test_a_histogram_of_what_may_be_negative_has_no_sum():
-    """A sum that falls looks like a restart; without the count, OpenTelemetry drops the histogram."""
+    """A sum that decreases looks like a restart; without the count, OpenTelemetry drops the histogram."""
     family = Family(name="gain", kind=MetricType.HISTOGRAM, meaning="Gain.", buckets=(-1.0, 0.0))
 
     names = {name for name, *_ in Shown(family, {(): family.tally()}).samples()}
@@ -86,7 +86,7 @@ def test_a_histogram_of_what_may_be_negative_has_no_sum():
     ],
 )
 def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
-    """As many as are served at most."""
+    """The count is the maximum number of series that are exported."""
     labels = (Label(name="color", values=("red", "blue")), Label(name="child", bound="child"))
     family = Family(name="x", kind=kind, meaning="X.", labels=labels, buckets=buckets)
 
@@ -94,7 +94,7 @@ def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
 
 
 def test_to_count_a_step_costs_less_than_two_microseconds():
-    """Of processor time, at the best of ten: up to 5,000 of them come a second."""
+    """The best of ten runs counts, in processor time; up to 5,000 steps come a second."""
     tally = Tally((0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0))
 
     def cost_s():

@@ -1,4 +1,4 @@
-"""Definitions of messages, as people write them."""
+"""The parser of message definitions as people write them."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from palaestra_protocol.ros.syntax import MessageField, parse
 
 
 def test_fields_are_read_with_their_types_in_full():
-    """A type without a package is of the message's own; only `Header` is always that of std_msgs."""
+    """A type without a package is of the message's own package; only `Header` is always from std_msgs."""
     text = "Header header\nPoint[] points\nsensor_msgs/Image image\nfloat64[9] covariance  # row by row\n"
 
     assert parse("demo/Path", text).fields == (
@@ -18,7 +18,7 @@ def test_fields_are_read_with_their_types_in_full():
 
 
 def test_an_array_has_a_length_only_if_it_is_fixed():
-    """The others write theirs before their elements."""
+    """Other arrays have their length in front of their elements."""
     fields = parse("demo/Arrays", "int8 one\nint8[] any\nint8[0] none\nint8[12] dozen").fields
 
     assert [field.length for field in fields] == [None, None, 0, 12]
@@ -33,7 +33,7 @@ def test_an_array_has_a_length_only_if_it_is_fixed():
     ],
 )
 def test_a_constant_is_kept_as_the_md5_covers_it(line, constant):
-    """Without spaces and comments, but a string has no comments."""
+    """Spaces and comments are removed, but a string has no comments."""
     message = parse("demo/Constants", line)
 
     assert message.constants == (constant,)
@@ -42,7 +42,7 @@ def test_a_constant_is_kept_as_the_md5_covers_it(line, constant):
 
 @pytest.mark.parametrize("line", ["int32", "int32 a b", "int32[x] a", "int32 a-b", "int32[2][2] a", "2 a"])
 def test_a_line_that_is_no_field_is_refused(line):
-    """A field that is left out would shift all that follow."""
+    """A skipped field would shift all later ones."""
     with pytest.raises(ValueError, match=r"demo/Wrong: .* is not a field; write a type, a space and a name"):
         parse("demo/Wrong", line)
 

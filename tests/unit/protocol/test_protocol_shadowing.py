@@ -1,4 +1,4 @@
-"""Which modules of a user shadow modules of Python and of Palaestra's dependencies."""
+"""A user's modules may shadow modules of Python and of Palaestra's dependencies; these are reported."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from palaestra_protocol.shadowing import shadows
 
 @pytest.fixture
 def put(tmp_path):
-    """Return a function that puts a file into a folder of the user, and returns what the folder shadows."""
+    """Return a function that adds a file to a user's folder, and returns the shadowed modules."""
 
     def shadowed_with(name):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -19,7 +19,7 @@ def put(tmp_path):
 
 @pytest.mark.parametrize("file", ["queue.py", "random.py", "types.py", "code.py", "email/__init__.py"])
 def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(put, tmp_path, file):
-    """Libraries fail with a traceback about a partially initialized module, which names neither."""
+    """Libraries fail with a traceback about a partially initialized module, which has neither."""
     name = file.partition("/")[0].removesuffix(".py")
 
     found = put(file)
@@ -41,7 +41,7 @@ def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(
     ],
 )
 def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, tmp_path, name):
-    """Packages that ours need, that those need, that an extra needs, and ROS."""
+    """These are Palaestra's packages, their own dependencies, those of an extra, and ROS."""
     found = put(f"{name}.py")
 
     assert found == [f"{tmp_path / name}.py: shadows the module {name}, which Palaestra needs; rename it"]
@@ -58,19 +58,19 @@ def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, t
     ],
 )
 def test_what_shadows_nothing_is_left_alone(put, file):
-    """Python imports the right module there."""
+    """Python imports the right module in these cases."""
     assert put(file) == []
 
 
 def test_folders_of_installed_packages_are_somebodys_choice(put):
-    """On clusters for computing, modules for `module load` put whole site-packages on PYTHONPATH."""
+    """On HPC clusters, `module load` puts whole site-packages folders on PYTHONPATH."""
     put("numpy-2.0.0.dist-info/METADATA")
 
     assert put("numpy.py") == []
 
 
 def test_a_folder_that_is_missing_or_named_twice_changes_nothing(put, tmp_path):
-    """Python leaves it out."""
+    """Python ignores such an entry."""
     [reason] = put("queue.py")
 
     assert shadows(f"{tmp_path}/missing:{tmp_path}") == [reason]

@@ -21,7 +21,7 @@ VALUES = st.text(max_size=40)
 
 @given(st.dictionaries(NAMES, VALUES, max_size=6))
 def test_a_header_survives_the_wire(fields):
-    """Values may hold anything, `=` too; names may not hold `=`."""
+    """Values may contain anything, even `=`; names may not contain `=`."""
     framed = encode_header(fields)
 
     assert decode_header(framed[4:]) == fields
@@ -40,7 +40,7 @@ def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(payloads, siz
 
 @given(st.binary(max_size=60))
 def test_arbitrary_bytes_are_a_header_or_refused(data):
-    """Whatever connects to the port must not raise anything else."""
+    """Any client that connects to the port must cause no other error."""
     try:
         fields = decode_header(data)
     except FramingError:
@@ -50,6 +50,6 @@ def test_arbitrary_bytes_are_a_header_or_refused(data):
 
 
 def test_a_frame_too_large_to_be_true_is_refused():
-    """A stream out of step would otherwise wait for gigabytes."""
+    """After lost bytes, the reader would otherwise wait for gigabytes."""
     with pytest.raises(FramingError, match="out of step"):
         list(FrameReader().feed(struct.pack("<I", MAX_FRAME_BYTES + 1)))

@@ -1,4 +1,4 @@
-"""No field of a device is accepted that is neither applied, nor refused, nor named at the start."""
+"""Every field of a device is applied, refused, or reported at the start."""
 
 import pytest
 
@@ -33,7 +33,7 @@ NODES = {
     "appearance": "[ Appearance { } ]",
     "bones": "[ SolidReference { } ]",
 }
-# Steps of an editor, texts for people, and what Webots itself ignores.
+# Fields for an editor or for people, and fields that Webots itself ignores.
 FOR_PEOPLE = {
     "translationStep",
     "rotationStep",
@@ -42,7 +42,7 @@ FOR_PEOPLE = {
     "GPS.type",
     "TouchSensor.lookupTable",
 }
-# Where it would matter, it is looked at: for a light, a bumper of another type, a radar, a fluid and so on.
+# These fields are read only for some nodes, such as a light, another type of bumper, a radar or a fluid.
 ELSEWHERE = {
     "LightSensor.colorFilter", "LightSensor.occlusion",  # the stub refuses lights
     "TouchSensor.resolution", "DistanceSensor.redColorSensitivity", "GPS.noiseCorrelation",
@@ -78,21 +78,21 @@ FIELDS = [
 
 
 class Watched(dict):
-    """The fields of a node, which record those whose values somebody gets."""
+    """The fields of a node, which record the names of those that are read."""
 
     def __init__(self):
         super().__init__()
         self.looked_at = set()
 
     def get(self, name, default=None):
-        """Return the content of a field."""
+        """Return the content of a field, and record its name."""
         self.looked_at.add(name)
         return super().get(name, default)
 
 
 @pytest.fixture
 def watched(monkeypatch):
-    """Record, of each node, the fields whose values somebody gets."""
+    """Make each new node record the fields that are read."""
     begin = SceneNode.__init__
 
     def begun(node, *given):
@@ -126,7 +126,7 @@ def test_no_field_of_a_device_is_ignored_in_silence(physics):
     [(kind.node, name) for kind in DEVICES.values() for name in kind.without_effect.split()],
 )
 def test_a_field_without_effect_is_named_unless_it_has_its_default(type_name, name):
-    """A world that was saved by Webots has many defaults."""
+    """A world that Webots has saved contains many defaults."""
     kind = field_kinds(type_name)[name]
     line = f"1 {type_name}: without effect: {name}"
     words = {FieldType.STRING: f'"{kind.default}"', FieldType.NODE: "NULL"}.get(kind.type, kind.default)

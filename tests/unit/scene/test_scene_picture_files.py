@@ -1,4 +1,4 @@
-"""Pictures as files."""
+"""Pictures are saved to and loaded from files."""
 
 import struct
 import sys
@@ -30,7 +30,7 @@ def decode(data):
 
 
 def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
-    """Its checksums hold, so that other programs read it."""
+    """Its checksums are right, so that other programs read it."""
     path = tmp_path / "eye.PNG"
 
     assert picture_files.save(str(path), (2, 2), memoryview(BLUE + RED + RED + BLUE))
@@ -38,7 +38,7 @@ def test_a_picture_is_written_row_by_row_as_red_green_blue(tmp_path):
 
 
 def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
-    """With its alpha, if it was asked for."""
+    """Alpha is included if it was requested."""
     path, pixels = str(tmp_path / "eye.png"), BLUE + bytes((1, 2, 3, 4))
 
     assert picture_files.save(path, (2, 1), pixels, alpha=True)
@@ -46,7 +46,7 @@ def test_a_picture_is_loaded_as_it_was_saved(tmp_path):
 
 
 def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):
-    """Its colors are near those of the picture; a worse one is smaller."""
+    """Its colors are similar to those of the picture; a lower quality gives a smaller file."""
     path, pixels = tmp_path / "eye.jpg", bytes(range(256)) * 64
     assert picture_files.save(str(path), (64, 64), pixels, quality=100)
     best = path.stat().st_size
@@ -60,7 +60,7 @@ def test_a_jpeg_file_has_the_quality_that_was_asked_for(tmp_path):
 
 @pytest.mark.parametrize("data", [None, b"", b"GIF89a", b"\x89PNG\r\n\x1a\n broken"])
 def test_what_is_no_picture_is_not_loaded(tmp_path, data):
-    """Webots prints that it is unreadable."""
+    """Webots prints that the file is unreadable."""
     path = tmp_path / "logo.png"
     if data is not None:
         path.write_bytes(data)
@@ -75,13 +75,13 @@ def test_a_picture_that_cannot_be_written_is_a_failure(tmp_path):
 
 
 def test_other_formats_are_refused(tmp_path):
-    """A file of another format than its name says would be worse."""
+    """A file in another format than its name claims would be worse."""
     with pytest.raises(UnsimulatedError, match=r"use a name that ends in \.png or \.jpg"):
         picture_files.save(str(tmp_path / "eye.gif"), (1, 1), BLUE)
 
 
 def test_without_pillow_the_refusal_names_what_to_install(tmp_path, monkeypatch):
-    """PNG files are written all the same."""
+    """PNG files are written without Pillow."""
     monkeypatch.setitem(sys.modules, "PIL.Image", None)
 
     assert picture_files.save(str(tmp_path / "eye.png"), (1, 1), BLUE)

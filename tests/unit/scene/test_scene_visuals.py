@@ -1,4 +1,4 @@
-"""What cameras see of a world: shapes, colors, and the places that carry them."""
+"""The visible part of a world: shapes, colors, and the frames that carry them."""
 
 import math
 
@@ -16,7 +16,7 @@ RED = "appearance PBRAppearance { baseColor 1 0 0 }"
 
 @pytest.fixture
 def view(tmp_path):
-    """`view(nodes)`: what is visible of a world of these nodes."""
+    """`view(nodes)` returns the visible part of a world with these nodes."""
 
     def read(nodes, head="#VRML_SIM R2023b utf8\nWorldInfo { }"):
         path = tmp_path / "world.wbt"
@@ -30,7 +30,7 @@ def view(tmp_path):
 
 @pytest.fixture
 def things(view):
-    """`things(nodes)`: the visible shapes of a world of these nodes."""
+    """`things(nodes)` returns the visible shapes of a world with these nodes."""
     return lambda *texts: view(*texts).things()
 
 
@@ -47,7 +47,7 @@ def things(view):
     ],
 )
 def test_each_geometry_has_a_kind_and_a_size(things, geometry, kind, size):
-    """Sizes are whole lengths, as of the shapes that robots run into."""
+    """Sizes are full lengths, like those of the shapes for collisions."""
     (thing,) = things(f"Shape {{ geometry {geometry} }}")
 
     assert (thing.kind, thing.size) == (kind, size)
@@ -68,7 +68,7 @@ def test_each_geometry_has_a_kind_and_a_size(things, geometry, kind, size):
     ],
 )
 def test_each_appearance_is_one_color(things, appearance, color):
-    """Also one with a texture, which is not read, and one with numbers that are no color."""
+    """A texture is not read, and numbers that are not a color are accepted too."""
     (thing,) = things(f"Shape {{ appearance {appearance} geometry Box {{ }} }}")
 
     assert thing.color == color
@@ -87,12 +87,12 @@ def test_each_appearance_is_one_color(things, appearance, color):
     ],
 )
 def test_what_has_no_surface_is_not_drawn(things, shape):
-    """A shape that is only drawn is no reason to refuse a world."""
+    """A shape that cannot be drawn is not a reason to refuse a world."""
     assert things(shape) == ()
 
 
 def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
-    """A Pose has a place of its own; the frame inside it stays as it is."""
+    """A Pose has its own frame, but a Group does not."""
     (thing,) = things(
         f"Solid {{ translation 1 2 3 children [ Pose {{ translation 0 0 1 children [ "
         f"Group {{ children [ Shape {{ {RED} geometry Box {{ }} }} ] }} ] }} ] }}"
@@ -102,7 +102,7 @@ def test_a_shape_is_in_the_frame_of_the_nearest_place(things):
 
 
 def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
-    """An even one is that of a place; one that differs by axis changes the shape alone."""
+    """An equal scale on all axes belongs to the frame; another one changes only the shape."""
     even, uneven = things(
         "Transform { scale 2 2 2 children [ Transform { translation 1 0 0 children [ "
         "Shape { geometry Box { size 1 1 1 } } ] } ] }\n"
@@ -115,7 +115,7 @@ def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
 
 
 def test_a_stand_in_has_the_shapes_of_its_outline(things):
-    """In a color of its own, unless its author gave it an appearance; its floor is darker than its walls."""
+    """Its color is its own unless its author set an appearance; its floor is darker than its walls."""
     arena = things("RectangleArena { }")
     (box,) = things(f"SolidBox {{ {RED} }}")
 
@@ -125,7 +125,7 @@ def test_a_stand_in_has_the_shapes_of_its_outline(things):
 
 
 def test_shapes_of_joints_and_of_robots_move_with_them(things):
-    """So a camera finds what carries each."""
+    """A camera must find the frame that carries each of them."""
     body, wheel, floor = things(
         """Robot { name "r" boundingObject Box { } children [ Shape { geometry Box { } }
           HingeJoint { device RotationalMotor { } endPoint Solid {
@@ -139,7 +139,7 @@ def test_shapes_of_joints_and_of_robots_move_with_them(things):
 
 
 def test_a_mesh_of_points_has_triangles(things):
-    """A face with more corners is cut into triangles; a wrong index drops its face."""
+    """A face with more corners is cut into triangles, and a wrong index removes its face."""
     (thing,) = things(
         """Shape { geometry IndexedFaceSet {
           coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] }
@@ -151,7 +151,7 @@ def test_a_mesh_of_points_has_triangles(things):
 
 
 def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
-    """Its faces are written clockwise."""
+    """Its faces are listed clockwise."""
     (thing,) = things(
         """Shape { geometry IndexedFaceSet { ccw FALSE
           coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0 ] } coordIndex [ 0 1 2 ] } }"""
@@ -160,10 +160,10 @@ def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
     assert thing.mesh.triangles == ((0, 2, 1),)
 
 
-HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # of 3 square meters
+HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # has 3 square meters
 
 
-@pytest.mark.parametrize("first", [0, 1, 2])  # of the axes
+@pytest.mark.parametrize("first", [0, 1, 2])  # first axis
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_face_that_is_not_convex_is_cut_without_overlap(first, way):
     """Floors of houses are such faces."""
@@ -176,7 +176,7 @@ def test_a_face_that_is_not_convex_is_cut_without_overlap(first, way):
 
 
 def test_an_outline_that_crosses_itself_ends():
-    """It has no triangles that are right."""
+    """No triangulation of it is right, but the function must return."""
     star = [(0, 0, 0), (2, 2, 0), (0, 2, 0), (2, 0, 0), (1, 3, 0)]
 
     assert len(cut(star, [0, 1, 2, 3, 4])) == 3
@@ -190,7 +190,7 @@ def area(a, b, c):
 
 
 def test_a_grid_of_heights_is_a_mesh(things):
-    """Heights go along x first."""
+    """Heights are listed along x first."""
     (thing,) = things(
         "Shape { geometry ElevationGrid { xDimension 2 yDimension 2 xSpacing 3 height [ 0 0.5 1 2 ] } }"
     )
@@ -200,7 +200,7 @@ def test_a_grid_of_heights_is_a_mesh(things):
 
 
 def test_a_cylinder_of_an_old_file_stands_along_y(things):
-    """As Webots turns it when it reads one."""
+    """Webots turns it in the same way when it reads an old file."""
     world = """Solid { children [ Shape { geometry Cylinder { } } ] }"""
     (thing,) = things(world, "#VRML_SIM R2021b utf8\nWorldInfo { }")
 
@@ -216,12 +216,12 @@ def test_a_cylinder_of_an_old_file_stands_along_y(things):
     ],
 )
 def test_the_sky_has_one_color(view, background, sky):
-    """Black where a world has no background, as in Webots."""
+    """As in Webots, it is black if a world has no background."""
     assert view(background).sky() == sky
 
 
 def test_writes_that_are_visible_are_counted(view):
-    """A physics that draws then looks again; a write of `customData` makes it do nothing."""
+    """A physics that draws then reads the nodes again; a write of `customData` causes no work."""
     seen = view(f'Solid {{ name "s" children [ Shape {{ {RED} geometry Box {{ }} }} ] }}')
     solid = seen.root.nodes()[1]
     look = solid.nodes()[0].nodes("appearance")[0]

@@ -12,7 +12,7 @@ WORLD = Path("/worlds/collect-0.wbt")
 
 @pytest.fixture
 def path(tmp_path):
-    """Return a PATH on which the named programs are."""
+    """Return a function that creates programs, and returns a PATH with them."""
 
     def make(*programs):
         for program in programs:
@@ -24,7 +24,7 @@ def path(tmp_path):
 
 
 def test_the_stub_gets_the_world_and_its_options(path) -> None:
-    """Options come last, so that they are next to what the job's author wrote."""
+    """Options come last, as in the job."""
     folder = path("palaestra-stub")
 
     started = command(
@@ -36,7 +36,7 @@ def test_the_stub_gets_the_world_and_its_options(path) -> None:
 
 
 def test_mujoco_gets_the_world_and_its_options(path) -> None:
-    """It has the command line of the stub, so the same job needs no other options."""
+    """It has the same options as the stub, so a job needs no others."""
     folder = path("palaestra-mujoco")
 
     started = command(Driver.MUJOCO, Launch(world=WORLD, options=["--leave-out", "all"]), {"PATH": folder})
@@ -52,21 +52,21 @@ def test_mujoco_draws_on_one_thread(path) -> None:
 
 
 def test_mujoco_is_not_told_how_to_draw(path) -> None:
-    """It would load OpenGL at its start, and not start at all where there is none."""
+    """Otherwise it would load OpenGL at its start, and fail on a machine that lacks it."""
     started = command(Driver.MUJOCO, Launch(world=WORLD), {"PATH": path("palaestra-mujoco")})
 
     assert "MUJOCO_GL" not in started.environment
 
 
 def test_variables_of_the_job_decide_how_mujoco_draws(path) -> None:
-    """An image of one's own may have another library, or a GPU."""
+    """A user's image may have another library or a GPU."""
     given = {"PATH": path("palaestra-mujoco"), "MUJOCO_GL": "osmesa", "LP_NUM_THREADS": "4"}
 
     assert command(Driver.MUJOCO, Launch(world=WORLD), given).environment == given
 
 
 def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
-    """The trainer sets the mode when it is there to step."""
+    """The trainer sets the mode when it is ready to step."""
     folder = path("webots")
 
     started = command(Driver.WEBOTS, Launch(world=WORLD, options=["--port=1235"]), {"PATH": folder})
@@ -79,7 +79,7 @@ def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
 
 @pytest.mark.parametrize(("given", "user"), [({}, "palaestra"), ({"USER": "maria"}, "maria")])
 def test_webots_always_has_a_user(path, given, user) -> None:
-    """Its temporary folder is named after one, and a container has none."""
+    """Its temporary folder has the user's name, which a container does not set."""
     started = command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": path("webots"), **given})
 
     assert started.environment["USER"] == user
@@ -96,19 +96,19 @@ def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None
 
 
 def test_a_missing_program_is_named(tmp_path) -> None:
-    """That is known before anything is started, and trying again cannot help."""
+    """This is known before anything is started, and a retry cannot help."""
     with pytest.raises(SidecarError, match=r"^--driver webots: program webots not found; install it"):
         command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
 
 def test_a_driver_without_a_program_says_where_to_put_one() -> None:
-    """The two dashes are easily forgotten."""
+    """Users often forget the two dashes."""
     with pytest.raises(SidecarError, match=r"^--driver command: has no program; add it after --"):
         command(Driver.COMMAND, Launch(world=WORLD), {})
 
 
 def test_the_programs_beside_our_own_python_are_found_without_a_path(tmp_path) -> None:
-    """A virtual environment works without being activated."""
+    """A virtual environment need not be activated."""
     started = command(Driver.STUB, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
     assert Path(started.arguments[0]).name == "palaestra-stub"

@@ -12,9 +12,11 @@ print(json.dumps(sorted(name for name in sys.modules if name.startswith("palaest
 
 
 def test_signals_are_held_back_before_anything_else_is_imported():
-    """Each import before it is time in which process 1 of a container loses a SIGTERM.
+    """Until signals are blocked, process 1 of a container loses a SIGTERM.
 
-    What decides from where to import comes first, as a user's `signal.py` may be found in place of Python's.
+    Every earlier import makes that longer.
+
+    The import path is fixed before that, because a user's `signal.py` may shadow Python's.
     """
     said = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, check=True, timeout=60)
 

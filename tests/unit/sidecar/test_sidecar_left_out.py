@@ -18,7 +18,7 @@ from palaestra_sim.sidecar.left_out import read_left_out
     ],
 )
 def test_a_report_is_read_as_printable_lines(tmp_path, content, lines) -> None:
-    """They are shown on terminals."""
+    """Terminals show these lines."""
     file = tmp_path / "left-out"
     file.write_bytes(content)
 
@@ -26,7 +26,7 @@ def test_a_report_is_read_as_printable_lines(tmp_path, content, lines) -> None:
 
 
 def test_without_a_file_nothing_was_left_out(tmp_path) -> None:
-    """Most simulators write none. A pipe would block the sidecar for ever."""
+    """Most simulators write no file. A pipe would block the sidecar for ever."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "loop").symlink_to("loop")
 

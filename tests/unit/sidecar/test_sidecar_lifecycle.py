@@ -1,4 +1,4 @@
-"""The life of a simulator: the table says all of it, and its picture says the same."""
+"""The life of a simulator: one table defines it, and the picture in the docstring shows the same."""
 
 import re
 from itertools import product
@@ -14,7 +14,7 @@ ARROW = re.compile(r"^ {4}(\w+) +--(\w+)--> +(\w+) +(\w+)$", re.MULTILINE)
 
 
 def after(*events: LifecycleEvent, state: SidecarState = IDLE) -> SidecarState:
-    """Return the state after events that are all allowed."""
+    """Return the state after some allowed events."""
     for event in events:
         step = lifecycle.step(state, event)
         assert step is not None, f"{event} in {state}"
@@ -23,7 +23,7 @@ def after(*events: LifecycleEvent, state: SidecarState = IDLE) -> SidecarState:
 
 
 def test_the_picture_is_the_table() -> None:
-    """People read the docstring, the program reads the table."""
+    """People read the docstring, and the program reads the table."""
     picture = {
         (SidecarState(state), LifecycleEvent(event)): (SidecarState(then), Action(action))
         for state, event, then, action in ARROW.findall(lifecycle.__doc__ or "")
@@ -40,31 +40,31 @@ def test_a_life_that_goes_well() -> None:
 
 
 def test_a_simulator_that_failed_is_started_again() -> None:
-    """The decision is the trainer's; the sidecar only tells."""
+    """The trainer decides; the sidecar only reports."""
     assert after(LifecycleEvent.START, LifecycleEvent.EXITED) is FAILED
     assert after(LifecycleEvent.START, LifecycleEvent.EXITED, LifecycleEvent.START) is STARTING
 
 
 @pytest.mark.parametrize("state", [STARTING, READY, STOPPING])
 def test_a_simulator_is_not_started_where_one_runs(state) -> None:
-    """Rule 1: two with the same ROS names would throw each other out of the master."""
+    """Rule 1: two with the same ROS names would unregister each other from the master."""
     assert lifecycle.step(state, LifecycleEvent.START) is None
 
 
 @pytest.mark.parametrize("state", [state for state in SidecarState if state is not STARTING])
 def test_only_a_starting_simulator_gets_ready(state) -> None:
-    """Rule 2: a round trip that was on its way when the simulator died proves nothing."""
+    """Rule 2: a response that was sent before the simulator died proves nothing."""
     assert lifecycle.step(state, LifecycleEvent.READY) is None
 
 
 @pytest.mark.parametrize("state", [STARTING, READY])
 def test_an_exit_that_nobody_announced_is_a_fault(state) -> None:
-    """Rule 3: whatever its code."""
+    """Rule 3: this holds for every exit code."""
     assert lifecycle.step(state, LifecycleEvent.EXITED) == (FAILED, Action.BLAME)
 
 
 def test_an_exit_after_an_announced_stop_is_wanted() -> None:
-    """Rule 3: also when the deadline had to kill it."""
+    """Rule 3: this holds also if it had to be killed at the deadline."""
     assert (
         after(LifecycleEvent.START, LifecycleEvent.STOP, LifecycleEvent.DEADLINE, LifecycleEvent.EXITED)
         is IDLE
@@ -72,19 +72,19 @@ def test_an_exit_after_an_announced_stop_is_wanted() -> None:
 
 
 def test_a_stop_can_be_repeated() -> None:
-    """Rule 4: a trainer in a hurry brings the deadline forward."""
+    """Rule 4: a second request may shorten the deadline."""
     assert lifecycle.step(STOPPING, LifecycleEvent.STOP) == (STOPPING, Action.WAIT)
 
 
 @pytest.mark.parametrize("state", [IDLE, FAILED])
 def test_where_nothing_runs_there_is_nothing_to_stop(state) -> None:
-    """Rule 6: and the reason of a failure stays to be read."""
+    """Rule 6: the reason of a failure also stays readable."""
     assert lifecycle.step(state, LifecycleEvent.STOP) is None
 
 
 @pytest.mark.parametrize("state", SidecarState)
 def test_the_end_of_the_container_is_allowed_everywhere(state) -> None:
-    """Rule 5: a kubelet does not ask twice."""
+    """Rule 5: a kubelet sends only one request."""
     running = state in {STARTING, READY, STOPPING}
 
     step = lifecycle.step(state, LifecycleEvent.SHUTDOWN)
@@ -92,14 +92,14 @@ def test_the_end_of_the_container_is_allowed_everywhere(state) -> None:
 
 
 def test_every_state_can_be_left_and_reached() -> None:
-    """A state without a way out would be a simulator that is lost."""
+    """A simulator in a state without a way out would be lost."""
     ways = {(state, then) for (state, _), (then, _) in TABLE.items() if state is not then}
 
     assert {state for state, _ in ways} == {then for _, then in ways} == set(SidecarState)
 
 
 def test_what_the_table_does_not_have_is_refused() -> None:
-    """Rule 6: fifteen of thirty pairs."""
+    """Rule 6 refuses fifteen of thirty pairs."""
     refused = [pair for pair in product(SidecarState, LifecycleEvent) if lifecycle.step(*pair) is None]
 
     assert len(refused) == 15

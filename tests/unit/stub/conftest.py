@@ -1,7 +1,7 @@
-"""A ROS without sockets: services called by path, as a client would, and topics that keep what was sent.
+"""A ROS without sockets: tests call services by path, as a client does, and topics keep the sent messages.
 
-Requests and responses go through the real message types, so a field that the type does not have is an
-error here too.
+Requests and responses go through the real message types, so a field that the type does not have is an error
+here too.
 """
 
 import heapq
@@ -25,7 +25,7 @@ PENDING = object()
 
 
 class FakePublisher:
-    """Keeps what was sent while somebody was subscribed."""
+    """A publisher that delivers messages to the inboxes of its topic."""
 
     def __init__(self, topic, type_name, template, latched, reading):
         self.topic = topic
@@ -36,19 +36,19 @@ class FakePublisher:
 
     @property
     def heard(self):
-        """Whether there is a subscriber."""
+        """Whether the topic has a subscriber."""
         return bool(self.topic.inboxes)
 
     def send(self, fields):
-        """Keep the template with these fields."""
+        """Deliver the template with these fields."""
         self.topic.deliver({**self.template, **fields})
 
     def send_stamped(self, fields):
-        """Keep the template with these fields, as `send` does."""
+        """Deliver the template with these fields, as `send` does."""
         self.send(fields)
 
     def send_value(self, value):
-        """Keep the value alone."""
+        """Deliver only the value."""
         self.topic.deliver(value)
 
 
@@ -66,7 +66,7 @@ class FakeTopic:
 
 
 class FakeNode:
-    """A node as the controller sees it, and as a client does: `call`."""
+    """A node for both sides: the controller serves, and a client uses `call`."""
 
     def __init__(self, ros, name):
         self.name = name
@@ -80,7 +80,7 @@ class FakeNode:
         self._calls = itertools.count()
 
     def serve(self, path, type_name, handler):
-        """Take a service, once."""
+        """Register a service; its path must be new."""
         assert path not in self.services, f"{path} served twice"
         self.services[path] = (service_type(type_name), handler)
 
@@ -89,33 +89,33 @@ class FakeNode:
         return nullcontext()
 
     def advertise(self, path, type_name, *, latched=False, template=None, reading=""):
-        """Return a publisher that keeps what it sends."""
+        """Return a publisher of a topic."""
         topic = self._ros.topic(path if path.startswith("/") else f"/{self.name}/{path}")
         publisher = FakePublisher(topic, type_name, dict(template or {}), latched, reading)
         topic.publishers.append(publisher)
         return publisher
 
     def withdraw(self, publisher):
-        """Forget a publisher."""
+        """Remove a publisher."""
         publisher.topic.publishers.remove(publisher)
 
     def answer(self, call, fields):
-        """Answer a call that was put off, then what waited behind it."""
+        """Respond to a deferred call, and then handle the calls that waited behind it."""
         number, type_ = call
         self.answers[number] = _travelled(type_.response, fields)
         self.later(0, self._take_waiting)
 
     def later(self, delay_s, callback):
-        """Call back when `advance` has come that far."""
+        """Schedule a callback for the time when `advance` reaches it."""
         self._ros.later(delay_s, callback)
 
     def close(self):
-        """Serve no more."""
+        """Remove all services."""
         self.closed = True
         self.services.clear()
 
     def ask(self, path, **fields):
-        """Send a request and return its number; the answer is in `answers`, once there is one."""
+        """Send a request and return its number; its response appears in `answers`."""
         number = next(self._calls)
         if self.blocked():
             self._waiting.append((number, path, fields))
@@ -124,7 +124,7 @@ class FakeNode:
         return number
 
     def call(self, path, **fields):
-        """Call a service, and let happen what does right after the answer; PENDING if none comes."""
+        """Call a service, run callbacks that are due at once, and return the response, or PENDING."""
         number = self.ask(path, **fields)
         self._ros.advance(0)
         answer = self.answers.get(number, PENDING)
@@ -133,19 +133,19 @@ class FakeNode:
         return answer
 
     def get(self, path, **fields):
-        """Call a service and return the one field of its response."""
+        """Call a service and return the only field of its response."""
         (value,) = self.call(path, **fields)
         return value
 
     def inbox(self, path):
-        """Subscribe, and return the list that messages come into."""
+        """Subscribe, and return the list that receives the messages."""
         messages = []
         name = path if path.startswith("/") else f"/{self.name}/{path}"
         self._ros.topic(name).inboxes.append(messages)
         return messages
 
     def publishers(self, path):
-        """Return who publishes a topic below this node's name."""
+        """Return the publishers of a topic below this node's name."""
         return self._ros.topic(f"/{self.name}/{path}").publishers
 
     def _handle(self, number, path, fields):
@@ -165,7 +165,7 @@ class FakeNode:
 
 
 class FakeRos:
-    """Nodes, topics and a clock that only `advance` moves."""
+    """A ROS with nodes, topics and a clock that only `advance` moves."""
 
     def __init__(self):
         self.now_s = 100.0
@@ -193,11 +193,11 @@ class FakeRos:
         return self.now_s
 
     def later(self, delay_s, callback):
-        """Call back when `advance` has come that far."""
+        """Schedule a callback for the time when `advance` reaches it."""
         heapq.heappush(self._timers, (self.now_s + delay_s, next(self._order), callback))
 
     def advance(self, duration_s):
-        """Let time pass, and everything happen that was to happen by then."""
+        """Move the clock, and run every callback that is due."""
         end_s = self.now_s + duration_s
         while self._timers and self._timers[0][0] <= end_s:
             due_s, _, callback = heapq.heappop(self._timers)
@@ -212,13 +212,13 @@ def _travelled(codec, fields):
 
 @pytest.fixture
 def ros():
-    """An empty ROS."""
+    """A ROS without nodes."""
     return FakeRos()
 
 
 @pytest.fixture
 def start(ros, tmp_path):
-    """Start a stub: `start(world=..., mode=..., options=...)` returns the Simulator."""
+    """Return `start(world=..., mode=..., options=...)`, which starts a stub and returns its Simulator."""
 
     def begin(world=None, mode=Mode.FAST, **options):
         path = tmp_path / "worlds" / "arena.wbt"
@@ -247,14 +247,14 @@ def robot(ros, start):
 
 @pytest.fixture
 def two_robots(ros, start):
-    """The nodes of the shipped world with a separate supervisor: supervisor, robot."""
+    """The nodes of the built-in world with a separate supervisor: supervisor and robot."""
     start(builtin("two_robots"))
     return ros.node("supervisor"), ros.node("robotino")
 
 
 @pytest.fixture
 def drive():
-    """`drive(node, vx, vy, omega)`: command the wheels over ROS, as a facade does."""
+    """`drive(node, vx, vy, omega)` commands the wheels over ROS, as a facade does."""
 
     def command(node, vx, vy, omega):
         speeds = (
@@ -271,7 +271,7 @@ def drive():
 
 @pytest.fixture
 def position():
-    """`position(node, "ROBOTINO")`: x, y, z of a node by its DEF, over ROS."""
+    """`position(node, "ROBOTINO")` returns x, y, z of a node by its DEF, over ROS."""
 
     def ask(node, def_name):
         handle = node.get("supervisor/get_from_def", name=def_name)
@@ -283,7 +283,7 @@ def position():
 
 @pytest.fixture
 def world():
-    """`world(objects, robot=...)`: a world file around a few nodes, with a robot unless told otherwise."""
+    """`world(objects, robot=...)` returns a world file with these nodes, and with a robot by default."""
 
     def write(objects="", robot=ROBOT, info=""):
         return f"#VRML_SIM R2023b utf8\nWorldInfo {{ {info} }}\n{objects}\n{robot}\n".encode()
@@ -292,7 +292,7 @@ def world():
 
 
 def _wheel(index):
-    """Return a wheel of the Robotino 3: 0.1826 m from its middle, of radius 0.063 m, on a radial axle."""
+    """Return a wheel of the Robotino 3 at 0.1826 m from its center, with radius 0.063 m and a radial axle."""
     azimuth = math.radians(180 + 120 * index)
     c, s = math.cos(azimuth), math.sin(azimuth)
     place = f"{0.1826 * c!r} {0.1826 * s!r} 0.063"
@@ -323,5 +323,5 @@ ROBOT = f"""DEF ROBOTINO Robot {{
 
 @pytest.fixture
 def simple_robot():
-    """The text of a robot of radius 0.2 m with one noiseless ray that tells 1 - distance."""
+    """The text of a robot of radius 0.2 m with one noiseless ray whose value is 1 - distance."""
     return ROBOT

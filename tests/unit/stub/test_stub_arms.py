@@ -1,4 +1,4 @@
-"""Joints with motors, brakes and sensors, and the devices that only keep what a program sets."""
+"""Joints with motors, brakes and sensors, and devices that only store their settings."""
 
 import math
 
@@ -21,13 +21,13 @@ CAMERA = """Camera { name "eye" width 320 height 200 focus Focus { focalDistance
 
 @pytest.fixture
 def load(world, simple_robot):
-    """`load(part)`: a simulation whose robot has that part."""
+    """`load(part)` returns a simulation whose robot has that part."""
     return lambda part: load_scene(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
 
 
 @pytest.fixture
 def robot_with(start, world, simple_robot, ros):
-    """`robot_with(part)`: the node of a robot that has that part."""
+    """`robot_with(part)` returns the node of a robot that has that part."""
 
     def begin(part):
         start(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
@@ -37,7 +37,7 @@ def robot_with(start, world, simple_robot, ros):
 
 
 def test_a_linear_motor_lifts_what_is_on_its_slider_as_far_as_the_stop(load):
-    """Lengths are in meters: 0.1 m/s for 0.32 s, then on to the stop at 0.2 m."""
+    """The motor moves at 0.1 m/s for 0.32 s, and then on to its stop at 0.2 m."""
     simulation = load(LIFT)
     (robot,) = simulation.robots
     start = robot.sensors["top"]
@@ -54,7 +54,7 @@ def test_a_linear_motor_lifts_what_is_on_its_slider_as_far_as_the_stop(load):
 
 
 def test_a_linear_motor_has_services_for_force_and_none_for_torque(robot_with):
-    """The advertised set depends on the kind of motor; `get_type` answers 1."""
+    """The services depend on the type of the motor; `get_type` returns 1."""
     robot = robot_with(LIFT)
 
     assert robot.get("lift/get_type") == 1
@@ -65,7 +65,7 @@ def test_a_linear_motor_has_services_for_force_and_none_for_torque(robot_with):
 
 
 def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
-    """In whatever order the world has them; "" for one that a joint lacks."""
+    """This holds for any order in the world; "" means that the joint lacks the device."""
     robot = robot_with(LIFT)
 
     assert robot.get("lift/get_brake_name") == "grip"
@@ -80,7 +80,7 @@ def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
 
 
 def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
-    """6 N m against 3 N m s/rad are 2 rad/s; without the brake it turns at 5 rad/s again."""
+    """6 N m against 3 N m s/rad give 2 rad/s; without the brake it turns at 5 rad/s again."""
     robot = robot_with(WRIST)
     angles = robot.inbox("turn/value")
     robot.call("turn/enable", value=STEP_MS)
@@ -97,7 +97,7 @@ def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
 
 
 def test_a_brake_slows_a_driven_wheel(load):
-    """The motors of wheels turn with the body, and the rule is the same."""
+    """The motors of wheels turn with the body, but the same rule holds."""
     simulation = load("")
     (robot,) = simulation.robots
     for motor in robot.motors.values():
@@ -111,7 +111,7 @@ def test_a_brake_slows_a_driven_wheel(load):
 
 
 def test_an_led_keeps_its_state(robot_with):
-    """Nobody sees it, but a program reads it back."""
+    """The LED is invisible, but a program reads its state."""
     robot = robot_with('LED { name "lamp" color [ 1 0 0, 0 1 0 ] }')
 
     assert robot.get("lamp/get_led") == 0
@@ -121,7 +121,7 @@ def test_an_led_keeps_its_state(robot_with):
 
 
 def test_a_camera_answers_its_settings_and_fails_to_see(robot_with):
-    """A success of `enable` would leave a client waiting for images."""
+    """A success of `enable` would let a client wait for images for ever."""
     robot = robot_with(CAMERA)
 
     info = robot.call("eye/get_info")
@@ -136,7 +136,7 @@ def test_a_camera_answers_its_settings_and_fails_to_see(robot_with):
 
 
 def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
-    """The answer is success for every value, as in the controller; one beyond the limits changes nothing."""
+    """As in the controller, every call succeeds; a value beyond the limits changes nothing."""
     robot = robot_with(CAMERA)
 
     for fov in (1.0, 1.3):
@@ -152,7 +152,7 @@ def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
 
 
 def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
-    """And it has no services for recognition."""
+    """It also has no services for recognition."""
     robot = robot_with('Camera { name "eye" }')
 
     robot.call("eye/set_fov", value=1.0)
@@ -164,7 +164,7 @@ def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
 
 
 def test_a_range_finder_answers_its_settings_alone(robot_with):
-    """Like a camera."""
+    """A camera behaves in the same way."""
     robot = robot_with('RangeFinder { name "it" maxRange 3 }')
     answer = robot.call("it/get_info")
 
@@ -173,7 +173,7 @@ def test_a_range_finder_answers_its_settings_alone(robot_with):
 
 
 def test_a_skin_has_no_bones_and_whatever_needs_one_fails(robot_with):
-    """The stub loads no meshes; Webots itself crashes for the name of a bone that does not exist."""
+    """The stub loads no meshes; Webots itself crashes for an unknown bone."""
     robot = robot_with('Skin { name "anna" }')
 
     assert robot.get("anna/get_bone_count") == 0
@@ -192,7 +192,7 @@ TANK = """Robot { name "tank" controller "ros" controllerArgs [ "--name=tank" "-
 
 
 def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
-    """A belt moves the robot by as many meters as its motor turns; there is no slip."""
+    """Without slip, a belt moves the robot by as many meters as its motor turns."""
     (robot,) = (simulation := load_scene(world(robot=TANK))).robots
     for name, speed in (("left", 0.1), ("right", 0.2)):
         robot.motors[name].set_position(math.inf)
@@ -214,7 +214,7 @@ def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
 
 
 def test_what_is_at_the_end_of_a_joint_is_refused_if_it_is_unknown(load):
-    """A gripper of an unknown type would be missing without a word."""
+    """Otherwise a gripper of an unknown type would silently be missing."""
     with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
         load("HingeJoint { endPoint Minotaur { } }")
     with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
@@ -224,7 +224,7 @@ def test_what_is_at_the_end_of_a_joint_is_refused_if_it_is_unknown(load):
 
 
 def test_a_sensor_on_a_caster_is_one_of_the_robot_s(load):
-    """A joint without motors is fixed, and everything on it is there."""
+    """A joint without a motor is fixed, and everything on it belongs to the robot."""
     (robot,) = load('BallJoint { endPoint Solid { children [ GPS { name "low" } ] } }').robots
 
     assert "low" in robot.sensors

@@ -1,4 +1,4 @@
-"""Worlds whose y axis points up: the same motion and readings, in the axes of the file."""
+"""Worlds whose y axis points up have the same motions and readings, in the axes of the file."""
 
 import math
 
@@ -13,7 +13,7 @@ from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse
 from palaestra_sim.world.stand_ins import shipped
 
-LYING = "1 0 0 -1.5707963267948966"  # of what stands along z, in a world whose y axis points up
+LYING = "1 0 0 -1.5707963267948966"  # of a solid that lies along z, in a world whose y axis points up
 E_PUCK = """E-puck { translation %s rotation %s controller "ros" controllerArgs [ "--name=a" "--synchronize" ]
   turretSlot [ GPS { } ] }"""
 WALL = "Solid { translation %s boundingObject Box { size %s } }"
@@ -25,26 +25,26 @@ TWINS = {
 
 
 def load(text, header="R2023b", leave_out=None):
-    """The simulation of a world that may use what ships."""
+    """Return the simulation of a world that may use the bundled PROTOs and stand-ins."""
     world = parse(f"#VRML_SIM {header} utf8\n{text}".encode(), "my.wbt")
     descriptions = Descriptions(protos=builtin_protos(), stand_ins=shipped())
     return Simulation.of(world, StubPhysics(), "my.wbt", descriptions=descriptions, leave_out=leave_out)
 
 
 def load_twin(system):
-    """The same E-puck before the same wall, in a world with these axes."""
+    """Return the same E-puck in front of the same wall, in a world with these axes."""
     info = f'WorldInfo {{ basicTimeStep 16 coordinateSystem "{system}" }}'
     return load("\n".join([info, *TWINS[system]]))
 
 
 def y_up(vector):
-    """A vector of a world whose z axis points up, in one whose y axis does."""
+    """Return a vector of a world whose z axis points up in the axes of one whose y axis does."""
     x, y, z = vector
     return x, z, -y
 
 
 def drive(simulation, left, right, steps=20):
-    """Drive the E-puck with these speeds of its wheels."""
+    """Drive the E-puck with these wheel speeds."""
     (robot,) = simulation.robots
     for name, speed in (("left wheel motor", left), ("right wheel motor", right)):
         robot.motors[name].set_position(math.inf)
@@ -56,7 +56,7 @@ def drive(simulation, left, right, steps=20):
 
 @pytest.mark.parametrize(("left", "right"), [(3.0, 3.0), (-3.0, -2.0), (2.0, -2.0)])
 def test_a_robot_drives_and_sees_alike_whichever_axis_points_up(left, right):
-    """Only the axes in which clients see it differ."""
+    """Clients see the same, only in other axes."""
     twin, robot = (drive(load_twin(system), left, right) for system in ("ENU", "NUE"))
 
     assert robot.place.translation == pytest.approx(y_up(twin.place.translation))
@@ -69,7 +69,7 @@ def test_a_robot_drives_and_sees_alike_whichever_axis_points_up(left, right):
 
 
 def test_a_supervisor_places_a_robot_in_the_axes_of_the_file():
-    """A field that is written is read back; a reset returns to the file."""
+    """The value of a written field is read back, and a reset returns to that of the file."""
     simulation = load_twin("NUE")
     (robot,) = simulation.robots
     robot.place.translation = (0.5, 0.25, 1.0)
@@ -104,7 +104,7 @@ def test_a_robot_that_lies_in_a_world_is_refused():
 
 
 def test_what_is_added_stands_in_the_axes_of_the_file():
-    """Both come from the same author."""
+    """The text and the world have the same author."""
     simulation = load('WorldInfo { coordinateSystem "EUN" }')
     root = simulation.tree.root
     children = simulation.tree.field_of(root, "children", simulation)
@@ -114,13 +114,13 @@ def test_what_is_added_stands_in_the_axes_of_the_file():
 
 
 def test_an_unknown_system_of_axes_is_a_mistake():
-    """Webots knows three."""
+    """Webots knows three systems."""
     with pytest.raises(WorldError, match='coordinateSystem "UP" is none of ENU, NUE, EUN; write one of them'):
         load('WorldInfo { coordinateSystem "UP" }', leave_out=LeaveOut(everything=True))
 
 
 def test_what_comes_with_webots_is_turned_in_an_old_world():
-    """Its files are of today, so x of a box was -z of the world, and z was y."""
+    """Its files have today's axes: x of a box became -z of the world, and z became y."""
     old = load("WorldInfo { } WoodenBox { translation 0 1.5 0 size 1 2 3 }", "R2021a")
     (box,) = old.scene.solids
 
@@ -161,13 +161,16 @@ FORWARD = {"R2023b": (1.0, 0.0, 0.0), "R2021b": (0.0, 0.0, -1.0)}
 
 
 def load_car(release):
-    """The same car before the same post, in a world of a release, with its axes."""
+    """Return the same car in front of the same post, in a world of a release with its axes."""
     return load(f"WorldInfo {{ basicTimeStep 16 }} {CARS[release]} {POSTS[release]}", release)
 
 
 @pytest.mark.parametrize(("left", "right"), [(3.0, 3.0), (-3.0, -2.0), (2.0, -2.0)])
 def test_a_world_of_old_axes_is_the_same_world(left, right):
-    """Robots looked along -z there, with y up, and cylinders stood along y. Webots turns what it loads."""
+    """Robots looked along -z there, y pointed up, and cylinders stood along y.
+
+    Webots turns such worlds when it loads them.
+    """
     twin, robot = (drive(load_car(release), left, right) for release in CARS)
     places = [it.parts.node.place for it in (twin, robot)]
 
@@ -203,7 +206,7 @@ def test_a_supervisor_turns_a_robot_of_old_axes_in_the_axes_of_the_file():
 
 
 def test_a_robot_of_webots_drives_in_an_old_world():
-    """Its file is of today: Webots turns the instance, and so does the stub."""
+    """Its file has today's axes: Webots turns the instance, and the stub does too."""
     forward = "0 1 0 -1.5707963267948966"  # -z is x of the world
     wall = WALL % ("1.1 0.05 -2", "0.01 0.1 1")
     old = load(f"WorldInfo {{ basicTimeStep 16 }} {E_PUCK % ('1 0 -2', forward)} {wall}", "R2021b")

@@ -1,4 +1,4 @@
-"""Robots of any wheels and outline on the floor: pairs of wheels, boxes, rows of discs."""
+"""Robots with any wheels and outline on the floor: pairs of wheels, boxes, rows of discs."""
 
 import math
 
@@ -23,7 +23,7 @@ PAIR = [Wheel(x_m=0.0, y_m=y_m, axle=(0.0, 1.0), radius_m=0.05) for y_m in (0.1,
 
 @pytest.fixture
 def pair():
-    """`pair(outline, obstacles, others)`: a body on two wheels, and a function that drives it."""
+    """`pair(outline, obstacles, others)` returns a body on two wheels, and a function that drives it."""
 
     def make(outline=ROUND, obstacles=(), others=()):
         motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]
@@ -43,7 +43,7 @@ def pair():
 
 
 def test_two_wheels_drive_a_robot(pair):
-    """Equal speeds are straight on; the right one faster is a turn to the left."""
+    """With equal speeds it drives straight on; with a faster right wheel it turns to the left."""
     body, go = pair()
 
     go(4.0, 4.0, 10)
@@ -54,7 +54,7 @@ def test_two_wheels_drive_a_robot(pair):
 
 
 def test_two_wheels_speed_up_as_three_do(pair):
-    """10 m/s2, whatever the robot: friction sets it."""
+    """The limit is 10 m/s2 for every robot, because friction sets it."""
     body, go = pair()
 
     go(60.0, 60.0, 1)
@@ -65,7 +65,7 @@ def test_two_wheels_speed_up_as_three_do(pair):
 
 
 def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
-    """A push to the side is over with the next step, one straight on fades."""
+    """A push to the side ends with the next step; one straight on fades."""
     body, go = pair()
 
     body.push(2.0, 1.0, 0.0)
@@ -77,7 +77,7 @@ def test_a_pushed_pair_of_wheels_keeps_what_it_can(pair):
 
 
 def test_a_body_without_wheels_stays():
-    """A push is over with the next step."""
+    """A push ends with the next step."""
     body = StubBody(MobileBase(), ROUND)
     body.push(1.0, 0.0, 0.5)
 
@@ -87,14 +87,14 @@ def test_a_body_without_wheels_stays():
 
 
 def test_a_drive_wants_one_motor_a_wheel():
-    """A mistake of the reader, not of the world."""
+    """Such a mismatch is a bug of the loader, not of the world."""
     with pytest.raises(ValueError, match="do not fit a drive of 2 wheels"):
         MobileBase([Motor(MotorSpec(name="alone"))], find_drive(PAIR))
 
 
 @pytest.mark.parametrize(("heading", "half"), [(0.0, 0.3), (math.pi / 2, 0.1), (math.pi, 0.3)])
 def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
-    """Half its length ahead, half its width to the side."""
+    """The distance is half its length ahead, and half its width to the side."""
     body = StubBody(MobileBase(), LONG)
     body.face(Neighborhood([Block(1.05, 0.0, 0.0, (0.1, 4.0))], body.radius), ())
     body.place(1.0 - half + 0.02, 0.0, heading)
@@ -106,7 +106,7 @@ def test_a_long_robot_stops_at_a_wall_with_its_own_side(heading, half):
 
 
 def test_a_long_robot_that_turns_at_a_wall_moves_off(pair):
-    """Its front pushes the whole robot away; nothing enters the wall."""
+    """Its front pushes the whole robot away, so that no part enters the wall."""
     body, go = pair(LONG, [Block(0.0, 1.05, 0.0, (40.0, 0.1))])
     body.place(0.0, 0.85, 0.0)
 
@@ -119,7 +119,7 @@ def test_a_long_robot_that_turns_at_a_wall_moves_off(pair):
 
 
 def test_a_fast_turn_does_not_swing_through_a_pole(pair):
-    """Between two steps the end of a long robot travels further than the pole is thick."""
+    """Within one step, the end of a long robot moves further than the pole is thick."""
     pole = Disc(0.0, 0.5, 0.01)
     body, go = pair(discs_of_box(0.0, 0.0, 0.0, 1.2, 0.04), [pole])
     body.place(0.0, 0.0, math.pi / 2 - 0.5)
@@ -131,7 +131,7 @@ def test_a_fast_turn_does_not_swing_through_a_pole(pair):
 
 
 def test_an_outline_beside_the_origin_goes_along(pair):
-    """One disc that is not centered is where it was put, at every heading."""
+    """A single disc off the origin keeps its offset at every heading."""
     body, _ = pair([RoundPart(0.2, 0.1, 0.05)])
 
     body.place(1.0, 2.0, math.pi / 2)
@@ -142,7 +142,7 @@ def test_an_outline_beside_the_origin_goes_along(pair):
 
 
 def test_a_robot_meets_every_disc_of_another(pair):
-    """And the other one feels it."""
+    """The other robot feels the contact, too."""
     other = StubBody(MobileBase(), LONG)
     other.place(1.0, 0.5, 0.0)
     body, go = pair(others=[other])
@@ -172,7 +172,7 @@ def test_rays_meet_every_disc_of_a_robot():
     heading=st.floats(-3, 3),
 )
 def test_a_long_robot_never_ends_inside_anything(commands, heading):
-    """Also where it turns in a corner."""
+    """This holds also when it turns in a corner."""
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]

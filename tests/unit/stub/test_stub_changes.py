@@ -1,4 +1,4 @@
-"""Worlds that change while they run: nodes added and removed, saved states, joints put by hand."""
+"""Worlds that change while they run: nodes are added and removed, states saved, joints moved."""
 
 import math
 
@@ -12,14 +12,14 @@ STEP_MS = 32
 
 @pytest.fixture
 def children(robot):
-    """The handle of the root's children."""
+    """The handle of the root's `children` field."""
     root = robot.get("supervisor/get_root")
     return robot.get("supervisor/node/get_field", node=root, fieldName="children")
 
 
 @pytest.fixture
 def add(robot, children):
-    """`add(text, position)`: the answer of an import into the root's children."""
+    """`add(text, position)` returns the response to an import into the root's children."""
 
     def call(text, position=-1, field=None):
         return robot.get(
@@ -34,7 +34,7 @@ def add(robot, children):
 
 @pytest.fixture
 def find(robot):
-    """`find("WALL")`: the handle of a node by its DEF."""
+    """`find("WALL")` returns the handle of a node by its DEF."""
     return lambda name: robot.get("supervisor/get_from_def", name=name)
 
 
@@ -44,7 +44,7 @@ def count(robot, field):
 
 
 def test_an_added_node_is_found_and_counts_at_once(robot, children, add, find):
-    """Also while the simulation is paused, as in Webots."""
+    """As in Webots, this holds also while the simulation is paused."""
     before = count(robot, children)
 
     assert add(WALL) == 1
@@ -57,7 +57,7 @@ def test_an_added_node_is_found_and_counts_at_once(robot, children, add, find):
 
 
 def test_several_nodes_are_added_in_their_order_before_the_position(robot, children, add, find):
-    """A position counts from 0, or from the end."""
+    """A position counts from 0, or from the end if it is negative."""
     assert add("DEF A Group { } DEF B Group { }", position=1) == 1
 
     assert robot.get("supervisor/field/get_node", field=children, index=1) == find("A")
@@ -65,7 +65,7 @@ def test_several_nodes_are_added_in_their_order_before_the_position(robot, child
 
 
 def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
-    """Rays see it at the next step."""
+    """Rays meet it from the next step on."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -90,7 +90,7 @@ def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
 
 
 def test_a_removed_node_is_gone_with_its_handle_and_its_number(robot, children, add, find):
-    """In Webots the handle is a dangling pointer."""
+    """In Webots the handle would be a dangling pointer."""
     add("DEF OUTER Pose { children [ DEF INNER Solid { } ] }")
     outer, inner = find("OUTER"), find("INNER")
     number = robot.get("supervisor/node/get_id", node=inner)
@@ -107,7 +107,7 @@ def test_a_removed_node_is_gone_with_its_handle_and_its_number(robot, children, 
 
 @pytest.mark.parametrize("service", ["remove_node", "remove"])
 def test_a_node_is_removed_by_its_place_in_a_field(robot, children, add, find, service):
-    """`remove` takes nodes too, as `wb_supervisor_field_remove_mf` does."""
+    """`remove` removes nodes too, as `wb_supervisor_field_remove_mf` does."""
     add(WALL)
     index = "position" if service == "remove_node" else "index"
 
@@ -128,7 +128,7 @@ def test_a_node_is_removed_by_its_place_in_a_field(robot, children, add, find, s
     ],
 )
 def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, text, message):
-    """All or nothing, with the place in the text."""
+    """Either everything is added or nothing; the message has the position in the text."""
     before = count(robot, children)
 
     with pytest.raises(ServiceFailed, match=message):
@@ -138,7 +138,7 @@ def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, te
 
 
 def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children, add):
-    """Of the count, or of a field that holds numbers."""
+    """The position is outside the field, or the field holds numbers."""
     own = robot.get("supervisor/get_self")
     numbers = robot.get("supervisor/node/get_field", node=own, fieldName="translation")
     before = count(robot, children)
@@ -149,14 +149,14 @@ def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children
 
 
 def test_a_running_robot_and_its_parts_cannot_be_removed(robot, find):
-    """A success without the effect would leave a client with another robot than it thinks."""
+    """If it succeeded without an effect, the client would have a wrong idea of the robot."""
     for name in ("ROBOTINO", "BODY"):
         with pytest.raises(ServiceFailed, match="remove"):
             robot.get("supervisor/node/remove", node=find(name))
 
 
 def test_a_reset_removes_what_was_added_and_brings_nothing_back(start, ros):
-    """As in Webots."""
+    """Webots does the same."""
     simulation = start().simulation
     node = ros.node("robotino")
     root = node.get("supervisor/get_root")
@@ -172,7 +172,7 @@ def test_a_reset_removes_what_was_added_and_brings_nothing_back(start, ros):
 
 
 def test_a_state_holds_a_node_and_all_inside_it(start, ros):
-    """A robot goes back to where it was, at rest; `__init__` is its start in the world file."""
+    """A robot returns to its position, at rest; `__init__` is its start in the world file."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -197,7 +197,7 @@ def test_a_state_holds_a_node_and_all_inside_it(start, ros):
 
 
 def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, simple_robot):
-    """As Webots sets the motor's target."""
+    """Webots sets the motor's target, too."""
     arm = """DEF ARM SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 maxStop 0.2 }
       device [ PositionSensor { name "height" } LinearMotor { name "lift" } ] endPoint Solid { } }"""
     simulation = start(world(robot=simple_robot.replace("DEF IR", f"{arm} DEF IR"))).simulation
@@ -222,7 +222,7 @@ def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, 
 
 
 def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, ros, world, simple_robot):
-    """At first, that is its position in the world file."""
+    """At first that is its position in the world file."""
     flap = """DEF FLAP HingeJoint { jointParameters HingeJointParameters { position 0.25 }
       device [ PositionSensor { name "angle" } ] endPoint Solid { } }"""
     simulation = start(world(robot=simple_robot.replace("DEF IR", f"{flap} DEF IR"))).simulation
@@ -239,7 +239,7 @@ def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, r
 
 
 def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
-    """With the number of the Solid that touches: the robot's for the robot, the wall's for the wall."""
+    """It has the number of the Solid that touches: of the robot, or of the wall."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")
@@ -262,6 +262,6 @@ def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
 
 
 def points(node, handle):
-    """Return the contact points of a node and of what is inside it."""
+    """Return the contact points of a node and of its descendants."""
     asked = {"node": handle, "include_descendants": True}
     return node.get("supervisor/node/get_contact_points", **asked)

@@ -1,4 +1,4 @@
-"""Fields over ROS: types, values, when a write is seen, and what a rotation goes through."""
+"""Fields over ROS: types, values, the time when a write takes effect, and rotations."""
 
 import math
 
@@ -19,7 +19,7 @@ HALF = math.sqrt(0.5)
 
 @pytest.fixture
 def field(robot):
-    """`field("TARGET", "translation")`: the handle of a field."""
+    """`field("TARGET", "translation")` returns the handle of a field."""
 
     def find(def_name, name):
         node = robot.get("supervisor/get_from_def", name=def_name)
@@ -29,7 +29,7 @@ def field(robot):
 
 
 def xyz(vector):
-    """A vector message as a tuple."""
+    """Return a vector message as a tuple."""
     return vector.x, vector.y, vector.z
 
 
@@ -50,7 +50,7 @@ def xyz(vector):
     ],
 )
 def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
-    """MF types have 0x10 added; an SF field counts -1."""
+    """MF types have 0x10 added; the count of an SF field is -1."""
     def_name, name = path.split(".")
     handle = field(def_name, name)
 
@@ -61,7 +61,7 @@ def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
 
 
 def test_values_of_the_world_file_and_defaults_are_read(robot, field):
-    """Whether the file writes them or not."""
+    """They are equal whether the file writes them or not."""
     get = robot.get
 
     assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"))) == (1.5, 0, 0.001)
@@ -74,7 +74,7 @@ def test_values_of_the_world_file_and_defaults_are_read(robot, field):
 
 
 def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
-    """The services' types, not the fields'."""
+    """The types are those of the services, not of the fields."""
     start(
         world(
             "DEF LIGHT DirectionalLight { color 1 0.5 0.25 } DEF P Pose { children [ Shape {"
@@ -95,7 +95,7 @@ def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
 
 
 def test_mf_values_are_read_by_index(robot, field):
-    """Negative ones count from the end."""
+    """Negative indices count from the end."""
     handle = field("ROBOTINO", "controllerArgs")
 
     values = [robot.get("supervisor/field/get_string", field=handle, index=index) for index in (0, 1, -1)]
@@ -104,7 +104,7 @@ def test_mf_values_are_read_by_index(robot, field):
 
 
 def test_nodes_of_fields_are_handles(robot, field):
-    """0 where there is none."""
+    """The handle is 0 if the field has no node."""
     children = field("TARGET", "children")
 
     first = robot.get("supervisor/field/get_node", field=children, index=0)
@@ -115,7 +115,7 @@ def test_nodes_of_fields_are_handles(robot, field):
 
 
 def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, field, position):
-    """Writes are queued; `get` answers what is pending, getters of the node what is."""
+    """Writes are queued; `get` returns the queued value, the node's getters the current one."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": -1.0, "y": 0.5}) == 1
@@ -127,7 +127,7 @@ def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, fiel
 
 
 def test_the_last_of_several_writes_wins(robot, field, position):
-    """Within one step."""
+    """The writes are in the same step."""
     handle = field("TARGET", "translation")
     for x in (0.1, 0.2, 0.3):
         robot.call("supervisor/field/set_vec3f", field=handle, value={"x": x})
@@ -138,7 +138,7 @@ def test_the_last_of_several_writes_wins(robot, field, position):
 
 
 def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position):
-    """As an episode begins; the robot drives on from there."""
+    """An episode begins like this; the robot then drives on from there."""
     robot.call(
         "supervisor/field/set_vec3f",
         field=field("ROBOTINO", "translation"),
@@ -159,7 +159,7 @@ def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position
 
 
 def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
-    """Not where it was put."""
+    """It is not the position at which the robot was placed."""
     drive(robot, 0.1, 0.0, 0.0)
 
     robot.call("robot/time_step", value=3200)
@@ -169,7 +169,7 @@ def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
 
 
 def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
-    """Rays and collisions follow."""
+    """Rays and collisions use the new position."""
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=32)
     robot.call(
@@ -184,7 +184,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """Answered with success all the same."""
+    """The call still succeeds."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1
@@ -216,7 +216,7 @@ def test_values_that_are_drawn_only_are_kept_and_change_nothing(ros, start, worl
 def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
     robot, field, path, setter, value, fact
 ):
-    """A client that randomizes sizes would otherwise train in one world for ever."""
+    """Otherwise a client that randomizes sizes would always train in the same world."""
     handle = field(*path.split("."))
 
     with pytest.raises(
@@ -226,7 +226,7 @@ def test_a_write_that_would_be_read_back_and_change_nothing_is_refused(
 
 
 def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros, start, world):
-    """Its ray stays where the world file has it."""
+    """Its ray stays at its position in the world file."""
     del robot
     start(world(robot=simple_robot))
     node = ros.node("robotino")
@@ -238,7 +238,7 @@ def test_the_sensor_of_a_robot_cannot_be_moved_by_field(robot, simple_robot, ros
 
 
 def test_custom_data_can_be_written_both_ways(robot, field):
-    """At once through the robot, with the next step through the field."""
+    """A write through the robot takes effect at once, one through the field with the next step."""
     handle = field("ROBOTINO", "customData")
     robot.call("robot/set_custom_data", value="a")
     assert robot.get("supervisor/field/get_string", field=handle) == "a"
@@ -251,7 +251,7 @@ def test_custom_data_can_be_written_both_ways(robot, field):
 
 
 def test_an_episode_is_seeded_by_custom_data_and_reset_in_one_step(robot, field):
-    """Write, reset, step: the write is seen before the reset, so both take one step."""
+    """The write takes effect before the reset, so write and reset together take one step."""
     handle = field("ROBOTINO", "customData")
     inbox = robot.inbox("ir1/value")
     robot.call("ir1/enable", value=192)
@@ -269,7 +269,7 @@ def test_an_episode_is_seeded_by_custom_data_and_reset_in_one_step(robot, field)
 
 
 def test_a_reset_restores_places_and_not_other_fields(robot, field, position):
-    """Poses are restored, field edits stay."""
+    """A reset restores poses, but other field writes stay."""
     robot.call("supervisor/field/set_vec3f", field=field("TARGET", "translation"), value={"x": -1.0})
     robot.call("supervisor/field/set_string", field=field("ROBOTINO", "description"), value="new")
     robot.call("robot/time_step", value=32)
@@ -283,7 +283,7 @@ def test_a_reset_restores_places_and_not_other_fields(robot, field, position):
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
-    """And leaves the field as it was."""
+    """The field keeps its value."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": bad}) == 1
@@ -292,7 +292,7 @@ def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
 
 
 def test_a_value_of_the_wrong_type_answers_success(robot, field):
-    """And is not there."""
+    """The value is not stored."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/set_float", field=handle, value=1.0) == 1
@@ -301,7 +301,7 @@ def test_a_value_of_the_wrong_type_answers_success(robot, field):
 
 
 def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
-    """0 and "" where libController has them; a null vector crashes the real controller."""
+    """The values are 0 and "", as in libController; a null vector crashes the real controller."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/get_float", field=handle) == 0.0
@@ -311,7 +311,7 @@ def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
 
 
 def test_mf_values_can_be_set_inserted_and_removed(robot, field):
-    """An insertion into an SF field is the one write that says no."""
+    """Only an insertion into an SF field fails."""
     root = robot.get("supervisor/get_root")
     children = robot.get("supervisor/node/get_field", node=root, fieldName="children")
     world_info = robot.get("supervisor/field/get_node", field=children, index=0)
@@ -335,14 +335,14 @@ def test_mf_values_can_be_set_inserted_and_removed(robot, field):
 
 
 def test_tracking_of_a_field_is_accepted(robot, field):
-    """It affects only the speed of Webots' answers."""
+    """It affects only the speed of Webots' responses."""
     handle = field("TARGET", "translation")
 
     assert robot.get("supervisor/field/enable_sf_tracking", field=handle, sampling_period=32) == 1
 
 
 def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
-    """The fault of the real controller: reading gives the identity, writing that is refused in silence."""
+    """The real controller has this fault: a read gives the identity, and writing it back has no effect."""
     handle = field("ROBOTINO", "rotation")
     saved = robot.get("supervisor/field/get_rotation", field=handle)
     assert (saved.x, saved.y, saved.z, saved.w) == (0.0, 0.0, 0.0, 1.0)
@@ -358,7 +358,7 @@ def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
 
 
 def test_the_workaround_writes_a_rotation_of_zero(robot, field):
-    """A tiny z beside w = 1: the angle is exactly 0, the axis is z."""
+    """With a tiny z and w = 1 the angle is exactly 0 and the axis is z."""
     handle = field("ROBOTINO", "rotation")
     robot.call("supervisor/field/set_rotation", field=handle, value={"z": HALF, "w": HALF})
     robot.call("robot/time_step", value=32)
@@ -372,7 +372,7 @@ def test_the_workaround_writes_a_rotation_of_zero(robot, field):
 
 @pytest.mark.parametrize("w", [1.0000001, -1.5, math.nan])
 def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
-    """So it is refused: normalize first."""
+    """It is therefore refused; clients must normalize it first."""
     assert math.isnan(quaternion_to_axis_angle(0.0, 0.0, 0.1, w)[3])
 
 
@@ -381,7 +381,7 @@ def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
     axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: math.hypot(*a) > 0.1),
 )
 def test_other_rotations_survive_the_way_there_and_back(angle, axis):
-    """Within what float64 and acos leave."""
+    """The tolerance is that of float64 and acos."""
     length = math.hypot(*axis)
     unit = tuple(it / length for it in axis)
     x, y, z, w = axis_angle_to_quaternion((*unit, angle))
@@ -397,12 +397,12 @@ def test_other_rotations_survive_the_way_there_and_back(angle, axis):
     [("Robot", 34), ("Solid", 80), ("WorldInfo", 84), ("TouchSensor", 60), ("Nonsense", 0), ("-", 0)],
 )
 def test_type_numbers_are_those_of_nodes_h(type_name, number):
-    """Counted from WB_NODE_NO_NODE = 0."""
+    """They count from WB_NODE_NO_NODE = 0."""
     assert type_number(type_name) == number
 
 
 def test_a_kind_of_robot_is_a_kind_of_solid():
-    """Inherited fields come first; a default of its own replaces the inherited one in place."""
+    """Inherited fields come first; a different default replaces the inherited one in place."""
     solid, robot = list(field_kinds("Solid")), list(field_kinds("Robot"))
 
     assert robot[: len(solid)] == solid
@@ -428,7 +428,7 @@ def test_a_kind_of_robot_is_a_kind_of_solid():
     ],
 )
 def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, written, kind):
-    """So that a newer or rarer field can still be read."""
+    """Newer or rarer fields can then still be read."""
     simulation = load_scene(world(f"DEF A Pose {{ novelty {written} }}"))
     tree = simulation.tree
 
@@ -436,7 +436,7 @@ def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, wri
 
 
 def test_every_field_of_the_shipped_worlds_has_values():
-    """No default is malformed, no value is lost."""
+    """No default is malformed, and no value is lost."""
     for name in ("arena", "two_robots"):
         simulation = load_scene(builtin(name))
         for node in list(simulation.tree.nodes.values()):

@@ -1,4 +1,4 @@
-"""Poses: composing, turning, and the quaternions that clients read."""
+"""Poses: composition, rotation, and the quaternions that clients read."""
 
 import math
 
@@ -25,37 +25,37 @@ poses = st.builds(Pose, vectors, matrices)
 
 
 def close(values, tolerance=1e-9):
-    """Equal but for rounding."""
+    """Return a value that equals numbers up to rounding."""
     return pytest.approx(values, abs=tolerance)
 
 
 @given(matrix=matrices, vector=vectors)
 def test_a_rotation_keeps_lengths(matrix, vector):
-    """So every rotation is one."""
+    """Then every matrix is a rotation."""
     assert math.hypot(*turn(matrix, vector)) == close(math.hypot(*vector))
 
 
 @given(matrix=matrices, vector=vectors)
 def test_the_transposed_turns_back(matrix, vector):
-    """The inverse of a rotation costs nothing."""
+    """The inverse of a rotation is then cheap."""
     assert turn(transposed(matrix), turn(matrix, vector)) == close(vector)
 
 
 @given(first=matrices, second=matrices, vector=vectors)
 def test_a_product_does_the_second_rotation_first(first, second, vector):
-    """As nested frames do."""
+    """Nested frames need this order."""
     assert turn(multiply(first, second), vector) == close(turn(first, turn(second, vector)))
 
 
 @given(outer=poses, inner=poses, point=vectors)
 def test_a_frame_in_a_frame_carries_points_through_both(outer, inner, point):
-    """What a Pose in a Pose means."""
+    """This is the meaning of a Pose in a Pose."""
     assert outer.after(inner).carry(point) == close(outer.carry(inner.carry(point)), 1e-8)
 
 
 @given(rotation=rotations)
 def test_the_axis_stays_where_it_is(rotation):
-    """What an axis is."""
+    """This defines the axis."""
     axis = rotation[:3]
 
     assert turn(from_axis_angle(rotation), axis) == close(axis)
@@ -63,7 +63,10 @@ def test_the_axis_stays_where_it_is(rotation):
 
 @given(rotation=rotations)
 def test_both_ways_to_a_quaternion_agree(rotation):
-    """From the field's axis and angle, or from the node's matrix; up to the sign that means nothing."""
+    """One starts from the field's axis and angle, the other from the node's matrix.
+
+    The sign has no meaning.
+    """
     length = math.hypot(*rotation[:3])
     unit = (rotation[0] / length, rotation[1] / length, rotation[2] / length, rotation[3])
     direct = axis_angle_to_quaternion(unit)
@@ -76,13 +79,13 @@ def test_both_ways_to_a_quaternion_agree(rotation):
 
 
 def test_an_axis_without_direction_turns_nothing():
-    """Read from a world file, it must not become NaN."""
+    """The axis comes from a world file and must not give NaN."""
     assert from_axis_angle((0.0, 0.0, 0.0, 1.0)) == from_axis_angle((0.0, 0.0, 1.0, 0.0))
 
 
 @given(angle=st.floats(-3.1, 3.1))
 def test_the_heading_is_the_angle_about_z(angle):
-    """Of whatever stands upright."""
+    """This holds for everything that stands upright."""
     pose = Pose(rotation=from_axis_angle((0.0, 0.0, 1.0, angle)))
 
     assert pose.heading_rad == close(angle)
@@ -90,13 +93,13 @@ def test_the_heading_is_the_angle_about_z(angle):
 
 
 def test_what_leans_by_more_than_two_degrees_is_not_upright():
-    """The planar physics can't have it."""
+    """The planar physics cannot simulate it."""
     assert not Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, 0.036))).upright
     assert Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, 0.034))).upright
 
 
 def test_half_turns_have_quaternions_too():
-    """Where w is 0 and the usual formula divides by it."""
+    """There, w is 0, and the usual formula divides by it."""
     for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
         quaternion = to_quaternion(from_axis_angle((*axis, math.pi)))
 

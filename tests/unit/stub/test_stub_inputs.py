@@ -1,4 +1,4 @@
-"""Battery, keyboard and joystick: what every robot has, and what our services do to them."""
+"""Battery, keyboard and joystick: every robot has them, and Palaestra's services control them."""
 
 import pytest
 
@@ -6,7 +6,7 @@ BATTERY = "battery [ 1 10 0 ] cpuConsumption 10"
 
 
 def stepped(robot, *topics):
-    """Enable the devices of these topics, step once, and return what each has sent."""
+    """Enable the devices of these topics, step once, and return the messages of each."""
     inboxes = [robot.inbox(topic) for topic in topics]
     for device in {topic.partition("/")[0] for topic in topics}:
         assert robot.get(f"{device}/enable", value=32) is True
@@ -15,7 +15,7 @@ def stepped(robot, *topics):
 
 
 def test_pressed_keys_are_published_at_every_step_until_they_are_released(robot):
-    """One message for each, as Webots does for a key that a person holds."""
+    """Each key has its own message, as in Webots while a person holds the key."""
     assert robot.get("palaestra/keyboard/press", value=ord("W")) is True
     assert robot.get("palaestra/keyboard/press", value=ord("A")) is True
     (keys,) = stepped(robot, "keyboard/key")
@@ -28,7 +28,7 @@ def test_pressed_keys_are_published_at_every_step_until_they_are_released(robot)
 
 
 def test_a_keyboard_reports_seven_keys_at_most(robot):
-    """Webots has no more."""
+    """Webots reports no more."""
     answers = [robot.get("palaestra/keyboard/press", value=key) for key in range(65, 73)]
 
     assert answers == [True] * 7 + [False]
@@ -38,7 +38,7 @@ def test_a_keyboard_reports_seven_keys_at_most(robot):
 
 
 def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
-    """Clients ask first, and go without one."""
+    """Clients check this first, and work without a joystick."""
     assert robot.get("joystick/is_connected") is False
     assert robot.get("joystick/get_number_of_axes") == -1
     (axis,) = stepped(robot, "joystick/axis0")
@@ -47,7 +47,7 @@ def test_a_joystick_is_not_connected_until_somebody_moves_it(robot):
 
 
 def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robot):
-    """With the topics of the controller: an axis has a message at every step, a button while it is down."""
+    """The topics are the controller's: an axis has a message at every step, a button while it is pressed."""
     assert robot.get("palaestra/joystick/set_axes", values=[100.0, -128.0]) is True
     assert robot.get("palaestra/joystick/set_povs", values=[1.0]) is True
     assert robot.get("palaestra/joystick/press", value=3) is True
@@ -63,7 +63,7 @@ def test_a_moved_joystick_publishes_axes_points_of_view_and_pressed_buttons(robo
 
 @pytest.mark.parametrize("values", [[1.0] * 7, [128.0], [float("nan")]])
 def test_a_joystick_cannot_be_turned_beyond_its_range(robot, values):
-    """The answer is False, and nothing moves or is connected."""
+    """The service returns False, and the joystick neither moves nor gets connected."""
     assert robot.get("palaestra/joystick/set_axes", values=values) is False
     assert robot.get("joystick/is_connected") is False
 
@@ -102,14 +102,14 @@ def test_a_robot_with_an_empty_battery_stands_still_until_a_reset(start, world, 
 
 
 def test_a_robot_without_a_battery_reads_minus_1(robot):
-    """As in Webots."""
+    """Webots does the same."""
     (values,) = stepped(robot, "battery_sensor/value")
 
     assert values == [-1.0]
 
 
 def test_a_client_sends_what_a_robot_window_would(robot):
-    """The controller receives each text once, in order; 100 wait at most."""
+    """The controller receives each text once, in order; at most 100 texts wait."""
     for text in ("first", "second"):
         assert robot.get("palaestra/window/send_text", value=text) is True
 

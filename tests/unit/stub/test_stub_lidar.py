@@ -1,4 +1,4 @@
-"""Lidar: what its rays see, and how it tells it."""
+"""Lidar: the measurements of its rays, and their messages."""
 
 import math
 import struct
@@ -16,7 +16,7 @@ ROBOT = """Robot {{ supervisor TRUE controller "ros" controllerArgs [ "--name=se
 
 @pytest.fixture
 def seer(start, world, ros):
-    """`seer(fields)`: the node of a robot that looks at a wall 1.9 m ahead, 1 m high."""
+    """`seer(fields)` returns the node of a robot that looks at a wall 1.9 m ahead, 1 m high."""
 
     def begin(fields, objects=WALL):
         start(world(objects, robot=ROBOT.format(fields)))
@@ -36,12 +36,12 @@ def seen(robot, *topics):
 
 
 def floats(data):
-    """The float32 numbers of an image."""
+    """Return the float32 numbers of an image."""
     return struct.unpack(f"<{len(data) // 4}f", data)
 
 
 def test_the_rays_of_a_layer_go_from_left_to_right(seer):
-    """The middle of each pixel; the distance along the ray, not along the axis."""
+    """A ray goes through the middle of its pixel; its distance is along the ray, not along the axis."""
     image, scan = seen(seer(FLAT), "range_image", "laser_scan")
     expected = [1.9 / math.cos(angle) for angle in (0.6, 0.3, 0.0, -0.3, -0.6)]
 
@@ -51,7 +51,7 @@ def test_the_rays_of_a_layer_go_from_left_to_right(seer):
 
 
 def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
-    """Its period is the one that was enabled."""
+    """The scan's period is the one that was enabled."""
     scan, older = seen(seer(FLAT), "laser_scan", "laser_scan/layer0")
 
     assert (scan["angle_min"], scan["angle_max"], scan["angle_increment"]) == (-0.75, 0.75, 0.3)
@@ -62,7 +62,7 @@ def test_a_scan_has_the_angles_and_times_of_the_controller(seer):
 
 
 def test_several_layers_look_up_and_down(seer):
-    """The top one over the wall; the lowest one to the floor; only layers have scans then."""
+    """The top layer looks over the wall, the lowest one at the floor; the scans are then per layer."""
     robot = seer(TALL, WALL + "Solid { children [ Shape { geometry Plane { size 20 20 } } ] }")
     image, middle = seen(robot, "range_image", "laser_scan/layer1")
     top, _, low = (floats(image["data"])[row * 3 + 1] for row in range(3))
@@ -74,14 +74,14 @@ def test_several_layers_look_up_and_down(seer):
 
 
 def test_nothing_nearer_or_farther_than_the_range_is_seen(seer):
-    """Both are infinite."""
+    """Both values are infinite."""
     (near,) = seen(seer(FLAT.replace("minRange 0.1", "minRange 2.1")), "laser_scan")
 
     assert list(near["ranges"]) == pytest.approx([1.9 / math.cos(0.6), *[math.inf] * 3, 1.9 / math.cos(0.6)])
 
 
 def test_a_cloud_of_points_comes_while_it_is_enabled(seer):
-    """X forward, y left, z up, then the layer and the time, of each point."""
+    """Each point has x forward, y left, z up, and then the layer and the time."""
     robot = seer(FLAT)
     clouds = robot.inbox("eye/point_cloud")
     seen(robot, "range_image")
@@ -101,7 +101,7 @@ def test_a_cloud_of_points_comes_while_it_is_enabled(seer):
 
 
 def test_a_layer_can_be_asked_for(seer):
-    """Webots would read a null pointer for one that there is not."""
+    """Webots would read a null pointer for a layer that does not exist."""
     robot = seer(TALL)
     seen(robot, "range_image")
 
@@ -113,7 +113,7 @@ def test_a_layer_can_be_asked_for(seer):
 
 
 def test_the_settings_are_answered(seer):
-    """A frequency beyond the limits is ignored, as in libController."""
+    """As in libController, a frequency beyond the limits is ignored."""
     robot = seer(FLAT)
     info = robot.call("eye/get_info")
 
@@ -124,7 +124,7 @@ def test_the_settings_are_answered(seer):
 
 
 def test_a_lidar_that_is_not_enabled_casts_no_rays(seer):
-    """They cost time; an image of them is of the last time that it was enabled."""
+    """Rays cost time; the image then stays that of the last enabled step."""
     robot = seer(FLAT)
     robot.call("robot/time_step", value=32)
     assert set(floats(robot.get("eye/get_layer_range_image", layer=0).data)) == {math.inf}
@@ -134,7 +134,7 @@ def test_a_lidar_that_is_not_enabled_casts_no_rays(seer):
 
 
 def test_noise_is_a_share_of_the_range_and_a_resolution_rounds(seer):
-    """In this order."""
+    """The noise comes first."""
     (scan,) = seen(seer(f"{FLAT} noise 0.05 resolution 0.25"), "laser_scan")
 
     assert all(math.remainder(distance, 0.25) == 0.0 for distance in scan["ranges"])

@@ -1,4 +1,4 @@
-"""The loop: sockets and moments, and when it looks instead of sleeping."""
+"""The event loop of sockets and timers, and when it polls instead of sleeping."""
 
 import os
 import socket
@@ -10,7 +10,7 @@ from palaestra_sim.ros.loop import Loop
 
 @pytest.fixture
 def loop():
-    """A loop, closed when the test ends."""
+    """A loop that is closed when the test ends."""
     fresh = Loop()
     yield fresh
     fresh.close()
@@ -18,7 +18,7 @@ def loop():
 
 @pytest.fixture
 def pair(loop):
-    """Two ends of a connection; the loop answers whatever arrives at its own."""
+    """The far end of a connection; the loop echoes whatever arrives at its own."""
     mine, theirs = socket.socketpair()
     loop.watch(mine, lambda: mine.send(mine.recv(100)))
     yield theirs
@@ -29,7 +29,7 @@ def pair(loop):
 
 @pytest.fixture
 def looks(monkeypatch):
-    """Grows by one with each look that lets the others run."""
+    """Return a list that grows by one with each poll that yields the processor."""
     seen = []
     monkeypatch.setattr(os, "sched_yield", lambda: seen.append(1))
     return seen
@@ -37,7 +37,7 @@ def looks(monkeypatch):
 
 @pytest.fixture
 def chatter(loop, pair):
-    """`chatter(50)`: as many questions and answers, with short waits between."""
+    """`chatter(50)` exchanges as many requests and responses, with short waits between them."""
 
     def begin(count):
         def go_on():
@@ -55,7 +55,7 @@ def chatter(loop, pair):
 
 
 def run(loop, *delays_s):
-    """Run until the last of some moments; return the number of the moment that each came as."""
+    """Run until the last of some timers, and return their delays in the order in which they fired."""
     came = []
     for delay_s in delays_s:
         loop.later(delay_s, lambda delay_s=delay_s: came.append(delay_s))
@@ -65,12 +65,12 @@ def run(loop, *delays_s):
 
 
 def test_moments_come_in_their_order(loop):
-    """Whatever the order they were set in."""
+    """The order in which they were set does not matter."""
     assert run(loop, 0.003, 0.001, 0.0, 0.002) == [0.0, 0.001, 0.002, 0.003]
 
 
 def test_what_arrives_is_answered_meanwhile(loop, chatter):
-    """A moment holds nothing up."""
+    """A timer must not delay other work."""
     said = chatter(3)
 
     run(loop, 0.05)
@@ -79,9 +79,9 @@ def test_what_arrives_is_answered_meanwhile(loop, chatter):
 
 
 def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
-    """Being woken would take longer than what comes next."""
+    """A wake-up would take longer than the wait."""
 
-    def talk():  # again, where somebody else had the processor meanwhile: that wait was no short one
+    def talk():  # repeat it if another process took the processor: that wait was not short
         if looks:
             loop.stop()
         else:
@@ -95,7 +95,7 @@ def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
 
 
 def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
-    """Polling in vain takes processor time from the other simulators."""
+    """Useless polling takes processor time from the other simulators."""
 
     def ask():
         asked.append(pair.send(b"question"))
@@ -115,7 +115,7 @@ def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
 
 
 def test_it_does_not_look_for_a_moment_that_is_near(loop, chatter, looks):
-    """The peers wait for the end of a step too; three milliseconds became three and a third."""
+    """The clients wait for the end of a step too; polling made three milliseconds three and a third."""
     chatter(50)
 
     run(loop, 0.003)
@@ -124,7 +124,7 @@ def test_it_does_not_look_for_a_moment_that_is_near(loop, chatter, looks):
 
 
 def test_another_thread_may_post(loop):
-    """The one thing that others may do."""
+    """It is the only method that other threads may call."""
     loop.post(loop.stop)
 
     assert loop.run() is None

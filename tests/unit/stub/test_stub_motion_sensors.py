@@ -1,4 +1,4 @@
-"""GPS, compass, gyro and their like: what they read on a robot that stands, drives and turns."""
+"""GPS, compass, gyro and similar sensors on a robot that stands, drives and turns."""
 
 import math
 import random
@@ -23,7 +23,7 @@ ON_A_TURNTABLE = """HingeJoint {{
 
 @pytest.fixture
 def load(world, simple_robot):
-    """`load(sensor, robot=..., info=...)`: a simulation whose robot has that sensor, with the seed 7."""
+    """`load(sensor, robot=..., info=...)` returns a simulation whose robot has that sensor, with seed 7."""
 
     def begin(sensor, robot="", info="", objects=""):
         text = simple_robot.replace("DEF IR", f"{sensor} DEF IR")
@@ -35,7 +35,7 @@ def load(world, simple_robot):
 
 @pytest.fixture
 def device(start, world, simple_robot, ros):
-    """`device(sensor)`: the node of a stub whose robot has that sensor, for its services and topics."""
+    """`device(sensor)` returns the node of a stub whose robot has that sensor."""
 
     def begin(sensor):
         start(world(robot=simple_robot.replace("DEF IR", f"{sensor} DEF IR")))
@@ -45,7 +45,7 @@ def device(start, world, simple_robot, ros):
 
 
 def drive(simulation, vx, vy, omega, steps=30):
-    """Drive at that velocity until it is reached."""
+    """Drive until that velocity is reached."""
     motors = simulation.robots[0].motors
     for name, speed in zip(WHEELS, wheel_speeds(vx, vy, omega), strict=True):
         motors[name].set_position(math.inf)
@@ -55,18 +55,18 @@ def drive(simulation, vx, vy, omega, steps=30):
 
 
 def value_of(simulation, name):
-    """The value of a sensor of the first robot."""
+    """Return the value of a sensor of the first robot."""
     return simulation.robots[0].sensors[name].value
 
 
 def draws(count):
-    """The first numbers of the noise with the seed 7."""
+    """Return the first numbers of the noise with seed 7."""
     noise = random.Random(7)
     return [noise.gauss(0.0, 1.0) for _ in range(count)]
 
 
 def test_a_gps_reads_its_own_place_and_not_that_of_its_robot(load):
-    """It is 0.1 m before the middle of a robot that looks north."""
+    """The GPS is 0.1 m in front of the center of a robot that looks north."""
     simulation = load(
         "GPS { translation 0.1 0 0.3 }", f"translation 1 2 0 {NORTH}", info="gpsReference 100 200 300"
     )
@@ -88,7 +88,7 @@ def test_a_gps_reads_its_speed_in_the_axes_of_the_world(load):
 
 
 def test_a_gps_off_the_middle_moves_when_the_robot_turns(load):
-    """0.2 m to the left of the middle: it moves backward."""
+    """It is 0.2 m to the left of the center, so it moves backward."""
     simulation = load("GPS { translation 0 0.2 0 }")
 
     drive(simulation, 0.0, 0.0, 0.5, steps=1)
@@ -103,7 +103,7 @@ def test_a_gps_off_the_middle_moves_when_the_robot_turns(load):
 
 
 def test_a_gps_on_a_joint_moves_with_it(load):
-    """The speed of a motor counts, not only that of the robot: 0.1 m from the axis, at 2 rad/s."""
+    """The motor's speed counts too, not only the robot's: 2 rad/s at 0.1 m from the axis."""
     simulation = load(ON_A_TURNTABLE.format("GPS { translation 0.1 0 0 }"))
     simulation.robots[0].motors["turntable"].set_position(math.inf)
     simulation.robots[0].motors["turntable"].set_velocity(2.0)
@@ -117,7 +117,7 @@ def test_a_gps_on_a_joint_moves_with_it(load):
 
 
 def test_a_place_on_a_slider_moves_along_its_axis():
-    """The axis is in the frame around the joint, which is turned here."""
+    """The axis is in the frame of the joint, which is turned here."""
     frame = Frame(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
     motor = Motor(MotorSpec(name="lift"))
     motor.speed_rad_s = 0.2
@@ -132,7 +132,7 @@ def test_a_place_on_a_slider_moves_along_its_axis():
 
 
 def test_a_robot_that_is_placed_elsewhere_has_no_speed(load):
-    """Webots takes the speed from its physics too, not from two positions."""
+    """Webots, too, takes the speed from its physics and not from two positions."""
     simulation = load("GPS { }")
     simulation.step(STEP_MS)
 
@@ -144,7 +144,7 @@ def test_a_robot_that_is_placed_elsewhere_has_no_speed(load):
 
 
 def test_the_noise_of_a_gps_is_in_meters_and_that_of_its_speed_a_fraction(load):
-    """The vector of the speed has none, as in Webots."""
+    """As in Webots, the velocity vector has no noise."""
     simulation = load("GPS { accuracy 0.5 speedNoise 0.1 }", NORTH)
     expected = draws(8)
 
@@ -159,7 +159,7 @@ def test_the_noise_of_a_gps_is_in_meters_and_that_of_its_speed_a_fraction(load):
 
 
 def test_a_gps_rounds_to_its_resolution(load):
-    """Position and speed have one each."""
+    """Position and speed have a resolution each."""
     simulation = load("GPS { resolution 0.25 speedResolution 0.2 }", "translation 1.1 -0.4 0")
 
     drive(simulation, 0.0, 0.5, 0.0, steps=1)
@@ -194,7 +194,7 @@ def test_a_gps_reads_a_worldinfo_that_follows_its_robot(simple_robot):
 
 
 def test_a_gps_answers_its_coordinate_system_and_converts_angles(device):
-    """Each part is cut toward zero, as in the library of Webots."""
+    """Each part is truncated toward zero, as in the library of Webots."""
     node = device("GPS { }")
 
     def converted(angle):
@@ -206,7 +206,7 @@ def test_a_gps_answers_its_coordinate_system_and_converts_angles(device):
 
 
 def test_a_gps_is_in_the_frame_of_its_name_except_for_its_speed(device):
-    """The controller leaves the frame of that one message empty."""
+    """The controller leaves the frame of that message empty."""
     node = device("GPS { }")
 
     node.call("gps/enable", value=STEP_MS)
@@ -237,7 +237,7 @@ def test_a_compass_shows_north_in_its_own_frame(load, robot, mount, north):
 
 
 def test_a_compass_turns_against_its_robot(load):
-    """The bearing of its documentation is atan2 of the first two."""
+    """Its documentation computes the bearing as atan2 of the first two values."""
     simulation = load("Compass { }")
 
     drive(simulation, 0.0, 0.0, 0.5)
@@ -250,7 +250,7 @@ def test_a_compass_turns_against_its_robot(load):
 
 
 def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load):
-    """As in Webots, table first."""
+    """The order is that of Webots, with the table first."""
     simulation = load("Compass { lookupTable [ -1 -100 0, 1 100 0 ] resolution 30 zAxis FALSE }", NORTH)
 
     simulation.step(STEP_MS)
@@ -261,7 +261,7 @@ def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load):
 
 
 def test_each_axis_of_a_noisy_table_draws_its_own_noise(load):
-    """In the order x, y, z."""
+    """The draws are in the order x, y, z."""
     simulation = load("Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5")
     first, third = draws(2)
 
@@ -279,14 +279,14 @@ def test_a_sensor_without_a_table_answers_an_empty_one(device):
 
 
 def test_a_sensor_answers_its_table(device):
-    """Row after row."""
+    """The rows follow each other."""
     node = device("Compass { lookupTable [ -1 -100 0, 1 100 0.5 ] }")
 
     assert node.get("compass/get_lookup_table") == (-1.0, -100.0, 0.0, 1.0, 100.0, 0.5)
 
 
 def test_a_table_whose_inputs_do_not_grow_is_refused(load):
-    """Nothing could be read between its rows."""
+    """No value could be interpolated between its rows."""
     with pytest.raises(WorldError, match="the inputs of lookupTable do not grow; sort its rows"):
         load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
 
@@ -303,7 +303,7 @@ STANDING = "rotation 1 0 0 -1.5707963267948966"  # of a robot with z up, in a wo
     ],
 )
 def test_the_system_of_axes_says_where_north_and_up_are(load, system, robot, north, height_m, quaternion):
-    """Its letters are those of x, y and z; an InertialUnit reads its rotation in the axes of the file."""
+    """Its letters are the directions of x, y and z; an InertialUnit has the axes of the file."""
     info = f'coordinateSystem "{system}" gpsReference 1 2 400'
     simulation = load("Compass { } InertialUnit { } Altimeter { translation 0 0 0.3 }", robot, info)
     simulation.step(STEP_MS)
@@ -314,7 +314,7 @@ def test_the_system_of_axes_says_where_north_and_up_are(load, system, robot, nor
 
 
 def test_gravity_of_an_old_world_may_be_a_vector():
-    """Until R2020a it had three numbers."""
+    """Until R2020a gravity had three numbers."""
     text = '#VRML_SIM R2019a utf8\nWorldInfo { gravity 0 -3.7 0 } Robot { controller "ros" controllerArgs'
     simulation = load_scene(
         f'{text} [ "--name=a" "--synchronize" ] children [ Accelerometer {{ }} ] }}'.encode()
@@ -329,7 +329,7 @@ def test_gravity_of_an_old_world_may_be_a_vector():
     [("", (0.0, 0.0, 1.0)), ("rotation 1 0 0 1.5707963267948966", (0.0, 1.0, 0.0))],
 )
 def test_a_gyro_reads_the_turning_of_its_robot_about_its_own_axes(load, mount, direction):
-    """The robot turns about the vertical; a gyro that is tipped over reads it on another axis."""
+    """The robot turns about the vertical, so a gyro that is tipped over reads it on another axis."""
     simulation = load(f"Gyro {{ translation 0.1 0 0 {mount} }}")
 
     drive(simulation, 0.2, 0.0, 0.5)
@@ -349,7 +349,7 @@ def test_a_gyro_reads_the_motor_that_carries_it_too(load):
 
 
 def test_a_gyro_marks_what_it_does_not_measure(device):
-    """-1 in a covariance is ROS's word for it; the covariance of the reading is unknown, which is 0."""
+    """In ROS, -1 in a covariance means not measured; the covariance of the reading is unknown, which is 0."""
     node = device("Gyro { }")
     node.call("gyro/enable", value=STEP_MS)
     inbox = node.inbox("gyro/values")
@@ -371,7 +371,7 @@ def test_a_gyro_marks_what_it_does_not_measure(device):
     ],
 )
 def test_an_accelerometer_at_rest_reads_the_reaction_to_gravity(load, mount, info, expected):
-    """Upward, in its own frame."""
+    """It points up, in the sensor's own frame."""
     simulation = load(f"Accelerometer {{ {mount} }}", info=info)
 
     simulation.step(STEP_MS)
@@ -380,7 +380,7 @@ def test_an_accelerometer_at_rest_reads_the_reaction_to_gravity(load, mount, inf
 
 
 def test_an_accelerometer_reads_a_robot_that_speeds_up_and_then_drives_on(load):
-    """10 m/s2 is the limit along x; at an even speed nothing but gravity is left."""
+    """The limit along x is 10 m/s2; at constant speed only gravity is left."""
     simulation = load("Accelerometer { }", NORTH)
 
     drive(simulation, 2.0, 0.0, 0.0, steps=1)
@@ -392,7 +392,7 @@ def test_an_accelerometer_reads_a_robot_that_speeds_up_and_then_drives_on(load):
 
 
 def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load):
-    """The robot is at its speed after two of six."""
+    """The robot reaches its speed after two of six basic steps."""
     simulation = load("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0, steps=0)
 
@@ -402,7 +402,7 @@ def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load):
 
 
 def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load):
-    """The square of 2 rad/s by 0.3 m, against the arm; half a basic step late, it has turned a bit."""
+    """It is the square of 2 rad/s times 0.3 m, against the arm; the value is half a basic step late."""
     simulation = load("Accelerometer { translation 0.3 0 0 }")
 
     drive(simulation, 0.0, 0.0, 2.0)
@@ -415,7 +415,7 @@ def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load):
 
 
 def test_a_reset_is_no_acceleration(load):
-    """The robot drove before, and stands after."""
+    """The robot drove before the reset and stands after it."""
     simulation = load("Accelerometer { }")
     drive(simulation, 0.5, 0.0, 0.0)
 
@@ -426,7 +426,7 @@ def test_a_reset_is_no_acceleration(load):
 
 
 def test_an_inertial_unit_reads_its_rotation_in_the_world(load):
-    """Robot and mount are each turned by a quarter about the vertical."""
+    """Robot and mount are each turned by 90 degrees about the vertical."""
     simulation = load(f"InertialUnit {{ {NORTH} }}", NORTH)
 
     simulation.step(STEP_MS)
@@ -447,7 +447,7 @@ def test_an_inertial_unit_turns_with_its_robot(load):
 
 
 def test_the_noise_of_an_inertial_unit_turns_it_about_all_axes(load):
-    """A fraction of pi: the sum of small turns is near the vector of the three."""
+    """It is a fraction of pi: a sum of small rotations is near the vector of the three."""
     simulation = load("InertialUnit { noise 0.0001 }")
 
     simulation.step(STEP_MS)
@@ -459,7 +459,7 @@ def test_the_noise_of_an_inertial_unit_turns_it_about_all_axes(load):
 
 
 def test_an_inertial_unit_rounds_each_number_to_its_resolution(load):
-    """As in Webots, so that the length is no longer 1."""
+    """As in Webots, the quaternion then no longer has length 1."""
     simulation = load("InertialUnit { resolution 0.5 }", "rotation 0 0 1 0.7")
 
     simulation.step(STEP_MS)
@@ -468,18 +468,18 @@ def test_an_inertial_unit_rounds_each_number_to_its_resolution(load):
 
 
 def test_an_inertial_unit_answers_its_noise(device):
-    """The field, as it is."""
+    """The value is that of the field."""
     assert device("InertialUnit { noise 0.25 }").get("inertial_unit/get_noise") == 0.25
 
 
 def test_an_inertial_unit_with_an_axis_switched_off_is_refused(load):
-    """What Webots sends then is a rotation that no robot has."""
+    """Webots then sends a rotation that no robot can have."""
     with pytest.raises(WorldError, match="an inertial unit with an axis that is switched off"):
         load("InertialUnit { yAxis FALSE }")
 
 
 def test_an_altimeter_reads_its_height_and_that_of_the_reference(load):
-    """The robot stands 0.5 m up, the sensor is 0.3 m higher."""
+    """The robot is 0.5 m up, and the sensor 0.3 m higher."""
     simulation = load("Altimeter { translation 0 0 0.3 }", "translation 0 0 0.5", info="gpsReference 1 2 400")
 
     simulation.step(STEP_MS)
@@ -507,7 +507,7 @@ def test_an_altimeter_adds_noise_and_then_rounds(load):
     ],
 )
 def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, expected):
-    """What its table has for no irradiance; that of an E-puck begins at its largest value."""
+    """It reads its table's value for no irradiance, which for an E-puck is the largest value."""
     simulation = load(f"LightSensor {{ {fields} }}")
 
     simulation.step(STEP_MS)
@@ -516,7 +516,7 @@ def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, e
 
 
 def test_the_table_of_a_light_sensor_adds_noise(load):
-    """A fraction of the response."""
+    """It is a fraction of the response."""
     simulation = load("LightSensor { lookupTable [ 1 4095 0.01, 2 0 0.01 ] }")
     (noise,) = draws(1)
 
@@ -527,13 +527,13 @@ def test_the_table_of_a_light_sensor_adds_noise(load):
 
 @pytest.mark.parametrize("light", ["DirectionalLight { }", "Pose { children [ PointLight { on FALSE } ] }"])
 def test_a_light_sensor_in_a_world_with_a_light_is_refused(load, light):
-    """A client may switch it on; darkness would then be wrong."""
+    """A client may switch the light on, and a dark reading would then be wrong."""
     with pytest.raises(WorldError, match="a light sensor in a world with lights"):
         load("LightSensor { }", objects=light)
 
 
 def test_a_light_on_the_robot_is_a_light_too(load):
-    """It shines on what is before the robot."""
+    """It lights the objects in front of the robot."""
     with pytest.raises(WorldError, match="a light sensor in a world with lights"):
         load("LightSensor { } SpotLight { }")
 

@@ -1,4 +1,4 @@
-"""Motors: how commands are taken, over ROS and directly."""
+"""Motors and the effect of their commands, over ROS and directly."""
 
 import itertools
 import math
@@ -12,18 +12,18 @@ INF = math.inf
 
 @pytest.fixture
 def motor():
-    """A motor of at most 10 rad/s."""
+    """A motor with a limit of 10 rad/s."""
     return Motor(MotorSpec(name="m"))
 
 
 def test_a_new_motor_holds_its_position(robot):
-    """Target 0, velocity the maximum: as after each reset."""
+    """As after each reset, its target is 0 and its velocity the maximum."""
     assert robot.get("wheel0_joint/get_target_position") == 0.0
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 
 
 def test_get_velocity_returns_the_commanded_velocity(robot):
-    """Not the measured speed: for that there are position sensors."""
+    """Position sensors measure the real speed."""
     robot.call("wheel0_joint/set_position", value=INF)
     robot.call("wheel0_joint/set_velocity", value=5.0)
 
@@ -32,14 +32,14 @@ def test_get_velocity_returns_the_commanded_velocity(robot):
 
 
 def test_infinity_travels(robot):
-    """As float64 over ROS, in both directions."""
+    """Both directions use float64."""
     assert robot.get("wheel0_joint/set_position", value=-INF) is True
     assert robot.get("wheel0_joint/get_target_position") == -INF
 
 
 @pytest.mark.parametrize(("asked", "kept"), [(200.0, 137.46), (-200.0, -137.46), (INF, 137.46), (0.0, 0.0)])
 def test_a_velocity_is_clamped_to_the_limit(robot, asked, kept):
-    """With a warning in Webots, and success all the same."""
+    """Webots logs a warning, but the call succeeds."""
     robot.call("wheel0_joint/set_position", value=INF)
 
     assert robot.get("wheel0_joint/set_velocity", value=asked) is True
@@ -48,7 +48,7 @@ def test_a_velocity_is_clamped_to_the_limit(robot, asked, kept):
 
 @pytest.mark.parametrize("service", ["set_velocity", "set_position", "set_acceleration"])
 def test_nan_is_refused_and_answers_success(robot, service):
-    """All setters answer success."""
+    """All setters return success."""
     getter = {"set_position": "get_target_position"}.get(service, service.replace("set", "get"))
     before = robot.get(f"wheel0_joint/{getter}")
 
@@ -57,7 +57,7 @@ def test_nan_is_refused_and_answers_success(robot, service):
 
 
 def test_a_negative_velocity_needs_an_infinite_target(robot):
-    """The classic mistake: the robot turns only one way until set_position(inf)."""
+    """This is a common mistake: the robot turns only one way until set_position(inf)."""
     robot.call("wheel0_joint/set_velocity", value=-3.0)
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 
@@ -68,7 +68,7 @@ def test_a_negative_velocity_needs_an_infinite_target(robot):
 
 
 def test_a_motor_tells_what_the_world_file_says(robot):
-    """Limits and names."""
+    """These are limits and names."""
     assert robot.get("wheel1_joint/get_max_velocity") == pytest.approx(137.46)
     assert robot.get("wheel1_joint/get_acceleration") == -1.0
     assert robot.get("wheel1_joint/get_max_torque") == 10.0
@@ -82,13 +82,13 @@ def test_a_motor_tells_what_the_world_file_says(robot):
 
 @pytest.mark.parametrize(("asked", "kept"), [(0.0, 0.0), (40.0, 10.0), (-1.0, 10.0), (math.nan, 10.0)])
 def test_available_torque_is_kept_within_the_limit(robot, asked, kept):
-    """Every value that Webots takes or ignores answers success."""
+    """Every value that Webots uses or ignores returns success."""
     assert robot.get("wheel0_joint/set_available_torque", value=asked) is True
     assert robot.get("wheel0_joint/get_available_torque") == kept
 
 
 def test_a_part_of_the_torque_of_a_wheel_is_refused(robot):
-    """The stub has no masses, so it has no way to drive a robot more weakly."""
+    """The stub has no masses, so it cannot drive a robot with less torque."""
     with pytest.raises(Exception, match="a part of the torque of 'wheel0_joint' is not simulated; set 0, or"):
         robot.call("wheel0_joint/set_available_torque", value=4.0)
 
@@ -108,14 +108,14 @@ def test_a_motor_without_torque_drives_nothing(robot):
 
 
 def test_torque_control_fails(robot):
-    """The stub's wheels have speeds, no torques."""
+    """The stub's wheels have speeds but no torques."""
     with pytest.raises(Exception, match="torques are not simulated; set a position or velocity"):
         robot.call("wheel0_joint/set_torque", value=1.0)
     assert robot.get("wheel0_joint/torque_feedback_sensor/enable", value=32) is False
 
 
 def test_commands_take_effect_with_the_next_step(robot):
-    """Until then the shaft is where it was."""
+    """Until then the shaft keeps its position."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("robot/time_step", value=32)
@@ -129,7 +129,7 @@ def test_commands_take_effect_with_the_next_step(robot):
 
 
 def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
-    """No faster than the commanded velocity."""
+    """It turns no faster than the commanded velocity."""
     sensor = robot.inbox("wheel0_joint_sensor/value")
     robot.call("wheel0_joint_sensor/enable", value=32)
     robot.call("wheel0_joint/set_velocity", value=2.0)
@@ -143,7 +143,7 @@ def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
 
 
 def test_a_motor_accelerates_no_faster_than_its_limit(motor):
-    """-1, the default, is without limit."""
+    """The default of -1 means no limit."""
     motor.set_position(INF)
     motor.set_velocity(4.0)
     assert motor.demand(0.1) == 4.0
@@ -154,7 +154,7 @@ def test_a_motor_accelerates_no_faster_than_its_limit(motor):
 
 
 def test_positions_are_clamped_to_limits_that_differ():
-    """Equal limits mean none."""
+    """Equal limits mean no limits."""
     motor = Motor(MotorSpec(name="m", min_rad=-1.0, max_rad=2.0))
 
     motor.set_position(5.0)
@@ -173,7 +173,7 @@ def positions(motor, steps, step_s=0.008):
 
 
 def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
-    """A proportional gain of 1 comes 63 % near in a second; the default gain of 10 arrives."""
+    """With a proportional gain of 1 it covers 63 % in a second; with the default of 10 it arrives."""
     motor.set_control_pid(1.0, 0.0, 0.0)
     motor.set_position(1.0)
 
@@ -181,7 +181,7 @@ def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
 
 
 def test_the_controller_integrates_and_differentiates_the_error(motor):
-    """As Webots does in each basic step, from the moment when the gains were set."""
+    """Webots does so in each basic step, from the time when the gains were set."""
     motor.set_control_pid(1.0, 2.0, 0.001)
     motor.set_position(0.5)
 
@@ -196,14 +196,14 @@ def test_the_controller_integrates_and_differentiates_the_error(motor):
 
 @pytest.mark.parametrize("gains", [(0.0, 0.0, 0.0), (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (math.nan, 0.0, 0.0)])
 def test_gains_that_webots_refuses_change_nothing(motor, gains):
-    """All three stay as they are."""
+    """All three keep their values."""
     motor.set_control_pid(*gains)
 
     assert motor.gains == (10.0, 0.0, 0.0)
 
 
 def test_a_multiplier_scales_positions_velocities_and_torques():
-    """The program reads back what it has set, and the shaft moves by the product."""
+    """The program reads the value that it set, and the shaft moves by the product."""
     motor = Motor(MotorSpec(name="m", multiplier=-0.5, max_velocity_rad_s=2.0))
 
     motor.set_position(1.0)
@@ -218,7 +218,7 @@ def test_a_multiplier_scales_positions_velocities_and_torques():
 
 
 def test_a_joint_without_physics_accelerates_by_its_torque_and_keeps_its_velocity_to_the_target():
-    """Webots moves it without its controller: 10 rad/s2, then the velocity, and the target exactly."""
+    """Webots moves it without its controller: first at 10 rad/s2, then at the velocity, up to the target."""
     motor = Motor(MotorSpec(name="m", max_velocity_rad_s=2.0))
     motor.kinematic = True
     motor.set_position(1.0)
@@ -242,7 +242,7 @@ def test_the_acceleration_of_a_joint_without_physics_is_at_most_its_torque(accel
 
 
 def test_an_endless_motion_of_a_joint_without_physics_ends_at_its_limit():
-    """A limit of commands is one of the motion there."""
+    """There, a limit of the commands also limits the motion."""
     motor = Motor(MotorSpec(name="m", max_torque_nm=100.0, min_rad=-1.0, max_rad=1.0))
     motor.kinematic = True
     motor.set_position(INF)
@@ -251,7 +251,7 @@ def test_an_endless_motion_of_a_joint_without_physics_ends_at_its_limit():
 
 
 def test_a_robot_without_physics_accelerates_as_its_wheels_do(ros, start, world, simple_robot):
-    """Its wheels need 0.4 s to 4 rad/s at 10 rad/s2; with physics they have them at once."""
+    """At 10 rad/s2 its wheels need 0.4 s for 4 rad/s; with physics they reach it at once."""
     start(world(robot=simple_robot.replace("physics Physics { }", "")))
     robot = ros.node("robotino")
     sensor = robot.inbox("wheel0_joint_sensor/value")
@@ -268,7 +268,7 @@ def test_a_robot_without_physics_accelerates_as_its_wheels_do(ros, start, world,
 
 
 def test_a_reset_takes_every_command_back(motor):
-    """Why a client sends set_position(inf) after each reset."""
+    """A client therefore sends set_position(inf) after each reset."""
     motor.set_position(INF)
     motor.set_velocity(-2.0)
     motor.set_acceleration(3.0)
@@ -281,7 +281,7 @@ def test_a_reset_takes_every_command_back(motor):
 
 
 def test_a_motor_off_the_wheels_turns_too(ros, start, world, simple_robot):
-    """A joint more, such as a turret: it moves nothing but its shaft."""
+    """An additional joint such as a turret moves only its shaft."""
     turret = """HingeJoint { device [ RotationalMotor { name "turret" } PositionSensor { name "angle" } ]
       endPoint Solid { physics Physics { } } }"""
     start(world(robot=simple_robot.replace("DEF IR", f"{turret} DEF IR")))

@@ -1,4 +1,4 @@
-"""The scene tree over ROS: finding nodes, asking them, moving them."""
+"""The scene tree over ROS: nodes are found, read and moved."""
 
 import math
 
@@ -10,19 +10,19 @@ from palaestra_sim.world import builtin
 
 @pytest.fixture
 def find(robot):
-    """`find("TARGET")`: the handle of a node by its DEF."""
+    """`find("TARGET")` returns the handle of a node by its DEF."""
     return lambda name: robot.get("supervisor/get_from_def", name=name)
 
 
 def test_a_def_that_does_not_exist_is_handle_0(find):
-    """A miss is a success with 0, not an error."""
+    """The call succeeds with 0 and is not an error."""
     assert find("NOBODY") == 0
     assert find("") == 0
     assert find("ROBOTINO.NOBODY") == 0
 
 
 def test_handles_look_like_addresses_and_stay_the_same(find):
-    """As long as the world is loaded."""
+    """They stay the same as long as the world is loaded."""
     assert find("TARGET") == find("TARGET") > 2**40
     assert find("TARGET") != find("ROBOTINO")
 
@@ -34,12 +34,12 @@ def test_dots_lead_inside(find):
 
 
 def test_a_protos_inside_is_not_found_where_there_are_no_protos(robot, find):
-    """`proto` is for looking inside one."""
+    """`proto` searches only inside a PROTO."""
     assert robot.get("supervisor/get_from_def", name="BODY", proto=find("ROBOTINO")) == 0
 
 
 def test_a_node_tells_what_it_is(robot, find):
-    """Type numbers are those of webots/nodes.h."""
+    """The type numbers are those of webots/nodes.h."""
     target, robotino = find("TARGET"), find("ROBOTINO")
 
     assert robot.get("supervisor/node/get_type_name", node=robotino) == "Robot"
@@ -53,7 +53,7 @@ def test_a_node_tells_what_it_is(robot, find):
 
 @pytest.fixture
 def among_protos(ros, start, world):
-    """A supervisor of the PROTO E-puck, beside a stand-in; and `find`, by DEF name."""
+    """The node of a PROTO E-puck as supervisor, in a world with a stand-in; and `find`, by DEF name."""
     arguments = 'controllerArgs [ "--name=puck" "--synchronize" ]'
     robot = f'DEF PUCK E-puck {{ controller "ros" {arguments} supervisor TRUE }}'
     start(world("DEF BOX WoodenBox { translation 2 0 0 }", robot=robot))
@@ -65,7 +65,7 @@ def among_protos(ros, start, world):
     ("name", "proto", "base", "number"), [("PUCK", "E-puck", "Robot", 34), ("BOX", "WoodenBox", "Solid", 80)]
 )
 def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, proto, base, number):
-    """Its base type is that of the node that the PROTO consists of, also where a stand-in takes its place."""
+    """Its base type is that of the PROTO's own node, even if a stand-in replaces it."""
     puck, find = among_protos
     node = find(name)
 
@@ -76,7 +76,7 @@ def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, pr
 
 
 def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
-    """`proto` asks for fields of the node inside of it, and for a DEF in there; others have neither."""
+    """`proto` selects fields of the node inside it, or a DEF in there; other nodes have neither."""
     puck, find = among_protos
     number = "supervisor/node/get_number_of_fields"
     root = puck.get("supervisor/get_root")
@@ -89,7 +89,7 @@ def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
 
 
 def test_ids_lead_back_to_nodes(robot, find):
-    """And unknown ones to 0."""
+    """Unknown ids give 0."""
     number = robot.get("supervisor/node/get_id", node=find("TARGET"))
 
     assert robot.get("supervisor/get_from_id", id=number) == find("TARGET")
@@ -98,7 +98,7 @@ def test_ids_lead_back_to_nodes(robot, find):
 
 
 def test_the_root_is_a_group_with_id_0(robot, find):
-    """It holds the world; nothing holds it."""
+    """It contains the world and has no parent."""
     root = robot.get("supervisor/get_root")
 
     assert robot.get("supervisor/node/get_id", node=root) == 0
@@ -109,12 +109,12 @@ def test_the_root_is_a_group_with_id_0(robot, find):
 
 
 def test_self_is_the_robot_that_asks(robot, find):
-    """The shipped robot is its own supervisor."""
+    """The built-in arena's robot is its own supervisor."""
     assert robot.get("supervisor/get_self") == find("ROBOTINO")
 
 
 def test_a_device_is_found_by_its_raw_name(robot):
-    """With its blanks; an unknown one fails the call."""
+    """The name has its blanks; an unknown one fails the call."""
     handle = robot.get("supervisor/get_from_device", value="touch sensor")
 
     assert robot.get("supervisor/node/get_type_name", node=handle) == "TouchSensor"
@@ -123,7 +123,7 @@ def test_a_device_is_found_by_its_raw_name(robot):
 
 
 def test_devices_of_other_robots_are_not_found(two_robots):
-    """They belong to their own controller."""
+    """They belong to their own controllers."""
     supervisor, _ = two_robots
 
     with pytest.raises(ServiceFailed, match="no device 'ir1'"):
@@ -132,13 +132,13 @@ def test_devices_of_other_robots_are_not_found(two_robots):
 
 @pytest.mark.parametrize("handle", [0, 1, 2**63, 0x5580_0000_0000])
 def test_a_handle_that_is_none_fails(robot, handle):
-    """For 0 in Webots too; any other may crash the real controller."""
+    """Webots also fails for 0; any other handle may crash the real controller."""
     with pytest.raises(ServiceFailed, match="does not exist; get a new handle"):
         robot.call("supervisor/node/get_position", node=handle)
 
 
 def test_the_handle_of_a_field_is_no_node(robot, find):
-    """Mixed up, they fail instead of answering something."""
+    """If a client mixes them up, the calls must fail."""
     field = robot.get("supervisor/node/get_field", node=find("TARGET"), fieldName="translation")
 
     with pytest.raises(ServiceFailed, match=r"node .* does not exist"):
@@ -148,7 +148,7 @@ def test_the_handle_of_a_field_is_no_node(robot, find):
 
 
 def test_positions_are_in_the_world(robot, position, drive):
-    """Those of parts move with the robot."""
+    """Positions of parts move with the robot."""
     assert position(robot, "CYLINDER_2") == (-0.8, -0.8, 0.2)
     drive(robot, 0.1, 0.0, 0.0)
 
@@ -161,7 +161,7 @@ def test_positions_are_in_the_world(robot, position, drive):
 
 
 def test_orientations_are_quaternions(robot, find, drive):
-    """Turning left: about +z."""
+    """A turn to the left is a rotation about +z."""
     drive(robot, 0.0, 0.0, 0.5)
     robot.call("robot/time_step", value=3200)
 
@@ -172,7 +172,7 @@ def test_orientations_are_quaternions(robot, find, drive):
 
 
 def test_the_velocity_is_in_world_axes(robot, find, drive):
-    """Turned to the left, forward is +y."""
+    """After a turn to the left, forward is +y."""
     field = robot.get("supervisor/node/get_field", node=find("ROBOTINO"), fieldName="rotation")
     half = math.sqrt(0.5)
     robot.call("supervisor/field/set_rotation", field=field, value={"z": half, "w": half})
@@ -186,14 +186,14 @@ def test_the_velocity_is_in_world_axes(robot, find, drive):
 
 
 def test_what_stands_has_no_velocity(robot, find):
-    """Zeros, for whatever has a place."""
+    """Every node with a frame has the velocity 0."""
     velocity = robot.get("supervisor/node/get_velocity", node=find("TARGET"))
 
     assert (velocity.linear.x, velocity.linear.y, velocity.angular.z) == (0.0, 0.0, 0.0)
 
 
 def test_a_velocity_can_be_set_and_fades(robot, find, position, drive):
-    """The motors want to stand still, and bring it there within a few basic steps."""
+    """The motors stop the robot within a few basic steps."""
     drive(robot, 0.0, 0.0, 0.0)
     velocity = {"linear": {"x": 1.0}}
 
@@ -206,13 +206,16 @@ def test_a_velocity_can_be_set_and_fades(robot, find, position, drive):
 
 
 def test_a_node_without_a_place_has_no_position(robot, find):
-    """In Webots the null pointer that is answered crashes the controller."""
+    """Webots returns a null pointer that crashes the controller."""
     with pytest.raises(ServiceFailed, match="a Cylinder has no position"):
         robot.call("supervisor/node/get_position", node=find("BODY"))
 
 
 def test_get_pose_is_swapped_as_in_webots(robot, find):
-    """It tells `from_node` seen from `node`; 0 for `from_node` crashes the real one and fails here."""
+    """It returns `from_node` relative to `node`.
+
+    0 for `from_node` crashes the real controller and fails here.
+    """
     pose = robot.get("supervisor/node/get_pose", node=find("CYLINDER_2"), from_node=find("CYLINDER_0"))
     seen = (pose.translation.x, pose.translation.y, pose.translation.z)
 
@@ -223,7 +226,7 @@ def test_get_pose_is_swapped_as_in_webots(robot, find):
 
 
 def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
-    """Wherever the robot goes."""
+    """The robot's own motion does not change it."""
     sensor = robot.get("supervisor/get_from_device", value="ir3")
     drive(robot, 0.1, 0.1, 0.5)
     robot.call("robot/time_step", value=1920)
@@ -235,7 +238,7 @@ def test_the_pose_of_a_part_is_constant_in_its_robot(robot, find, drive):
 
 
 def test_fields_are_found_by_name_and_by_index(robot, find):
-    """0 where there is none."""
+    """The handle is 0 if the field does not exist."""
     target = find("TARGET")
     count = robot.get("supervisor/node/get_number_of_fields", node=target)
     handles = [
@@ -263,7 +266,7 @@ def test_reset_physics_of_a_node_stops_it(robot, find, drive):
 
 
 def test_a_node_can_be_exported_as_written(robot, find):
-    """As it stands in the world file."""
+    """The text is that of the world file."""
     text = robot.get("supervisor/node/export_string", node=find("CYLINDER_0"))
     whole = robot.get("supervisor/node/export_string", node=robot.get("supervisor/get_root"))
 
@@ -273,7 +276,7 @@ def test_a_node_can_be_exported_as_written(robot, find):
 
 
 def test_hints_are_taken(robot, find):
-    """They change how fast Webots answers, or what it draws."""
+    """They only change the speed of Webots' responses, or the rendering."""
     target = find("TARGET")
 
     assert robot.get("supervisor/node/enable_pose_tracking", node=target, sampling_period=32) == 1
@@ -286,7 +289,7 @@ def test_hints_are_taken(robot, find):
 
 
 def test_a_used_node_is_a_node_of_its_own(robot, find):
-    """With an id of its own; DEF finds the first."""
+    """It has its own id, and DEF finds the first."""
     wall = find("WALL_0")
     field = robot.get("supervisor/node/get_field", node=wall, fieldName="boundingObject")
 
@@ -297,7 +300,7 @@ def test_a_used_node_is_a_node_of_its_own(robot, find):
 
 
 def test_what_hangs_on_a_joint_moves_with_it(ros, start, world, simple_robot):
-    """A quarter turn about x: what was 1 m to the left is 1 m up."""
+    """After a quarter turn about x, a point 1 m to the left is 1 m up."""
     arm = """HingeJoint { jointParameters HingeJointParameters { anchor 0 0 0.5 }
       device RotationalMotor { name "arm" }
       endPoint Solid { translation 0 0 0.5 children [ DEF HAND Pose { translation 0 1 0 } ] } }

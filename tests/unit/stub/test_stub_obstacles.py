@@ -1,4 +1,4 @@
-"""Discs and blocks: pushing robots out and stopping rays, checked against what a fine ruler says."""
+"""Discs and blocks push robots out and stop rays; fine sampling checks both."""
 
 import math
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 
 places = st.floats(-3, 3)
-nearby = st.floats(-1.5, 1.5)  # from the middle of an obstacle, so that most touch it
+nearby = st.floats(-1.5, 1.5)  # from the center of an obstacle, so that most touch it
 angles = st.floats(-math.pi, math.pi)
 sizes = st.floats(0.05, 2)
 discs = st.builds(Disc, places, places, sizes)
@@ -19,7 +19,7 @@ AHEAD = ((0.0, 0.0, 1.0, 0.0),)
 
 
 def cast(obstacle, x, y, heading, reach=10.0):
-    """How far one ray travels from x, y."""
+    """Return the distance that one ray travels from x, y."""
     distances = [reach]
     obstacle.scan((x, y, math.cos(heading), math.sin(heading)), AHEAD, distances)
     return distances[0]
@@ -28,10 +28,10 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @given(
     place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
 )
-@example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)  # whose square has few digits
+@example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)  # its square has few digits
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
-    """The push is the shortest way out that the contact tells."""
+    """The contact gives the shortest way out."""
     obstacle = Block(*place, heading, (1.0, 2.0)) if block else Disc(*place, 1.0)
     x, y = place[0] + away[0], place[1] + away[1]
     contact = obstacle.contact(x, y, radius)
@@ -45,7 +45,7 @@ def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, awa
 
 @given(obstacle=obstacles, x=places, y=places, radius=st.floats(0.05, 1))
 def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obstacle, x, y, radius):
-    """Contact and gap are two views of one shape."""
+    """Both values describe the same shape."""
     gap = obstacle.gap(x, y)
     assume(abs(gap - radius) > 1e-9)
 
@@ -54,7 +54,7 @@ def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obs
 
 @given(obstacle=obstacles, x=places, y=places, heading=angles)
 def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, heading):
-    """Sphere tracing: no point on the way is nearer than what was left to go."""
+    """With sphere tracing, no point on the way may be inside the obstacle."""
     assume(obstacle.gap(x, y) > 1e-6)
     met = cast(obstacle, x, y, heading)
     end = (x + met * math.cos(heading), y + met * math.sin(heading))
@@ -68,7 +68,7 @@ def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, he
 
 @given(obstacle=obstacles, x=places, y=places)
 def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
-    """Whatever the direction it comes from."""
+    """This holds for every direction."""
     assume(obstacle.gap(x, y) > 1e-6)
 
     met = cast(obstacle, x, y, math.atan2(obstacle.y - y, obstacle.x - x))
@@ -86,7 +86,7 @@ def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
 
 @given(x=places, y=places, heading=angles, ray_heading=angles)
 def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
-    """A ray in the robot's frame is turned with it."""
+    """A ray is given in the robot's frame."""
     block = Block(0.3, -0.2, 0.7, (1.0, 0.5))
     assume(block.gap(x, y) > 1e-3)
     distances = [10.0]
@@ -97,7 +97,7 @@ def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
 
 
 def test_a_ray_begins_at_its_own_origin():
-    """Sensors sit on the rim, not in the middle."""
+    """Sensors are on the rim, not in the center."""
     distances = [10.0]
 
     Disc(2.0, 0.0, 0.5).scan((0.0, 0.0, 1.0, 0.0), ((0.2, 0.0, 1.0, 0.0),), distances)
@@ -106,7 +106,7 @@ def test_a_ray_begins_at_its_own_origin():
 
 
 def test_a_ray_along_a_face_misses_a_parallel_wall():
-    """A direction of exactly 0 across the wall must not divide by it."""
+    """The direction across the wall is exactly 0 and must not be a divisor."""
     wall = Block(0.0, 1.0, 0.0, (4.0, 0.1))
 
     assert cast(wall, -3.0, 0.0, 0.0) == 10.0
@@ -114,12 +114,12 @@ def test_a_ray_along_a_face_misses_a_parallel_wall():
 
 
 def test_a_ray_from_inside_is_0_long():
-    """A sensor that was put into a wall sees the wall."""
+    """A sensor inside a wall measures the wall."""
     assert cast(Block(0.0, 0.0, 0.0, (1.0, 1.0)), 0.1, 0.1, 0.3) == 0.0
 
 
 def test_a_longer_obstacle_does_not_hide_a_nearer_one():
-    """Scans only ever shorten."""
+    """A scan can only shorten a distance."""
     distances = [10.0]
     frame = (0.0, 0.0, 1.0, 0.0)
     Disc(2.0, 0.0, 0.5).scan(frame, AHEAD, distances)
@@ -129,7 +129,7 @@ def test_a_longer_obstacle_does_not_hide_a_nearer_one():
 
 
 def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():
-    """Where no direction is the nearest, one has to be taken."""
+    """No direction is the nearest there, so any may be chosen."""
     assert Disc(1.0, 1.0, 0.5).contact(1.0, 1.0, 0.2) == (1.0, 0.0, 0.7)
 
 
@@ -137,7 +137,7 @@ def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():
     ("x", "y", "normal"), [(0.9, 0.0, (1, 0)), (-0.9, 0.0, (-1, 0)), (0, 0.4, (0, 1)), (0, -0.4, (0, -1))]
 )
 def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, normal):
-    """So that a robot put into a wall comes out on the side that it was put to."""
+    """A robot that is placed in a wall leaves it on the side from which it was placed."""
     contact = Block(0.0, 0.0, 0.0, (2.0, 1.0)).contact(x, y, 0.1)
 
     assert contact[:2] == pytest.approx(normal)
@@ -150,7 +150,7 @@ def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, nor
     reach=st.floats(0, 2),
 )
 def test_a_neighborhood_forgets_nothing_in_reach(obstacles, x, y, reach):
-    """It may tell too many, never too few."""
+    """It may return too many obstacles, but never too few."""
     near = Neighborhood(obstacles, reach).near(x, y)
 
     assert [it for it in obstacles if it.gap(x, y) <= reach and it not in near] == []

@@ -20,7 +20,7 @@ speeds = st.floats(-2, 2)
 
 @pytest.fixture
 def build():
-    """`build(obstacles, others, **motor)`: a body, and a function that commands and steps it."""
+    """`build(obstacles, others, **motor)` returns a body, and a function that commands and steps it."""
 
     def make(obstacles=(), others=(), **spec):
         wheels = [Motor(MotorSpec(name=name, **{"max_velocity_rad_s": 137.46, **spec})) for name in WHEELS]
@@ -42,12 +42,12 @@ def build():
 
 @given(vx=speeds, vy=speeds, omega=speeds)
 def test_wheel_speeds_and_twist_are_inverse(vx, vy, omega):
-    """Three wheels, three degrees of freedom: nothing is lost."""
+    """Three wheels have three degrees of freedom, so nothing is lost."""
     assert twist(*wheel_speeds(vx, vy, omega)) == pytest.approx((vx, vy, omega), abs=1e-9)
 
 
 def test_wheel_speeds_are_those_of_the_sample_controller():
-    """base.c: forwards, wheel 0 stands still and the front wheels turn against each other."""
+    """In base.c, wheel 0 stands still on the way forward, and the front wheels turn against each other."""
     w0, w1, w2 = wheel_speeds(1.0, 0.0, 0.0)
 
     assert (w0, w1, w2) == pytest.approx((0.0, -13.7464, 13.7464), abs=1e-4)
@@ -64,7 +64,7 @@ def test_wheel_speeds_are_those_of_the_sample_controller():
     ],
 )
 def test_a_second_of_driving_leads_where_it_should(build, command, moved):
-    """Slow enough that the first basic step reaches the speed."""
+    """The speed is so low that the first basic step reaches it."""
     body, go = build()
 
     go(*command, 125)
@@ -74,7 +74,7 @@ def test_a_second_of_driving_leads_where_it_should(build, command, moved):
 
 
 def test_sideways_is_sideways_of_the_robot(build):
-    """Turned left by a quarter, its left is the world's -x."""
+    """After a quarter turn to the left, the robot's left is -x of the world."""
     body, go = build()
     body.place(0.0, 0.0, math.pi / 2)
 
@@ -84,9 +84,12 @@ def test_sideways_is_sideways_of_the_robot(build):
 
 
 def test_driving_and_turning_is_a_circle(build):
-    """Radius v / omega, closed after a full turn, to within the arc's midpoint rule."""
+    """The radius is v / omega.
+
+    The circle is closed after a full turn, up to the error of the midpoint rule.
+    """
     body, go = build()
-    steps = 400  # slow enough to be at speed from the first one
+    steps = 400  # slow enough to reach the speed in the first one
     omega = 2 * math.pi / (steps * STEP_S)
 
     go(0.3, 0.0, omega, steps // 2)
@@ -98,7 +101,7 @@ def test_driving_and_turning_is_a_circle(build):
 
 
 def test_the_heading_stays_in_half_a_turn_each_way(build):
-    """However often it turns."""
+    """The number of turns does not matter."""
     body, go = build()
 
     for _ in range(300):
@@ -108,7 +111,7 @@ def test_the_heading_stays_in_half_a_turn_each_way(build):
 
 @pytest.mark.parametrize(("axis", "limit"), [(0, 10.0), (1, 6.0), (2, 20.0)])
 def test_speeding_up_takes_its_time(build, axis, limit):
-    """10 m/s2, 6 m/s2 and 20 rad/s2, as in the sample controller."""
+    """The limits are 10 m/s2, 6 m/s2 and 20 rad/s2, as in the sample controller."""
     body, go = build()
     command = [0.0, 0.0, 0.0]
     command[axis] = 3.0
@@ -121,7 +124,7 @@ def test_speeding_up_takes_its_time(build, axis, limit):
 
 
 def test_all_axes_are_slowed_by_the_same_factor(build):
-    """So that the direction is right from the first basic step on."""
+    """The direction is then right from the first basic step on."""
     body, go = build()
 
     go(2.0, 2.0, 0.0, 1)
@@ -131,7 +134,7 @@ def test_all_axes_are_slowed_by_the_same_factor(build):
 
 
 def test_a_motor_that_is_slower_than_its_command_bends_the_way(build):
-    """A wheel's own maxVelocity is the last word."""
+    """A wheel's own maxVelocity always applies."""
     body, go = build(max_velocity_rad_s=5.0)
 
     go(1.0, 0.0, 0.0, 50)
@@ -140,7 +143,7 @@ def test_a_motor_that_is_slower_than_its_command_bends_the_way(build):
 
 
 def test_a_motor_with_an_acceleration_is_slower_to_start(build):
-    """On top of the robot's own limits."""
+    """The robot's own limits apply too."""
     body, go = build(acceleration_rad_s2=10.0)
 
     go(0.3, 0.0, 0.0, 1)
@@ -149,7 +152,7 @@ def test_a_motor_with_an_acceleration_is_slower_to_start(build):
 
 
 def test_standing_still_is_exact(build):
-    """No drift, so that two runs can be compared bit by bit."""
+    """There is no drift, so two runs can be compared bit by bit."""
     body, go = build()
     go(0.3, 0.2, 0.1, 40)
     go(0.0, 0.0, 0.0, 10)
@@ -162,7 +165,7 @@ def test_standing_still_is_exact(build):
 
 
 def test_a_wall_stops_what_drives_straight_into_it(build):
-    """The rim at the wall, no further."""
+    """Its rim stops at the wall."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(0.5, 0.0, 0.0, 200)
@@ -173,7 +176,7 @@ def test_a_wall_stops_what_drives_straight_into_it(build):
 
 
 def test_a_robot_slides_along_a_wall(build):
-    """The part along the wall is kept whole."""
+    """The component along the wall is not reduced."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 40.0))])
     body.place(0.8, 0.0, 0.0)
 
@@ -184,7 +187,7 @@ def test_a_robot_slides_along_a_wall(build):
 
 
 def test_a_robot_slides_round_a_cylinder(build):
-    """Hit off its middle, it is passed, at the distance of the two radii."""
+    """If it is hit off its center, the robot passes it at the distance of the two radii."""
     disc = Disc(1.0, 0.0, 0.15)
     body, go = build([disc])
     body.place(0.0, 0.05, 0.0)
@@ -199,7 +202,7 @@ def test_a_robot_slides_round_a_cylinder(build):
 
 
 def test_a_corner_holds(build):
-    """Two contacts at a time."""
+    """The corner has two contacts at a time."""
     walls = [Block(1.05, 0.0, 0.0, (0.1, 4.0)), Block(0.0, 1.05, 0.0, (4.0, 0.1))]
     body, go = build(walls)
 
@@ -209,7 +212,7 @@ def test_a_corner_holds(build):
 
 
 def test_wheels_spin_on_at_a_wall(build):
-    """The shafts turn as commanded; only the floor knows that it slips."""
+    """The shafts turn as commanded; only the body knows that they slip."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
     go(0.5, 0.0, 0.0, 200)
     before = body.x
@@ -230,7 +233,7 @@ def test_nothing_is_fast_enough_to_pass_through_a_wall(build, speed):
 
 
 def test_at_rest_against_a_wall_nothing_is_touched_any_more(build):
-    """A touch is a push; rounding at the surface isn't one."""
+    """Only a push counts as a touch, not a rounding error at the surface."""
     body, go = build([Block(1.05, 0.0, 0.3, (0.1, 4.0))])
     go(0.5, 0.0, 0.0, 100)
     go(0.0, 0.0, 0.0, 5)
@@ -242,7 +245,7 @@ def test_at_rest_against_a_wall_nothing_is_touched_any_more(build):
 
 
 def test_a_robot_that_is_put_into_a_wall_is_pushed_out(build):
-    """Also when it stands still."""
+    """This holds also for a robot that stands still."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
     body.place(0.95, 0.0, 0.0)
 
@@ -267,7 +270,7 @@ def test_robots_stop_each_other_and_both_feel_it(build):
 
 
 def test_halting_takes_all_motion_and_the_motors_begin_again(build):
-    """reset_physics: velocities of zero, commands kept."""
+    """reset_physics sets velocities to zero and keeps the commands."""
     body, go = build()
     go(3.0, 0.0, 0.0, 50)
 
@@ -279,7 +282,7 @@ def test_halting_takes_all_motion_and_the_motors_begin_again(build):
 
 
 def test_a_push_fades_as_the_motors_take_over(build):
-    """In world axes, whatever the heading."""
+    """The push is in world axes, whatever the heading."""
     body, go = build()
     body.place(0.0, 0.0, math.pi / 2)
     body.push(1.0, 0.0, 0.0)
@@ -298,7 +301,7 @@ def test_a_push_fades_as_the_motors_take_over(build):
     )
 )
 def test_a_robot_never_ends_inside_anything(commands):
-    """Whatever is commanded, in an arena with walls and a cylinder."""
+    """This holds for any commands, in an arena with walls and a cylinder."""
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     obstacles = [*walls, Disc(0.6, 0.6, 0.1)]

@@ -1,4 +1,4 @@
-"""From meters to volts: the lookup table of a sensor, and the fan of rays of a robot."""
+"""The lookup table of a sensor turns meters into volts; a robot has a fan of rays."""
 
 import math
 import random
@@ -15,17 +15,17 @@ ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
 
 
 def silent(_mean, _deviation):
-    """A source of noise that must not be asked."""
+    """Raise an error, because a sensor without noise must draw none."""
     raise AssertionError("a sensor without noise drew some")
 
 
 def one(_mean, deviation):
-    """A draw of exactly one deviation."""
+    """Return a draw of exactly one deviation."""
     return deviation
 
 
 def test_rows_answer_their_own_value():
-    """The table is exact where it says something."""
+    """At its rows, the table is exact."""
     table = LookupTable(ROWS)
 
     assert [table.response(row[0], silent) for row in ROWS] == pytest.approx([3.0, 2.0, 1.0])
@@ -33,18 +33,18 @@ def test_rows_answer_their_own_value():
 
 @pytest.mark.parametrize(("distance", "volts"), [(0.15, 2.5), (0.3, 1.5), (0.25, 1.75)])
 def test_between_rows_it_is_linear(distance, volts):
-    """As in Webots."""
+    """Webots does the same."""
     assert LookupTable(ROWS).response(distance, silent) == pytest.approx(volts)
 
 
 @pytest.mark.parametrize(("distance", "volts"), [(0.0, 3.0), (0.05, 3.0), (0.41, 1.0), (1e9, 1.0)])
 def test_beyond_both_ends_the_end_value_holds(distance, volts):
-    """Nothing is extrapolated, in both directions."""
+    """No value is extrapolated at either end."""
     assert LookupTable(ROWS).response(distance, silent) == volts
 
 
 def test_noise_is_a_fraction_of_the_response():
-    """One deviation of a noise of 10 % on 2 V is 0.2 V."""
+    """One deviation of 10 % noise on 2 V is 0.2 V."""
     table = LookupTable([(d, v, 0.1) for d, v, _ in ROWS])
 
     assert table.response(0.2, one) == pytest.approx(2.2)
@@ -53,20 +53,20 @@ def test_noise_is_a_fraction_of_the_response():
 
 
 def test_noise_is_interpolated_too():
-    """Each row has its own."""
+    """Each row has its own noise."""
     table = LookupTable([(0.0, 1.0, 0.0), (1.0, 1.0, 0.2)])
 
     assert table.response(0.5, one) == pytest.approx(1.1)
 
 
 def test_an_empty_table_answers_metres():
-    """As in Webots."""
+    """Webots does the same."""
     assert LookupTable([]).response(0.37, silent) == pytest.approx(0.37)
 
 
 @given(distance=st.floats(0, 2))
 def test_a_response_lies_between_the_limits(distance):
-    """What min_range and max_range of the message promise, without noise."""
+    """The message promises min_range and max_range for values without noise."""
     table = LookupTable(ROWS)
     low, high = table.limits
 
@@ -74,7 +74,7 @@ def test_a_response_lies_between_the_limits(distance):
 
 
 def test_noise_has_the_spread_that_the_table_says():
-    """0.5 % of the response, over many draws."""
+    """It is 0.5 % of the response, over many draws."""
     table = LookupTable([(0.0, 2.0, 0.005)])
     gauss = random.Random(1).gauss
     draws = [table.response(0.1, gauss) for _ in range(5000)]
@@ -86,24 +86,24 @@ def test_noise_has_the_spread_that_the_table_says():
 
 
 def fan_of(obstacles):
-    """Two rays on the rim of a robot: ahead and to the left."""
+    """Return two rays on the rim of a robot: ahead and to the left."""
     fan = Fan([(0.2, 0.0, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)], [0.4, 0.4])
     fan.face(Neighborhood(obstacles, fan.reach_m), ())
     return fan
 
 
 def test_rays_that_meet_nothing_have_their_full_reach():
-    """Which the table turns into its last value."""
+    """The table turns it into its last value."""
     assert fan_of([]).cast((0.0, 0.0, 1.0, 0.0)) == [0.4, 0.4]
 
 
 def test_each_ray_is_stopped_for_itself():
-    """By what stands in its own way."""
+    """Only an obstacle in its own direction stops it."""
     assert fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, 1.0, 0.0)) == pytest.approx([0.4, 0.2])
 
 
 def test_rays_turn_with_the_robot():
-    """Turned left, what was on the left is ahead."""
+    """After a left turn, objects on the left are ahead."""
     left = math.pi / 2
 
     distances = fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, math.cos(left), math.sin(left)))
@@ -112,7 +112,7 @@ def test_rays_turn_with_the_robot():
 
 
 def test_rays_meet_robots_that_drive():
-    """Where these are now, not where they were when the scene was read."""
+    """The rays use the current positions of robots, not those in the world file."""
     other = Disc(5.0, 0.0, 0.2)
     fan = Fan([(0.2, 0.0, 1.0, 0.0)], [0.4])
     fan.face(Neighborhood((), fan.reach_m), [other])

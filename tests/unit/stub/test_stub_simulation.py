@@ -1,4 +1,4 @@
-"""The simulation without ROS: as an experiment drives it, and what a reset restores."""
+"""The simulation without ROS, as an experiment uses it, and the effects of a reset."""
 
 import math
 import subprocess
@@ -17,7 +17,7 @@ from tests.scenes import load_scene
 
 @pytest.fixture
 def simulation():
-    """The shipped arena."""
+    """The simulation of the built-in arena."""
     return load_scene(builtin("arena"))
 
 
@@ -30,13 +30,13 @@ def drive(simulation, vx, vy, omega):
 
 
 def readings(simulation):
-    """All sensor values and the pose, exactly."""
+    """Return all sensor values and the pose, unrounded."""
     robot = simulation.robots[0]
     return [sensor.value for sensor in robot.sensors.values()] + [*robot.place.translation]
 
 
 def run(simulation, steps=30):
-    """Drive a fixed way, and return every reading on it."""
+    """Drive a fixed route, and return every reading on it."""
     history = []
     for step in range(steps):
         drive(simulation, 0.3, 0.1 * math.sin(step), 0.2)
@@ -46,7 +46,7 @@ def run(simulation, steps=30):
 
 
 def test_it_can_be_driven_without_ros(simulation):
-    """Load, command, step, read."""
+    """A program can load, command, step and read."""
     robot = simulation.robots[0]
     robot.motors["wheel0_joint"].set_position(math.inf)
     robot.motors["wheel0_joint"].set_velocity(2.0)
@@ -68,7 +68,7 @@ def test_it_can_be_driven_without_ros(simulation):
     )
 )
 def test_sending_a_velocity_again_changes_nothing(ways):
-    """The trainer's facade does not send unchanged velocities; a run must stay the same bit by bit."""
+    """The trainer's facade does not send unchanged velocities; the run must stay the same, bit by bit."""
 
     def moments(told_again):
         simulation = load_scene(builtin("arena"))
@@ -88,7 +88,7 @@ def test_sending_a_velocity_again_changes_nothing(ways):
 
 
 def test_the_front_sensor_tells_volts_at_a_wall(simulation):
-    """Driven into the wall ahead, the ray is 2 mm long: the table's first row."""
+    """In front of the wall the ray is 2 mm long, so the table's first row applies."""
     drive(simulation, 0.5, 0.0, 0.0)
     for _ in range(30):
         simulation.step(192)
@@ -101,7 +101,7 @@ def test_the_front_sensor_tells_volts_at_a_wall(simulation):
 
 
 def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
-    """A touch in the first of six basic steps is not missed, and is reported once."""
+    """A touch in the first of six basic steps must not be missed, and is reported once."""
     robot = simulation.robots[0]
     robot.body.place(1.76, 0.0, 0.0)
     drive(simulation, 0.5, 0.0, 0.0)
@@ -117,13 +117,13 @@ def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
 
 @pytest.mark.parametrize("duration_ms", [0, -32, 33])
 def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms):
-    """Anything else would be another duration than asked for."""
+    """Any other value would step another duration than the requested one."""
     with pytest.raises(ValueError, match="no multiple of the basic step"):
         simulation.step(duration_ms)
 
 
 def test_two_simulations_of_a_world_agree_bit_by_bit():
-    """Same world, same commands, same seed."""
+    """World, commands and seed are the same."""
     assert run(load_scene(builtin("arena"))) == run(load_scene(builtin("arena")))
 
 
@@ -141,7 +141,7 @@ def test_a_reset_repeats_the_run_bit_by_bit(simulation):
 
 
 def test_another_seed_is_another_noise(simulation):
-    """And the same way driven, for the noise reaches the sensors only."""
+    """The route is the same, because noise affects only the sensors."""
     histories = []
     for seed in ("7", '{"seed": 8}'):
         simulation.robots[0].custom_data = seed
@@ -154,7 +154,7 @@ def test_another_seed_is_another_noise(simulation):
 
 
 def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
-    """A draw a sensor a step, seen or not: a robot elsewhere has the same noise in its free rays."""
+    """Each sensor draws once a step, so a robot elsewhere has the same noise in its free rays."""
     values = []
     for x in (0.0, 1.7):
         simulation.reset()
@@ -167,7 +167,7 @@ def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
 
 
 def test_every_robot_has_noise_of_its_own():
-    """Seeded by its own customData."""
+    """Its own customData seeds it."""
     source = builtin("arena")
     robot = source[source.index(b"DEF ROBOTINO Robot") :]
     source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)
@@ -197,23 +197,23 @@ def test_every_robot_has_noise_of_its_own():
     ],
 )
 def test_a_seed_is_a_number_or_in_an_object(custom_data, seed):
-    """Anything else leaves the seed as it was."""
+    """Any other value leaves the seed unchanged."""
     assert seed_of(custom_data, otherwise=1) == seed
 
 
 @given(text=st.text())
 def test_no_custom_data_is_an_error(text):
-    """It may be somebody else's data."""
+    """The data may belong to another program."""
     assert isinstance(seed_of(text, otherwise=1), int)
 
 
 def test_the_first_seed_is_that_of_the_world(world):
-    """WorldInfo.randomSeed, until customData gives another."""
+    """It is WorldInfo.randomSeed until customData sets another."""
     assert load_scene(world(info="randomSeed 42")).robots[0].seed == 42
 
 
 def test_a_reset_happens_within_the_next_basic_step(simulation):
-    """Asked for, nothing changes; after a step the time is one basic step."""
+    """The request changes nothing; after the next step the time is one basic step."""
     drive(simulation, 0.3, 0.0, 0.0)
     simulation.step(1920)
     simulation.reset()
@@ -226,7 +226,7 @@ def test_a_reset_happens_within_the_next_basic_step(simulation):
 
 
 def test_the_steps_after_the_first_go_on_from_the_reset(simulation):
-    """A long step with a reset in it ends five basic steps after it."""
+    """A long step that contains the reset ends five basic steps after it."""
     simulation.reset()
 
     simulation.step(192)
@@ -235,7 +235,7 @@ def test_the_steps_after_the_first_go_on_from_the_reset(simulation):
 
 
 def test_a_reset_restores_motors_and_rest(simulation):
-    """Position control at 0: a client that forgets set_position(inf) stands still."""
+    """It sets position control at 0: a client that forgets set_position(inf) stands still."""
     drive(simulation, 0.3, 0.0, 0.5)
     simulation.step(1920)
     simulation.reset()
@@ -250,7 +250,7 @@ def test_a_reset_restores_motors_and_rest(simulation):
 
 
 def test_a_reset_restores_the_places_of_all_solids(simulation):
-    """The target and the cylinders too, and what rays see of them."""
+    """This includes the target and the cylinders, and the rays see the difference."""
     cylinder = simulation.tree.of_def("CYLINDER_0")
     translation = simulation.tree.field_of(cylinder, "translation", simulation)
     translation.set(FieldType.VEC3F, 0, (0.5, 0.0, 0.2))
@@ -265,7 +265,7 @@ def test_a_reset_restores_the_places_of_all_solids(simulation):
 
 
 def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
-    """Only motion goes."""
+    """It only stops the motion."""
     drive(simulation, 2.0, 0.0, 0.0)
     simulation.step(320)
     place = simulation.robots[0].place.translation
@@ -278,7 +278,7 @@ def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
 
 
 def test_it_is_small():
-    """Many run on one machine: the whole stub below 120 MB, and this part of it far below."""
+    """Many stubs run on one machine; a whole stub needs less than 120 MB, and this part far less."""
     program = (
         "import pathlib, sys; from palaestra_sim.scene.simulation import Simulation;"
         "from palaestra_sim.stub.physics import StubPhysics;"

@@ -1,4 +1,4 @@
-"""A stub from one world to the next: reload, load, restart, quit, and what controllerArgs ask for."""
+"""A stub between two worlds: reload, load, restart and quit, and the arguments in controllerArgs."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from palaestra_sim.world import builtin
 
 
 def test_a_controller_starts_for_each_ros_robot(ros, start):
-    """Under the names of controllerArgs."""
+    """Their names come from controllerArgs."""
     simulator = start(builtin("two_robots"))
 
     assert list(simulator.controllers) == ["supervisor", "robotino"]
@@ -20,7 +20,7 @@ def test_a_controller_starts_for_each_ros_robot(ros, start):
 
 
 def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_robot):
-    """They stand about, and the world does not wait for them."""
+    """They do not move, and the world does not wait for them."""
     start(world('Robot { name "statue" controller "<none>" }', robot=simple_robot))
 
     assert [node.name for node in ros.nodes] == ["robotino"]
@@ -28,7 +28,7 @@ def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_
 
 
 def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
-    """The error comes before any node does."""
+    """The error comes before any node is created."""
     path = tmp_path / "bad.wbt"
     path.write_bytes(b"#VRML_SIM R2023b utf8\nColosseum { }\n")
 
@@ -48,20 +48,20 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     ],
 )
 def test_arguments_that_the_stub_cannot_follow_are_refused(start, world, simple_robot, change, fact):
-    """A robot that runs freely, or under another's control, is not what this simulates."""
+    """The stub does not simulate a robot that is not synchronized or has another controller."""
     with pytest.raises(WorldError, match=fact):
         start(world(robot=simple_robot.replace(*change)))
 
 
 def test_unknown_arguments_are_ignored(ros, start, world, simple_robot):
-    """The real controller complains in its log and goes on."""
+    """The real controller logs them and continues."""
     start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--speed=7"')))
 
     assert ros.node("robotino").get("robot/get_time") == 0.0
 
 
 def test_a_reload_ends_the_controllers_and_starts_new_ones(ros, start):
-    """Services vanish and come back; enables are lost; the file's state is restored."""
+    """Services disappear and come back, sensors are disabled, and the file's state is restored."""
     start()
     old = ros.node("robotino")
     old.call("ir1/enable", value=32)
@@ -90,7 +90,7 @@ def test_handles_do_not_survive_a_reload(ros, start):
 
 
 def test_revert_is_the_old_name_of_reload(ros, start):
-    """Deprecated, still served."""
+    """It is deprecated, but still served."""
     start()
 
     ros.node("robotino").call("supervisor/simulation_revert")
@@ -99,7 +99,7 @@ def test_revert_is_the_old_name_of_reload(ros, start):
 
 
 def test_a_reload_reads_the_file_again(ros, start):
-    """It applies changes of the file and keeps the mode."""
+    """Changes of the file take effect, and the mode stays."""
     simulator = start(mode=Mode.FAST)
     text = simulator.world_path.read_bytes()
     simulator.world_path.write_bytes(text.replace(b"basicTimeStep 32", b"basicTimeStep 16"))
@@ -111,7 +111,7 @@ def test_a_reload_reads_the_file_again(ros, start):
 
 
 def test_another_world_can_be_loaded(ros, start, world, tmp_path):
-    """By its absolute path."""
+    """The path must be absolute."""
     start()
     other = tmp_path / "other.wbt"
     other.write_bytes(world())
@@ -123,7 +123,7 @@ def test_another_world_can_be_loaded(ros, start, world, tmp_path):
 
 @pytest.mark.parametrize("content", [None, b"", b"#VRML_SIM R2023b utf8\nSphere { }"])
 def test_a_world_that_cannot_be_loaded_leaves_the_present_one(ros, start, tmp_path, content):
-    """Missing, empty, or beyond the stub."""
+    """The file may be missing, empty, or not supported by the stub."""
     start()
     other = tmp_path / "other.wbt"
     if content is not None:
@@ -135,7 +135,7 @@ def test_a_world_that_cannot_be_loaded_leaves_the_present_one(ros, start, tmp_pa
 
 
 def test_a_reload_with_two_robots_restarts_both(two_robots, ros):
-    """And the world waits for both again."""
+    """The world then waits for both again."""
     supervisor, _ = two_robots
 
     supervisor.call("supervisor/world_reload")
@@ -148,7 +148,7 @@ def test_a_reload_with_two_robots_restarts_both(two_robots, ros):
 
 
 def test_one_controller_can_be_restarted_alone(two_robots, ros):
-    """The world and the other robot go on."""
+    """The world and the other robot continue."""
     supervisor, robotino = two_robots
     handle = supervisor.get("supervisor/get_from_def", name="ROBOTINO")
     for node in (supervisor, robotino):
@@ -163,7 +163,7 @@ def test_one_controller_can_be_restarted_alone(two_robots, ros):
 
 
 def test_restarting_the_controller_of_what_is_no_robot_does_nothing(two_robots):
-    """Webots prints that it is no robot, and its controller answers success all the same."""
+    """Webots logs that it is not a robot, but its controller returns success."""
     supervisor, robotino = two_robots
     handle = supervisor.get("supervisor/get_from_def", name="TARGET")
 
@@ -173,7 +173,7 @@ def test_restarting_the_controller_of_what_is_no_robot_does_nothing(two_robots):
 
 
 def test_quit_tells_the_process_its_exit_status(ros, start):
-    """After the answer was sent."""
+    """The response is sent first."""
     simulator = start()
     statuses = []
     simulator.on_quit(statuses.append)
@@ -189,7 +189,7 @@ def test_quit_tells_the_process_its_exit_status(ros, start):
 
 
 def test_quit_ends_pending_steps_without_success(two_robots):
-    """-1 from wb_robot_step: the controller ends."""
+    """wb_robot_step returns -1, so the controller ends."""
     supervisor, robotino = two_robots
     pending = robotino.ask("robot/time_step", value=32)
 
@@ -211,7 +211,7 @@ def test_quitting_twice_keeps_the_first_status(ros, start):
 
 
 def test_closing_ends_every_controller(ros, start):
-    """As on SIGTERM: services are unregistered in good order."""
+    """As on SIGTERM, services are unregistered in order."""
     simulator = start(builtin("two_robots"))
 
     simulator.close()
@@ -221,7 +221,7 @@ def test_closing_ends_every_controller(ros, start):
 
 
 def test_messages_that_were_due_at_a_reload_never_come(ros, start):
-    """Their controller is gone."""
+    """Their controller no longer exists."""
     start(publish_delay_s=0.01)
     old = ros.node("robotino")
     inbox = old.inbox("ir1/value")
@@ -235,7 +235,7 @@ def test_messages_that_were_due_at_a_reload_never_come(ros, start):
 
 
 def test_a_step_that_sleeps_through_a_restart_is_not_answered(ros, start):
-    """The connection is gone by then."""
+    """The connection is closed by then."""
     start(builtin("two_robots"), step_sleep_s=0.01)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
     numbers = [node.ask("robot/time_step", value=32) for node in (supervisor, robotino)]
@@ -251,7 +251,7 @@ def test_a_step_that_sleeps_through_a_restart_is_not_answered(ros, start):
 
 
 def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
-    """The flag is set at once, the work is done inside the next basic step; nothing restarts."""
+    """The call sets a flag, and the next basic step does the work; nothing restarts."""
     drive(robot, 0.3, 0.0, 0.0)
     robot.call("ir1/enable", value=192)
     inbox = robot.inbox("ir1/value")
@@ -268,7 +268,7 @@ def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
 
 
 def test_reset_physics_through_the_supervisor_is_at_once(robot, drive):
-    """No step needed."""
+    """It needs no step."""
     drive(robot, 1.0, 0.0, 0.0)
     robot.call("robot/time_step", value=320)
     handle = robot.get("supervisor/get_self")

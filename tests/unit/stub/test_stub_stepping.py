@@ -1,4 +1,4 @@
-"""`time_step`: accepted values, the time of the answer, and which controller waits for which."""
+"""`time_step`: accepted values, the time of the response, and how controllers wait for each other."""
 
 import pytest
 from hypothesis import given
@@ -13,27 +13,27 @@ PENDING = "pending"
 
 
 def outcome(node, number):
-    """What a request came to by now."""
+    """Return the success of a request, or PENDING."""
     answer = node.answers.get(number)
     return PENDING if answer is None else answer.success
 
 
 @pytest.mark.parametrize("step_ms", [32, 64, 192, 3200])
 def test_a_multiple_of_the_basic_step_is_simulated(robot, step_ms):
-    """Time goes on by exactly what was asked for."""
+    """The time advances by exactly the requested value."""
     assert robot.get("robot/time_step", value=step_ms) is True
     assert robot.get("robot/get_time") == pytest.approx(step_ms / 1000)
 
 
 @pytest.mark.parametrize("step_ms", [1, 31, 33, 100, -1, -32, -192])
 def test_any_other_step_is_refused_and_changes_nothing(robot, step_ms):
-    """Success is false; no time passes."""
+    """`success` is false, and no time passes."""
     assert robot.get("robot/time_step", value=step_ms) is False
     assert robot.get("robot/get_time") == 0.0
 
 
 def test_a_step_of_0_is_one_basic_step(robot):
-    """Meant as "the client leaves"."""
+    """Webots uses 0 as the message that a client leaves."""
     robot.call("robot/time_step", value=192)
 
     assert robot.get("robot/time_step", value=0) is True
@@ -41,7 +41,7 @@ def test_a_step_of_0_is_one_basic_step(robot):
 
 
 def test_a_step_in_pause_is_not_answered(ros, start):
-    """Webots holds the mutex of the controller until the step is done."""
+    """Webots holds the controller's mutex until the step is done."""
     start(mode=Mode.PAUSE)
     robot = ros.node("robotino")
 
@@ -53,7 +53,7 @@ def test_a_step_in_pause_is_not_answered(ros, start):
 
 
 def test_every_other_service_waits_behind_a_pending_step(ros, start):
-    """The deadlock of a client that steps in pause and then asks the same controller to run."""
+    """A client that steps while paused and then requests the same controller's run mode is deadlocked."""
     start(mode=Mode.PAUSE)
     robot = ros.node("robotino")
     robot.ask("robot/time_step", value=32)
@@ -67,7 +67,7 @@ def test_every_other_service_waits_behind_a_pending_step(ros, start):
 
 
 def test_another_supervisor_ends_the_deadlock(ros, start):
-    """The pending step is made, then what waited behind it is answered in its order."""
+    """The pending step is done, and then the waiting calls get their responses in order."""
     start(builtin("two_robots"), mode=Mode.PAUSE)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
     step = robotino.ask("robot/time_step", value=32)
@@ -82,7 +82,10 @@ def test_another_supervisor_ends_the_deadlock(ros, start):
 
 
 def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
-    """A step is answered when the world has moved; the world moves when all have asked."""
+    """A step gets its response when the world has moved.
+
+    The world moves when every robot has requested a step.
+    """
     supervisor, robotino = two_robots
 
     first = supervisor.ask("robot/time_step", value=192)
@@ -111,7 +114,7 @@ def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
 
 
 def test_a_robot_with_synchronization_false_holds_nobody(ros, start):
-    """Its own steps end when the world has moved on for another reason."""
+    """Its own steps end when another robot has moved the world."""
     world = builtin("two_robots").replace(b'name "supervisor"', b'name "supervisor" synchronization FALSE', 1)
     start(world)
     supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
@@ -127,7 +130,7 @@ def test_a_robot_with_synchronization_false_holds_nobody(ros, start):
 
 
 def test_a_sleeping_stub_answers_after_its_sleep(ros, start):
-    """The stand-in for a world that takes time to simulate."""
+    """The sleep stands for a world that takes time to simulate."""
     start(step_sleep_s=0.003)
     robot = ros.node("robotino")
 
@@ -141,7 +144,7 @@ def test_a_sleeping_stub_answers_after_its_sleep(ros, start):
 
 
 def test_real_time_takes_as_long_as_it_says(ros, start):
-    """100 steps of 32 ms take 3.2 s, however fast they are asked for."""
+    """100 steps of 32 ms take 3.2 s, however fast they are requested."""
     start(mode=Mode.REAL_TIME)
     robot = ros.node("robotino")
     begun_s = ros.now_s
@@ -155,7 +158,7 @@ def test_real_time_takes_as_long_as_it_says(ros, start):
 
 
 def test_real_time_does_not_make_up_for_a_client_that_was_away(ros, start):
-    """It is owed one basic step, and waits for the other nine."""
+    """One basic step is done at once, and the other nine take their time."""
     start(mode=Mode.REAL_TIME)
     robot = ros.node("robotino")
     robot.ask("robot/time_step", value=32)
@@ -171,7 +174,7 @@ def test_real_time_does_not_make_up_for_a_client_that_was_away(ros, start):
 
 @pytest.mark.parametrize(("mode", "known"), [(0, True), (1, True), (2, True), (3, False), (-1, False)])
 def test_modes_are_those_since_r2021a(robot, mode, known):
-    """PAUSE 0, REAL_TIME 1, FAST 2; the old FAST, 3, is not among them."""
+    """They are PAUSE 0, REAL_TIME 1 and FAST 2; the old FAST, 3, is not among them."""
     assert robot.get("supervisor/simulation_set_mode", value=mode) is known
     assert robot.get("supervisor/simulation_get_mode") == (mode if known else Mode.FAST)
 
@@ -180,7 +183,7 @@ def test_modes_are_those_since_r2021a(robot, mode, known):
     orders=st.lists(st.tuples(st.integers(0, 1), st.sampled_from([32, 64, 96, 192])), min_size=1, max_size=30)
 )
 def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
-    """The world's time is the smallest of what the robots have asked for in total."""
+    """The world's time is the smallest of the totals that the robots have requested."""
     simulation = load_scene(builtin("two_robots"))
     stepping = Stepping(simulation)
     for robot in simulation.robots:
@@ -199,7 +202,7 @@ def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
 
 
 class OtherSimulation:
-    """A simulation of another kind, which notes what its steps ask of it."""
+    """A different simulation, which records the calls of its steps."""
 
     def __init__(self):
         self.mode = Mode.FAST
@@ -207,16 +210,16 @@ class OtherSimulation:
         self.asked = []
 
     def advance(self, duration_ms):
-        """Note the duration."""
+        """Record the duration."""
         self.asked.append(duration_ms)
 
     def sample(self):
-        """Note that the sensors get their values."""
+        """Record a sampling of the sensors."""
         self.asked.append("sample")
 
 
 def test_any_simulation_can_be_stepped():
-    """Other simulators stand behind the same controllers: they move, then sample once a step."""
+    """Other simulators use the same controllers; they move, then sample once a step."""
     simulation, answers = OtherSimulation(), []
     stepping = Stepping(simulation)
 

@@ -1,4 +1,4 @@
-"""Emitters, receivers, connectors, speakers, pens and grippers: what devices do to each other."""
+"""Emitters, receivers, connectors, speakers, pens and grippers, which affect each other."""
 
 import pytest
 
@@ -12,7 +12,7 @@ RECEIVER = 'Receiver { name "ear" channel 1 rotation 0 0 1 1.5707963 }'
 
 @pytest.fixture
 def pair(start, world, ros):
-    """`pair(here, there, distance)`: the nodes of two robots with these devices."""
+    """`pair(here, there, distance)` returns the nodes of two robots with these devices."""
 
     def begin(here, there, distance_m=1.0):
         start(world(robot=f"{TALKER.format('here', 0, here)} {TALKER.format('there', distance_m, there)}"))
@@ -22,13 +22,16 @@ def pair(start, world, ros):
 
 
 def step(*robots):
-    """Let each robot make a basic step."""
+    """Make a basic step of each robot."""
     for robot in robots:
         robot.call("robot/time_step", value=32)
 
 
 def test_a_packet_arrives_after_the_next_step(pair):
-    """With its direction in the receiver's frame, a quarter turned, and 1 / distance squared."""
+    """The receiver is turned by 90 degrees, and gets the direction in its own frame.
+
+    The strength is 1 / distance squared.
+    """
     here, there = pair(EMITTER, RECEIVER, 2.0)
     heard = there.inbox("ear/data")
     assert there.get("ear/enable", value=32) is True
@@ -45,7 +48,7 @@ def test_a_packet_arrives_after_the_next_step(pair):
 
 
 def test_a_robot_does_not_hear_itself(pair):
-    """Webots transmits no packet from a robot to itself, on any channel."""
+    """Webots sends no packet from a robot to itself, on any channel."""
     here, there = pair(EMITTER + RECEIVER, RECEIVER)
     for robot in (here, there):
         robot.call("ear/enable", value=32)
@@ -57,7 +60,7 @@ def test_a_robot_does_not_hear_itself(pair):
 
 
 def test_packets_wait_in_a_queue(pair):
-    """`next_packet` drops the oldest; then there is nothing to ask about."""
+    """`next_packet` drops the oldest one; an empty queue has no packet to read."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     here.call("mouth/send", value="one")
@@ -81,7 +84,7 @@ def test_packets_wait_in_a_queue(pair):
     ],
 )
 def test_a_channel_is_heard_by_those_who_listen_to_it(pair, emitter, receiver, arrives):
-    """-1 is all."""
+    """The channel -1 means all."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     assert here.get("mouth/set_channel", value=emitter) is True
@@ -95,7 +98,7 @@ def test_a_channel_is_heard_by_those_who_listen_to_it(pair, emitter, receiver, a
 
 
 def test_a_packet_does_not_reach_beyond_the_range(pair):
-    """A range beyond `maxRange` is that, and so is -1; others below 0 are ignored."""
+    """A larger range than `maxRange` is cut, -1 means `maxRange`, and other negative values are ignored."""
     here, there = pair(EMITTER, RECEIVER, 3.0)
     there.call("ear/enable", value=32)
     for range_m in (2.0, 4.0, 6.0):
@@ -111,7 +114,7 @@ def test_a_packet_does_not_reach_beyond_the_range(pair):
 
 
 def test_a_receiver_that_is_not_enabled_hears_nothing(pair):
-    """And it forgets what it heard when it is switched off."""
+    """It drops its packets when it is disabled."""
     here, there = pair(EMITTER, RECEIVER)
     here.call("mouth/send", value="early")
     step(here, there)
@@ -125,7 +128,7 @@ def test_a_receiver_that_is_not_enabled_hears_nothing(pair):
 
 
 def test_a_full_buffer_takes_no_more(pair):
-    """10 bytes; the call answers success all the same, as in Webots."""
+    """It has 10 bytes; as in Webots, the call still succeeds."""
     here, there = pair(EMITTER, RECEIVER)
     there.call("ear/enable", value=32)
     for text in ("0123456", "789a", "bcd"):
@@ -146,7 +149,7 @@ def test_a_full_buffer_takes_no_more(pair):
     ],
 )
 def test_a_connector_feels_a_fitting_one_that_faces_it(pair, there, presence):
-    """Of the same model and type, near, and axis to axis."""
+    """The other connector has the same model and type, is near, and its axis is aligned."""
     here, _ = pair('Connector { name "socket" model "a" }', there, 0.005)
     felt = here.inbox("socket/presence")
     assert here.get("socket/presence_sensor/enable", value=32) is True
@@ -170,7 +173,7 @@ def test_a_passive_connector_has_no_sensor_and_every_one_can_be_locked(pair):
 
 
 def test_a_speaker_loops_a_sound_until_it_is_stopped(pair):
-    """A sound that does not loop is over at once, because nobody hears it."""
+    """Nobody hears the sound, so one that does not loop ends at once."""
     here, _ = pair('Speaker { name "horn" }', "")
     play = {"volume": 1.0, "pitch": 1.0, "balance": 0.0}
     for sound, loop in (("a.wav", False), ("b.wav", True), ("c.wav", True)):
@@ -185,7 +188,7 @@ def test_a_speaker_loops_a_sound_until_it_is_stopped(pair):
 
 
 def test_a_speaker_knows_the_languages_of_its_engine(pair):
-    """Others are refused by the answer."""
+    """The response refuses other languages."""
     here, _ = pair('Speaker { name "horn" }', "")
 
     assert here.get("horn/get_engine") == "pico"
@@ -199,7 +202,7 @@ def test_a_speaker_knows_the_languages_of_its_engine(pair):
 
 
 def test_a_pen_takes_its_ink(pair):
-    """Its strokes are not drawn, but its services answer as in Webots."""
+    """Its strokes are not drawn, but its services respond as in Webots."""
     here, _ = pair('Pen { name "pen" }', "")
 
     assert here.get("pen/write", value=False) is True
@@ -207,7 +210,7 @@ def test_a_pen_takes_its_ink(pair):
 
 
 def test_a_gripper_that_nothing_can_touch_holds_nothing(pair):
-    """In Webots it needs a boundingObject to hold things."""
+    """In Webots a gripper needs a boundingObject to hold objects."""
     here, _ = pair('VacuumGripper { name "cup" }', "")
     felt = here.inbox("cup/presence")
     assert here.get("cup/presence_sensor/enable", value=32) is True
@@ -223,7 +226,7 @@ def test_a_gripper_that_nothing_can_touch_holds_nothing(pair):
 
 
 def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
-    """A success would leave a client with a thing that it does not hold."""
+    """After a success, the client would believe that it holds the object."""
     here, _ = pair('VacuumGripper { name "cup" boundingObject Box { size 0.1 0.1 0.1 } }', "")
 
     with pytest.raises(ServiceFailed, match="cup has a boundingObject"):
@@ -232,7 +235,7 @@ def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
 
 
 def test_connectors_that_fit_are_not_locked(pair):
-    """Locking would join them in Webots."""
+    """In Webots the lock would join them."""
     other = 'Connector { name "plug" model "a" rotation 0 0 1 3.14159 }'
     here, _ = pair('Connector { name "socket" model "a" }', other, 0.005)
 

@@ -1,4 +1,7 @@
-"""The drive of a robot, found by where its wheels are: every arrangement, with numbers made by hand."""
+"""The drive of a robot is derived from the positions of its wheels.
+
+The expected numbers are computed by hand.
+"""
 
 import math
 from dataclasses import replace
@@ -19,17 +22,17 @@ radii = st.floats(0.01, 0.5)
 
 
 def unit(angle):
-    """A direction."""
+    """Return a direction."""
     return math.cos(angle), math.sin(angle)
 
 
 def row(places, radius_m, **changes):
-    """Plain wheels that roll forward, at these places."""
+    """Return plain wheels at these positions that roll forward."""
     return [Wheel(x_m=x, y_m=y, axle=LEFT, radius_m=radius_m, **changes) for x, y in places]
 
 
 def mecanum(half_length, half_width, radius_m):
-    """Front left, front right, rear left, rear right, with the rollers of a usual mecanum robot."""
+    """Return the wheels of a mecanum robot: front left, front right, rear left, rear right."""
     return [
         Wheel(x_m=i * half_length, y_m=j * half_width, axle=LEFT, radius_m=radius_m, roller=(H, -i * j * H))
         for i in (1, -1)
@@ -44,7 +47,7 @@ PIONEER_3AT = row([(i * 0.134, j * 0.197) for i in (1, -1) for j in (1, -1)], 0.
 
 @given(speeds=st.tuples(*[st.floats(-140, 140)] * 3), velocity=velocities)
 def test_the_robotino_drives_as_its_sample_controller_says(speeds, velocity):
-    """The general solution is the closed form of base.c."""
+    """The general solution must equal the closed form of base.c."""
     drive = find_drive(ROBOTINO)
 
     assert drive.twist(speeds) == pytest.approx(twist(*speeds), abs=1e-12)
@@ -52,14 +55,14 @@ def test_the_robotino_drives_as_its_sample_controller_says(speeds, velocity):
 
 
 def test_wheel_speeds_are_those_of_the_sample_controller():
-    """base.c: forward, wheel 0 stands still and the front wheels turn against each other."""
+    """In base.c, wheel 0 stands still on the way forward, and the front wheels turn against each other."""
     assert wheel_speeds(1.0, 0.0, 0.0) == pytest.approx((0.0, -13.7464, 13.7464), abs=1e-4)
     assert wheel_speeds(0.0, 0.0, 1.0) == pytest.approx((-0.1826 / 0.063,) * 3)
 
 
 @given(speed=st.floats(-140, 140))
 def test_mirrored_wheels_drive_exactly_straight(speed):
-    """No rounding turns the robot, so a straight way stays straight for hours."""
+    """Rounding must not turn the robot, so it drives straight for hours."""
     drive = find_drive(ROBOTINO)
 
     assert drive.twist((0.0, -speed, speed))[1:] == (0.0, 0.0)
@@ -74,7 +77,7 @@ def test_mirrored_wheels_drive_exactly_straight(speed):
         (PIONEER_3DX, (0.0, 2.0), (0.0975, 0.0, 0.195 / 0.33)),
         (PIONEER_3AT, (1.0, 1.0, 1.0, 1.0), (0.11, 0.0, 0.0)),
         (PIONEER_3AT, (-1.0, 1.0, -1.0, 1.0), (0.0, 0.0, 0.11 / 0.197)),
-        (PIONEER_3AT, (0.0, 2.0, 0.0, 0.0), (0.055, 0.0, 0.055 / 0.197)),  # one of four has a quarter
+        (PIONEER_3AT, (0.0, 2.0, 0.0, 0.0), (0.055, 0.0, 0.055 / 0.197)),  # one of four wheels adds a quarter
     ],
 )
 def test_tires_in_rows_drive_straight_and_turn(wheels, speeds, expected):
@@ -83,28 +86,28 @@ def test_tires_in_rows_drive_straight_and_turn(wheels, speeds, expected):
 
 
 def test_six_wheels_are_steered_like_four():
-    """Each side rolls as one; the robot turns about the middle of all."""
+    """Each side rolls as one; the robot turns about the center of all wheels."""
     rover = row([(i * 0.3, j * 0.25) for i in (1, 0, -1) for j in (1, -1)], 0.1)
 
     assert find_drive(rover).twist((-1.0, 1.0) * 3) == pytest.approx((0.0, 0.0, 0.4))
 
 
 def test_an_axle_that_turns_backward_rolls_the_wheel_backward():
-    """Webots' E-puck has both axles the same way; many robots of people's own have them opposed."""
+    """Webots' E-puck has both axles in the same direction; on many users' robots they are opposed."""
     right = replace(E_PUCK[1], axle=(0.0, -1.0))
 
     assert find_drive([E_PUCK[0], right]).twist((2.0, -2.0)) == pytest.approx((0.04, 0.0, 0.0))
 
 
 def test_a_robot_may_drive_along_any_axis():
-    """Axles along x drive along -y, the way that a = x rolls."""
+    """A wheel whose axle points along x rolls along -y."""
     pair = [Wheel(x_m=x, y_m=0.0, axle=(1.0, 0.0), radius_m=0.05) for x in (0.1, -0.1)]
 
     assert find_drive(pair).twist((2.0, 2.0)) == pytest.approx((0.0, -0.1, 0.0))
 
 
 def test_an_axle_ahead_of_the_origin_swings_the_origin_aside():
-    """Turning left about a point 0.1 m ahead moves the origin to the right."""
+    """A left turn about a point 0.1 m ahead moves the origin to the right."""
     pair = row([(0.1, 0.2), (0.1, -0.2)], 0.05)
 
     assert find_drive(pair).twist((-4.0, 4.0)) == pytest.approx((0.0, -0.1, 1.0))
@@ -119,7 +122,7 @@ def test_where_tires_and_rollers_are_mixed_the_tires_hold_sideways():
 
 
 def test_a_parallel_row_of_rollers_turns_about_its_middle():
-    """Nothing holds it sideways, and nothing drives it there."""
+    """No force holds it sideways, and none drives it there."""
     wheels = row([(0.3, 0.2), (-0.1, 0.2), (0.3, -0.2), (-0.1, -0.2)], 0.05, roller=(-1.0, 0.0))
 
     assert find_drive(wheels).twist((-4.0, -4.0, 4.0, 4.0)) == pytest.approx((0.0, -0.1, 1.0))
@@ -134,7 +137,7 @@ def test_a_parallel_row_of_rollers_turns_about_its_middle():
     ],
 )
 def test_a_mecanum_robot_drives_in_every_direction(speeds, expected):
-    """Front left, front right, rear left, rear right."""
+    """The wheels are front left, front right, rear left and rear right."""
     drive = find_drive(mecanum(0.228, 0.172, 0.05))
 
     assert drive.twist(speeds) == pytest.approx(expected)
@@ -142,7 +145,7 @@ def test_a_mecanum_robot_drives_in_every_direction(speeds, expected):
 
 
 def test_four_crossed_wheels_move_in_every_direction():
-    """A square with an omnidirectional wheel at each side, with rollers or with low friction."""
+    """A square has an omnidirectional wheel on each side, with rollers or with low friction."""
     cross = [
         Wheel(x_m=0.2 * c, y_m=0.2 * s, axle=(c, s), radius_m=0.05)
         for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
@@ -163,7 +166,7 @@ def test_four_crossed_wheels_move_in_every_direction():
     velocity=st.tuples(small, small),
 )
 def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius, velocity):
-    """Anywhere on the robot, at any heading: forward and turning come back."""
+    """Wherever the wheels are, forward speed and rotation are recovered."""
     c, s = unit(heading)
     x, y = middle
     pair = [Wheel(x_m=x - i * half * s, y_m=y + i * half * c, axle=(-s, c), radius_m=radius) for i in (1, -1)]
@@ -189,7 +192,7 @@ def test_a_pair_of_wheels_follows_all_that_it_can(middle, heading, half, radius,
     velocity=velocities,
 )
 def test_a_drive_is_finite_and_gives_back_what_it_can_follow(wheels, velocity):
-    """Whatever the wheels: what they did once, they do again."""
+    """For any wheels, a motion that they once produced is produced again."""
     drive = find_drive(wheels)
     assume(drive is not None)
 
@@ -212,16 +215,16 @@ def test_a_drive_is_finite_and_gives_back_what_it_can_follow(wheels, velocity):
         [replace(wheel, roller=LEFT) for wheel in E_PUCK],  # rollers about the axle hold nothing
         mecanum(0.2, 0.2, 0.05)[:2],
         [replace(it, roller=(it.x_m, it.y_m)) for it in mecanum(H, H, 0.05)],  # all rollers at the middle
-        [Wheel(x_m=1.0, y_m=1.0, axle=unit(i), radius_m=0.1) for i in range(3)],  # all at one place
+        [Wheel(x_m=1.0, y_m=1.0, axle=unit(i), radius_m=0.1) for i in range(3)],  # all at one position
     ],
 )
 def test_wheels_that_cannot_steer_drive_nothing(wheels):
-    """The reader of a world then refuses the robot, or lets its joints turn in the air."""
+    """The loader then refuses the robot, or lets its joints turn in the air."""
     assert find_drive(wheels) is None
 
 
 def test_axles_that_are_parallel_but_for_rounding_are_parallel():
-    """Two degrees of toe are a pair of wheels, not a robot that drives sideways."""
+    """Two degrees of toe make a pair of wheels, not a robot that drives sideways."""
     toed = [replace(wheel, axle=unit(math.pi / 2 + i * 0.02)) for i, wheel in enumerate(PIONEER_3AT)]
 
     assert abs(find_drive(toed).twist((1.0, 1.0, 1.0, 1.0))[0]) == pytest.approx(0.11, rel=0.01)
@@ -229,13 +232,13 @@ def test_axles_that_are_parallel_but_for_rounding_are_parallel():
 
 
 def test_no_wheels_do_not_move():
-    """The drive of a robot that stands."""
+    """This is the drive of a robot that does not move."""
     assert STANDING.twist(()) == (0.0, 0.0, 0.0)
     assert STANDING.wheel_speeds(1.0, 1.0, 1.0) == ()
 
 
 def test_a_ring_of_wheels_that_a_file_rounds_is_exact():
-    """The arena has four digits; its Robotino drives as by the closed form of its own controller."""
+    """The arena has four digits, but its Robotino drives by the closed form of its own controller."""
     rounded = [
         Wheel(
             x_m=round(it.x_m, 4),
@@ -254,14 +257,14 @@ def test_a_ring_of_wheels_that_a_file_rounds_is_exact():
 
 @pytest.mark.parametrize("changed", [{"radius_m": 0.07}, {"x_m": 0.1}, {"axle": (0.6, -0.8)}])
 def test_wheels_that_are_no_ring_are_taken_as_they_are(changed):
-    """A robot may have been built that way."""
+    """A robot may really be built that way."""
     assert isinstance(find_drive(ROBOTINO), Ring)
     assert not isinstance(find_drive([ROBOTINO[0], replace(ROBOTINO[1], **changed), ROBOTINO[2]]), Ring)
 
 
 @given(angle=angles, velocity=velocities)
 def test_a_ring_may_be_turned(angle, velocity):
-    """The same wheels, in another frame."""
+    """The wheels are the same, in another frame."""
     c, s = math.cos(angle), math.sin(angle)
     turned = [
         replace(
@@ -279,6 +282,6 @@ def test_a_ring_may_be_turned(angle, velocity):
 
 
 def rounded_direction(direction, digits):
-    """Return a direction with so many digits, of length 1 again."""
+    """Return a direction that is rounded to some digits and has length 1 again."""
     x, y = (round(part, digits) for part in direction)
     return x / math.hypot(x, y), y / math.hypot(x, y)

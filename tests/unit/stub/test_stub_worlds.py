@@ -1,4 +1,4 @@
-"""Worlds of other people: PROTOs, stand-ins, robots by geometry, and parts that are left out."""
+"""Users' worlds: PROTOs, stand-ins, robots by geometry, and left-out parts."""
 
 import math
 
@@ -25,7 +25,7 @@ STOOL = """PROTO Stool [ field SFVec3f translation 0 0 0 field SFFloat radius 0.
 
 
 def load_world(text, *protos, stand_ins=None, leave_out=None):
-    """The simulation of a world that may use these PROTOs, beside what ships."""
+    """Return the simulation of a world that may use these PROTOs and the bundled ones."""
     own = [parse_proto(f"{HEAD}{proto}".encode(), "Own.proto") for proto in protos]
     descriptions = Descriptions(
         protos={**builtin_protos(), **{proto.name: proto for proto in own}},
@@ -36,7 +36,7 @@ def load_world(text, *protos, stand_ins=None, leave_out=None):
 
 
 def obstacles(simulation):
-    """Kind, x, y and size of each obstacle, rounded to millimeters."""
+    """Return kind, x, y and size of each obstacle, rounded to millimeters."""
     found = []
     for shape in simulation.scene.solids:
         x, y, _ = shape.pose.position
@@ -45,7 +45,7 @@ def obstacles(simulation):
 
 
 def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
-    """`IS` looks in the instance first."""
+    """`IS` uses the value of the instance first."""
     simulation = load_world("Stool { translation 1 2 0 } Stool { radius 0.1 }", STOOL)
 
     assert obstacles(simulation) == [
@@ -55,7 +55,7 @@ def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
 
 
 def test_a_proto_may_be_made_of_protos_and_take_nodes():
-    """Nested values are read where they were written."""
+    """Nested values are read in the file in which they were written."""
     perch = """PROTO Perch [ field SFFloat wide 0.3 ] { Pose { translation 5 0 0 children [
       Stool { radius IS wide parts [ DEF TOP Stool { radius 0.7 } ] } ] } }"""
     simulation = load_world("DEF A Perch { wide 0.6 }", STOOL, perch)
@@ -67,7 +67,7 @@ def test_a_proto_may_be_made_of_protos_and_take_nodes():
 
 
 def test_two_instances_are_nodes_of_their_own():
-    """Each with an identity, a place, and the place of its instance in the file."""
+    """Each has its own id and frame, and the position of its instance in the file."""
     simulation = load_world("DEF A Stool { } DEF B Stool { }", STOOL)
     a, b = (simulation.tree.of_def(name) for name in "AB")
 
@@ -77,7 +77,7 @@ def test_two_instances_are_nodes_of_their_own():
 
 
 def test_a_def_inside_of_a_proto_is_found_through_its_instance():
-    """Each instance has a node of its own of that name."""
+    """Each instance has its own node of that name."""
     tree = load_world("DEF A Stool { } DEF B Stool { }", STOOL).tree
     seats = [tree.of_def("SEAT", tree.of_def(name)) for name in ("A", "B")]
 
@@ -86,7 +86,10 @@ def test_a_def_inside_of_a_proto_is_found_through_its_instance():
 
 
 def test_a_field_that_a_proto_does_not_have_is_ignored_and_named():
-    """Webots warns: fields go with its releases, and worlds of exporters lag behind. A typo is seen, too."""
+    """Webots warns: fields change with its releases, and exporters are late.
+
+    The warning also shows a typo.
+    """
     simulation = load_world("Stool { colour 1 }", STOOL)
 
     (ignored,) = simulation.left_out
@@ -94,13 +97,13 @@ def test_a_field_that_a_proto_does_not_have_is_ignored_and_named():
 
 
 def test_a_proto_inside_itself_ends():
-    """The files were refused before; a table of descriptions may still have one."""
+    """The files were refused before, but a table of descriptions may still have one."""
     with pytest.raises(WorldError, match="PROTOs are nested more than 20 deep"):
         load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } ] } }")
 
 
 def test_protos_that_double_at_each_level_end(monkeypatch):
-    """Twenty levels would be a million nodes; the world is refused instead."""
+    """Twenty levels would be a million nodes, so the world is refused."""
     monkeypatch.setattr(instantiate, "MAX_NODES", 1000)
 
     with pytest.raises(WorldError, match="the world has more than 1000 nodes"):
@@ -115,13 +118,13 @@ def test_protos_that_double_at_each_level_end(monkeypatch):
     ],
 )
 def test_a_number_of_rays_that_is_a_slip_is_refused(sensor, fact):
-    """Otherwise the start would take minutes, without a word."""
+    """Otherwise the start would silently take minutes."""
     with pytest.raises(WorldError, match=fact):
         load_world(f'Robot {{ controller "ros" children [ {sensor} ] }}', leave_out=LeaveOut(names=True))
 
 
 def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():
-    """A crate that a supervisor puts elsewhere is there for rays and robots."""
+    """Rays and robots meet a crate where a supervisor has moved it."""
     simulation = load_world('DEF BOX WoodenBox { translation 1 2 0.3 size 1 1 0.6 name "b" }')
     node = simulation.tree.of_def("BOX")
 
@@ -133,21 +136,21 @@ def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():
 
 
 def test_a_stand_in_stands_where_its_proto_would_without_a_translation():
-    """A crate's origin is in its middle, and the default puts it on the floor."""
+    """The origin of a crate is in its center, and the default puts it on the floor."""
     simulation = load_world("OilBarrel { }")
 
     assert simulation.scene.solids[0].heights() == pytest.approx((0.0, 0.88))
 
 
 def test_a_user_s_stand_in_comes_before_one_that_ships():
-    """Their crate is the one that they measured."""
+    """The users have measured their own crate."""
     own = {**shipped(), **load("[WoodenBox]\nsphere = 0.5", "mine.toml")}
 
     assert obstacles(load_world("WoodenBox { }", stand_ins=own))[0][0] == "ball"
 
 
 def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
-    """A client would wait for it for ever."""
+    """A client would wait for the robot for ever."""
     own = load("[Rover]\nbox = [1, 1, 1]", "mine.toml")
 
     assert obstacles(load_world("Rover { }", stand_ins=own))
@@ -157,7 +160,7 @@ def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
 
 @pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Colosseum"}))])
 def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
-    """With its place: one line each for the log."""
+    """The log has one line for each, with its position."""
     simulation = load_world("Colosseum { } WoodenBox { }", leave_out=leave_out)
 
     assert len(simulation.scene.solids) == 1
@@ -167,7 +170,7 @@ def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
 
 
 def test_what_could_be_simulated_is_never_left_out():
-    """`--leave-out WoodenBox` is no way to remove crates."""
+    """`--leave-out WoodenBox` is not a way to remove crates."""
     simulation = load_world("WoodenBox { }", leave_out=LeaveOut(everything=True))
 
     assert len(simulation.scene.solids) == 1
@@ -181,7 +184,7 @@ def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
 
 
 def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
-    """People save worlds in which crates have tumbled by a few degrees; the shape is simple anyway."""
+    """In saved worlds crates have tumbled by a few degrees, and the shape is simplified anyway."""
     (shape,) = load_world("CardboardBox { size 0.6 0.4 0.5 rotation 1 0 0 0.1 }").scene.solids
     outline = obstacle(shape)
 
@@ -189,7 +192,7 @@ def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
 
 
 def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
-    """Its own controller does not run here; with the controller "ros" a client would wait for its motors."""
+    """Its own controller does not run here; with the controller "ros" a client would look for its motors."""
     (shape,) = load_world('Nao { translation 1 0 0.3 controller "soccer" }').scene.solids
     assert shape.pose.position[:2] == (1.0, 0.0)
 
@@ -198,28 +201,28 @@ def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
 
 
 def test_a_ceiling_is_in_nobody_s_way():
-    """A Plane that looks down stands nowhere."""
+    """A Plane that faces down is not an obstacle."""
     roof = "Solid { translation 0 0 2.4 rotation 1 0 0 3.14 boundingObject Plane { } }"
 
     assert load_world(roof).scene.solids == []
 
 
 def test_a_loose_crate_that_is_left_out_is_nowhere():
-    """It would be pushed in Webots, so it may not stand in the way here."""
+    """Webots would let a robot push it, so it must not be fixed here."""
     crate = 'Solid { name "crate" physics Physics { } boundingObject Box { } }'
 
     assert load_world(crate, leave_out=LeaveOut(types=frozenset({"Solid"}))).scene.solids == []
 
 
 def test_a_device_without_a_robot_is_a_solid():
-    """People leave cameras on tripods in their worlds; nobody reads them, but one can run into them."""
+    """Users have cameras on tripods in their worlds; nobody reads them, but a robot can hit them."""
     tripod = "Pose { translation 1 0 0 children [ Camera { boundingObject Box { size 0.1 0.1 1 } } ] }"
 
     assert obstacles(load_world(tripod)) == [("box", 1.0, 0.0, (0.1, 0.1, 1.0))]
 
 
 def test_a_second_device_of_a_name_can_be_left_out():
-    """Webots starts such worlds, and finds the first one by that name."""
+    """Webots starts such worlds, and finds the first device by that name."""
     robot = 'Robot { controller "ros" children [ GPS { } Pose { translation 0 0 1 children [ GPS { } ] } ] }'
     simulation = load_world(robot, leave_out=LeaveOut(everything=True, names=True))
 
@@ -238,19 +241,19 @@ def test_a_door_on_a_hinge_without_physics_stands_where_it_is():
 
 
 def test_a_door_that_swings_is_refused():
-    """A robot would push it open."""
+    """A robot would push it open in Webots."""
     with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
         load_world(DOOR % "physics Physics { }")
 
 
 def test_a_conveyor_belt_is_refused():
-    """It would carry away what stands on it."""
+    """It would move the objects on it in Webots."""
     with pytest.raises(WorldError, match="a Track with devices moves what stands on it"):
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 
 
 def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
-    """Webots turns them when it loads the file; a box and a stand-in have no such axis."""
+    """Webots turns cylinders when it loads the file; a box and a stand-in have no such axis."""
     post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"
     old = parse_proto(f"#VRML_SIM R2021b utf8\n{post}".encode(), "Post.proto")
     simulation = Simulation.of(
@@ -288,7 +291,7 @@ BOX = "Solid { translation 1 0 0 boundingObject Box { size 1 2 3 } }"
     ],
 )
 def test_a_scale_makes_what_is_in_a_transform_larger(world, found):
-    """Places and sizes, also of a Solid from before R2023a."""
+    """This holds for positions and sizes, also of a Solid from before R2023a."""
     assert obstacles(load_world(world)) == [found]
 
 
@@ -312,7 +315,7 @@ def test_a_scale_makes_what_is_in_a_transform_larger(world, found):
     ],
 )
 def test_a_scale_that_the_stub_cannot_follow_is_refused(world, fact):
-    """It can be left out, and then nothing of it is there."""
+    """The node can be left out, and then no part of it exists."""
     with pytest.raises(WorldError, match=fact):
         load_world(world, leave_out=LeaveOut(names=True))
 
@@ -320,7 +323,7 @@ def test_a_scale_that_the_stub_cannot_follow_is_refused(world, fact):
 
 
 def test_the_scale_of_a_stand_in_is_a_field_of_its_own():
-    """Some PROTOs have one number of that name."""
+    """Some PROTOs have a field of that name with one number."""
     own = load("[Bush]\nfields = 'SFFloat scale 1'\nbox = ['scale', 1, 1]", "mine.toml")
 
     assert obstacles(load_world("Bush { scale 3 }", stand_ins=own)) == [("box", 0.0, 0.0, (3.0, 1.0, 1.0))]
@@ -336,7 +339,7 @@ def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
 
 
 def drive(simulation, seconds, **speeds):
-    """Turn the motors of the one robot at these speeds in rad/s, and return where it is then."""
+    """Turn the motors of the only robot at these speeds in rad/s, and return its new position."""
     (robot,) = simulation.robots
     for name, motor in robot.motors.items():
         if name.replace(" ", "_") in speeds:
@@ -362,7 +365,7 @@ def drive(simulation, seconds, **speeds):
     ],
 )
 def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
-    """Straight on by the radius of the wheels, and about by their track."""
+    """It follows from the radius of the wheels and the distance between them."""
     straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
     assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
     assert straight.y == pytest.approx(0.0, abs=1e-6)
@@ -373,21 +376,21 @@ def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, trac
 
 
 def test_a_robotino_of_webots_drives_as_the_one_of_the_arena():
-    """0.063 m wheels at 120 degrees."""
+    """Its wheels have a radius of 0.063 m and are 120 degrees apart."""
     body = drive(load_world("Robotino3 { }"), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
 
     assert body.x == pytest.approx(0.8 * 0.063 / math.sqrt(0.75), rel=0.01)
 
 
 def test_a_robot_that_no_client_reaches_needs_no_device_of_the_table():
-    """Its own controller does not run here; it stands in the way."""
+    """Its own controller does not run here, so it is only an obstacle."""
     statue = 'Robot { controller "patrol" children [ Radar { } ] boundingObject Box { size 1 1 1 } }'
 
     assert load_world(statue).robots[0].body.radius > 0.4
 
 
 def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
-    """By the relative address, from the folder of the world."""
+    """Their addresses are relative to the folder of the world."""
     (tmp_path / "protos").mkdir()
     (tmp_path / "worlds").mkdir()
     (tmp_path / "protos" / "Stool.proto").write_text(HEAD + STOOL)
@@ -425,7 +428,7 @@ ARM = """Robot { name "arm" children [ HingeJoint {
 
 
 def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
-    """Its PROTO is a part that ships, with the rays of the real one."""
+    """Its PROTO is bundled, with the rays of the real one."""
     robot = 'Robot { controller "ros" controllerArgs [ "--name=r" "--synchronize" ] children [ Sick { } ] }'
     (found,) = load_world(robot.replace("Sick", "SickLms291")).robots
 
@@ -434,7 +437,7 @@ def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
 
 
 def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
-    """The place in the file holds at the position in the file."""
+    """The pose in the file is that at the joint's position in the file."""
     simulation = load_world(ARM)
     (robot,) = simulation.robots
     tip = simulation.tree.of_def("TIP")

@@ -1,4 +1,4 @@
-"""Sweeps as a person writes them, and figures of trials."""
+"""Sweeps as users write them, and the figures of trials."""
 
 from collections.abc import Callable
 from pathlib import Path

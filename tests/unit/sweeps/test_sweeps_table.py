@@ -1,4 +1,4 @@
-"""The result: medians and quartiles over seeds, as text and as a picture."""
+"""The result has medians and quartiles over seeds, as text and as a picture."""
 
 from palaestra.sweeps.model import Objective
 from palaestra.sweeps.plot import draw
@@ -24,7 +24,7 @@ ROWS = [
 
 
 def test_the_table_has_median_and_quartiles_and_the_best_complete_trial() -> None:
-    """A trial that failed is not the best one, whatever it had reached."""
+    """A failed trial is never the best one, whatever its figure was."""
     assert list(lines(ROWS, RATE)) == [
         "trial  a       b  state     seeds  success rate  quartiles",
         "s-0    0.0001  x  complete  2/2    0.6           0.5 to 0.7",
@@ -37,7 +37,7 @@ def test_the_table_has_median_and_quartiles_and_the_best_complete_trial() -> Non
 
 
 def test_a_curve_goes_as_far_as_all_of_its_seeds() -> None:
-    """A median over those that are ahead would compare seeds, not settings."""
+    """A median over the fastest seeds would compare seeds, not settings."""
     found = figures({5: 0.2, 10: 0.4, 15: 1.0}, {4: 0.1, 10: 0.8}, ended=False)
 
     assert found.common(RATE) == {5: 0.15000000000000002, 10: 0.6000000000000001}

@@ -10,7 +10,7 @@ RANDOM = {"random": {"seed": {"low": 1, "high": 9}}}
 
 
 def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path) -> None:
-    """Results of two sweeps in one table would be of none."""
+    """A table with results of two sweeps would be useless."""
     folder = tmp_path / "s"
     trial_log.begin(folder, sweep(**RANDOM, trials=3))
     trial_log.begin(folder, sweep(**RANDOM, trials=5))
@@ -24,7 +24,7 @@ def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path
 def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_from_the_first(
     sweep, tmp_path
 ) -> None:
-    """A file that is corrected must not train every trial once more."""
+    """The correction of the file must not train every trial again."""
     trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3))
     trial_log.begin(tmp_path / "s", sweep(**RANDOM, trials=3, objective="MeanReturn"))
     trial_log.begin(tmp_path / "o", sweep(**RANDOM, trials=3, optuna={}))
@@ -34,7 +34,7 @@ def test_another_objective_compares_the_same_trials_unless_optuna_has_learned_fr
 
 
 def test_a_line_that_a_crash_has_cut_spoils_no_later_one(sweep, tmp_path) -> None:
-    """Later lines would be appended to it, and the sweep could never be continued."""
+    """Otherwise later lines would be appended to it, and the sweep could not continue."""
     folder = tmp_path / "s"
     trial_log.begin(folder, sweep(**RANDOM, trials=3))
     trial_log.note(folder, 0, TrialFigures(state=TrialProgress.COMPLETE))

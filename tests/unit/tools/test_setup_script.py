@@ -1,4 +1,4 @@
-"""What `make setup` does for somebody who may not install ROS, on a machine that has none."""
+"""`make setup` for a user who may not install ROS, on a machine without it."""
 
 import os
 import shutil
@@ -19,7 +19,7 @@ NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 
 @pytest.fixture
 def checkout():
-    """A folder with the script alone, that anybody may write into, and a rospy that cannot be imported."""
+    """A folder with only the script, writable for everybody, and a rospy that cannot be imported."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         for name in ("tools", "modules"):
@@ -32,7 +32,7 @@ def checkout():
 
 
 def test_without_root_and_ros_it_prints_the_one_line_to_type_and_stops(checkout):
-    """Nothing is installed behind the back of a person, and nothing is half done."""
+    """Nothing is installed without consent, and nothing is half done."""
     before = sorted(checkout.rglob("*"))
 
     setup = subprocess.run(

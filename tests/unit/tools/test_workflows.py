@@ -1,4 +1,4 @@
-"""What runs for a change elsewhere: the actions of the workflows are those that somebody has looked at."""
+"""The actions that the workflows use are fixed versions that somebody has reviewed."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ WORKFLOWS = Path(__file__).parents[3] / ".github" / "workflows"
 
 
 def test_every_action_is_named_by_a_commit_and_its_release():
-    """A tag can be moved to another commit, and an action reads what the workflow may read."""
+    """A tag can be moved to another commit, and an action can read whatever its workflow can."""
     uses = [
         line.split("uses:", 1)[1].strip()
         for path in WORKFLOWS.glob("*.yaml")

@@ -1,4 +1,4 @@
-"""A corridor to walk in, members that break on demand, and the runs made of them."""
+"""A corridor to walk in, members that break at chosen steps, and runs with them."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ ALGORITHMS = {
 
 @pytest.fixture(autouse=True)
 def scratch(monkeypatch, tmp_path):
-    """Keep here what Stable-Baselines3 writes when it has no logger: it makes a folder a `learn`."""
+    """Keep Stable-Baselines3's folders in the test's folder: without a logger it makes one per `learn`."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 class Clock:
-    """A clock that is set by hand."""
+    """A clock that a test sets."""
 
     now = 0.0
 
     def __call__(self) -> float:
-        """Tell the time."""
+        """Return the time."""
         return self.now
 
 
 @pytest.fixture
 def clock() -> Clock:
-    """Return a clock that stands still."""
+    """Return a clock that does not move by itself."""
     return Clock()
 
 
@@ -73,7 +73,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
         }
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
-        """Begin to walk."""
+        """Begin an episode."""
         super().reset(seed=seed)
         self._member.take_reset()
         self.seeds.append(seed)
@@ -131,7 +131,7 @@ class FakeMember:
         self._counts = dict.fromkeys(self._faults, 0)
 
     def due(self, episodes: int = 1) -> str | None:
-        """Return why it is to be recycled, if it is."""
+        """Return the reason to recycle the member, or None."""
         worn = self._recycle_after is not None and self.resets + episodes > self._recycle_after
         return f"{self.resets} resets" if worn else None
 
@@ -142,7 +142,7 @@ class FakeMember:
         self.resets = 0
 
     def stop(self) -> None:
-        """Note it."""
+        """Log the call."""
         self.log.append("stop")
 
     def restart(self) -> None:
@@ -155,16 +155,16 @@ class FakeMember:
         self.resets = 0
 
     def abandon(self) -> None:
-        """Let a restart that is held fail."""
+        """Make a held restart fail."""
         self._abandoned = True
         self.release.set()
 
     def pause(self) -> None:
-        """Note it."""
+        """Log the call."""
         self.log.append("pause")
 
     def unpause(self) -> None:
-        """Note it."""
+        """Log the call."""
         self.log.append("run")
 
     def take_step(self) -> None:
@@ -195,7 +195,7 @@ def make_member() -> Callable[..., FakeMember]:
 
 @pytest.fixture
 def make_configuration(tmp_path: Path) -> Callable[..., Configuration]:
-    """Make a configuration of which the test says what matters, in the file's own words."""
+    """Make a configuration; a test passes the fields that matter, with their names in the file."""
     del tmp_path
 
     def make(*, collectors: int = 1, evaluators: int = 1, **changes: Any) -> Configuration:

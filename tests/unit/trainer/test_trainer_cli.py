@@ -1,4 +1,4 @@
-"""`palaestra-train` and `palaestra-eval`, as far as they need no simulator."""
+"""`palaestra-train` and `palaestra-eval`, as far as they can be tested without a simulator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
 
 @pytest.fixture(autouse=True)
 def nothing_given(monkeypatch):
-    """Remove the variables that the developer's shell may have set."""
+    """Remove variables that the developer's shell may have set."""
     for name in ("PALAESTRA_CONFIG", "PALAESTRA_RUN", "PALAESTRA_TERMINATION_LOG"):
         monkeypatch.delenv(name, raising=False)
 
@@ -27,7 +27,7 @@ def nothing_given(monkeypatch):
     ids=["train", "eval"],
 )
 def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, capsys):
-    """Nobody should have to read the source for that."""
+    """Nobody should have to read the source for them."""
     with pytest.raises(SystemExit) as ended:
         program(["--help"])
 
@@ -41,7 +41,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 
 @pytest.mark.parametrize("number", ["0", "-1", "many"])
 def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
-    """Before a simulator is started for it."""
+    """The error comes before a simulator is started."""
     with pytest.raises(SystemExit) as ended:
         cli.evaluate(["run", "--episodes", number])
 
@@ -60,7 +60,7 @@ def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
     ids=lambda it: type(it).__name__,
 )
 def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code, capsys, monkeypatch):
-    """Nothing is saved that could go on, so training's codes would mislead."""
+    """Nothing is saved from which it could resume, so training's exit codes would mislead."""
 
     def cut(*_):
         raise error
@@ -74,7 +74,7 @@ def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code
 
 
 def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys, monkeypatch):
-    """And with no traceback; the last word has them too."""
+    """There is no traceback, and the last word has the mistakes too."""
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     (tmp_path / "training.yaml").write_text(WRONG)
 
@@ -98,7 +98,7 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
     ],
 )
 def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, capsys, monkeypatch, tmp_path):
-    """The variables are set in a pod; a person types the programs by hand."""
+    """A pod has the variables, but a person types the command by hand."""
     monkeypatch.chdir(tmp_path)
 
     code = program(arguments)
@@ -109,7 +109,7 @@ def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, cap
 
 
 def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(tmp_path):
-    """Three seconds are long for a typing mistake."""
+    """Three seconds are too long for a typing error."""
     (tmp_path / "training.yaml").write_text(WRONG)
     program = (
         "import sys; from palaestra_trainer import cli\n"

@@ -1,4 +1,4 @@
-"""The content of a training.yaml, and the errors for its mistakes."""
+"""The fields of a training.yaml, and the errors for mistakes in it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ simulators:
   role: Collect
   control: http://127.0.0.1:7100
   world: /w/collect-0.wbt
-  namesPrefix: move_to_target_r1_collect_0a
   minSimulators: 1
   recycle: {afterResets: 24, afterMinutes: 90, aboveMemoryBytes: 419430400}
   standby: true
@@ -48,7 +47,7 @@ MINIMAL = {
 
 
 def test_every_field_of_the_contract_is_read(tmp_path):
-    """The operator writes this file; the trainer must know each of its words."""
+    """The operator writes this file, so the trainer must know all of its fields."""
     path = tmp_path / "training.yaml"
     path.write_text(COMPLETE)
 
@@ -61,14 +60,14 @@ def test_every_field_of_the_contract_is_read(tmp_path):
 
 
 def test_what_is_dumped_is_read_back_as_the_same():
-    """A run directory holds the file, so that the run can be measured later."""
+    """A run directory has the file, so that the run can be evaluated later."""
     configuration = parse(yaml.safe_load(COMPLETE))
 
     assert parse(yaml.safe_load(dump(configuration))) == configuration
 
 
 def test_all_mistakes_are_reported_at_once():
-    """Each attempt to fix a mistake costs a new pod."""
+    """Each attempt to correct a mistake costs a new pod."""
     wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -90,7 +89,10 @@ def test_a_mistake_in_a_list_names_its_place():
 
 
 def test_an_unknown_field_is_logged_with_its_place_and_ignored():
-    """An operator newer than the job's own trainer image may write one; the run goes on as it can."""
+    """An operator that is newer than the job's trainer image may write it.
+
+    The run continues as far as it can.
+    """
     newer = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"roll": 1}], "ofTomorrow": {"a": [1]}}
 
     with capture_logs() as logs:
@@ -102,7 +104,7 @@ def test_an_unknown_field_is_logged_with_its_place_and_ignored():
 
 
 def test_an_unknown_field_hides_no_mistake_of_another():
-    """Other mistakes are refused as always, including those that involve several fields."""
+    """Other mistakes are still refused, including those that involve several fields."""
     with pytest.raises(ConfigurationError, match="none has role Collect"):
         parse(MINIMAL | {"ofTomorrow": 1, "simulators": [MINIMAL["simulators"][0] | {"role": "Evaluate"}]})
 
@@ -116,7 +118,7 @@ def test_an_unknown_field_hides_no_mistake_of_another():
     ],
 )
 def test_simulators_that_do_not_fit_together_are_refused(simulators, fact):
-    """Each is right by itself; only together they are wrong."""
+    """Each is valid on its own; only the combination is wrong."""
     with pytest.raises(ConfigurationError, match=fact):
         parse(MINIMAL | {"simulators": simulators})
 
@@ -130,7 +132,7 @@ def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, m
 
 
 def test_without_the_variable_the_remedy_names_it(monkeypatch):
-    """A laptop has no such variable."""
+    """The variable is not set on a laptop."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
     with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG: is not set"):
@@ -138,7 +140,7 @@ def test_without_the_variable_the_remedy_names_it(monkeypatch):
 
 
 def test_a_file_that_is_not_yaml_is_refused(tmp_path):
-    """The parser's own message says where."""
+    """The parser's own message has the position."""
     path = tmp_path / "training.yaml"
     path.write_text("job: [")
 
@@ -152,6 +154,6 @@ def test_a_file_that_is_not_yaml_is_refused(tmp_path):
     )
 )
 def test_whatever_the_document_is_only_configuration_errors_come_out(content):
-    """A traceback would tell the author of a file nothing."""
+    """A traceback would not help the author of a file."""
     with pytest.raises(ConfigurationError):
         parse(content)

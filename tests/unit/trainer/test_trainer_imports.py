@@ -1,4 +1,4 @@
-"""What a trainer imports at its start: each attempt of each pod pays for it."""
+"""Every attempt of every pod pays for the modules that a trainer imports at its start."""
 
 import json
 import subprocess
@@ -34,7 +34,10 @@ def _run(program: str, *arguments: object):
 
 
 def test_a_trainer_imports_no_library_before_it_uses_it(tmp_path):
-    """pandas, Matplotlib, TensorBoard and rich were 40 % of its start; where they are used they work."""
+    """pandas, Matplotlib, TensorBoard and rich took 40 % of its start.
+
+    They still work where they are used.
+    """
     imported, used = _run(IMPORT + USE + "print(json.dumps([imported, used]))", tmp_path)
 
     assert "stable_baselines3.common.logger" in imported
@@ -66,12 +69,15 @@ print(json.dumps([before, compiled, real, hasattr(answer, "_torchdynamo_disable"
 
 
 def test_an_optimizer_brings_no_compiler_before_a_program_compiles():
-    """It was a third of a trainer's start; what PyTorch keeps from being compiled is still kept from it."""
+    """The compiler took a third of a trainer's start.
+
+    Functions that PyTorch excludes from it stay excluded.
+    """
     assert _run(OPTIMIZE + COMPILE) == [False, 2.0, True, True]
 
 
 def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
-    """A stand-in's answer would be forgotten by the time that another function is compiled."""
+    """A placeholder's mark would be lost when another function is compiled."""
     program = OPTIMIZE + "kept = torch._dynamo.disable(lambda x: x)\n"
 
     assert _run(program + "print(json.dumps([before, hasattr(kept, '_torchdynamo_disable')]))") == [
@@ -81,14 +87,14 @@ def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
 
 
 def test_a_part_of_the_compiler_can_be_imported_first():
-    """A part that was executed twice would have its state twice."""
+    """A module that runs twice would have its state twice."""
     program = OPTIMIZE + "import torch._dynamo.config as part\nfrom torch._dynamo import optimize\n"
 
     assert _run(program + "print(json.dumps(part is torch._dynamo.config))") is True
 
 
 def test_a_library_that_a_user_imports_first_is_the_real_one_everywhere():
-    """A stand-in beside the library itself would be a second object of the same name."""
+    """Otherwise the placeholder would be a second module of the same name."""
     first = "import matplotlib.figure, pandas\n"
     same = "logger.matplotlib is matplotlib, logger.pandas is pandas"
     program = first + IMPORT + f"from stable_baselines3.common import logger\nprint(json.dumps([{same}]))"

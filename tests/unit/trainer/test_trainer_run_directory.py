@@ -1,16 +1,15 @@
-"""The files of a run directory: each is the old or the new one, never half of one."""
+"""The files of a run directory: each is either the old or the new one, never a half."""
 
 from __future__ import annotations
 
 import errno
 import json
-from zipfile import ZipFile
 
 import pytest
 
 from palaestra_trainer.run.summary import finished, summarise, write_summary
 from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
-from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.progress import Progress
 
 
 @pytest.fixture
@@ -21,7 +20,7 @@ def directory(tmp_path):
 
 
 def test_attempts_are_counted(directory):
-    """The count of lines is the number of the attempt."""
+    """The number of lines is the number of the attempt."""
     numbers = [directory.begin_attempt("pod-1", "new run"), directory.begin_attempt("pod-2", "resumed")]
 
     assert numbers == [1, 2]
@@ -29,7 +28,7 @@ def test_attempts_are_counted(directory):
 
 
 def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
-    """The lines before and after it are whole."""
+    """The lines before and after it are complete."""
     path = tmp_path / "lines.jsonl"
     append_line(path, {"step": 1})
     with path.open("a") as file:
@@ -45,7 +44,7 @@ def test_a_file_that_is_not_there_has_no_lines(tmp_path):
 
 
 def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
-    """A full disk must not cost the best model."""
+    """A full disk must not destroy the best model."""
     path = tmp_path / "model.zip"
     replace_file(path, lambda name: name.write_text("old"))
 
@@ -59,24 +58,8 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
     assert [it.name for it in tmp_path.iterdir()] == ["model.zip"]
 
 
-def test_the_summary_of_a_run_of_an_earlier_release_is_of_its_best_line(directory):
-    """Its model.zip does not say which evaluation it is from."""
-    for step, rate in ((10, 0.5), (20, 0.9), (30, 0.7)):
-        append_line(directory.evaluations, {"step": step, "success_rate": rate, "mean_return": 1.0})
-    with ZipFile(directory.model, "w") as archive:
-        archive.writestr("data", "{}")
-    progress = Progress(30, [("collect-0", "Collect")], lambda: 0.0)
-    progress.resumed(30, Counters(goodput={"learning": 1.5, "starting": 0.5}))
-
-    summary = summarise(directory, progress)
-
-    assert (summary["success_rate"], summary["best_step"]) == (0.9, 20)
-    assert (summary["steps"], summary["steps_per_second"], summary["faults"]) == (30, 15.0, 0)
-    assert (summary["duration_s"], summary["trained_share"]) == (2.0, 0.75)
-
-
 def test_a_summary_makes_a_run_finished(directory, make_configuration):
-    """Until somebody prolongs it."""
+    """This holds until a user prolongs it."""
     before = finished(directory, make_configuration(steps=100))
     write_summary(directory, summarise(directory, Progress(100, [])))
 
@@ -87,7 +70,7 @@ def test_a_summary_makes_a_run_finished(directory, make_configuration):
 
 @pytest.mark.parametrize("text", ["", "[]", json.dumps({"steps": 3})])
 def test_a_summary_that_says_nothing_finishes_nothing(directory, make_configuration, text):
-    """It was written by something else."""
+    """Another program has written it."""
     directory.summary.write_text(text)
 
     assert finished(directory, make_configuration()) is None

@@ -1,4 +1,4 @@
-"""What a job names as module:Class is imported in one way, and each failure reads alike."""
+"""Everything that a job names as module:Class is imported in the same way, with the same errors."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BROKEN = {
 
 @pytest.fixture
 def written(tmp_path, monkeypatch):
-    """`written(source)`: the name of a new module with this source, which can be imported."""
+    """`written(source)` returns the name of a new module with this source, which can be imported."""
     monkeypatch.syspath_prepend(tmp_path)
 
     def write(source):
@@ -56,7 +56,7 @@ def written(tmp_path, monkeypatch):
 @pytest.mark.parametrize("source", BROKEN)
 @pytest.mark.parametrize("field", FIELDS)
 def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, tmp_path, field, source):
-    """Whatever it raises: exit code 2 with field, fact, line and remedy, not a retry or a silent end."""
+    """Any exception gives exit code 2 with field, fact, line and remedy, not a retry or a silent end."""
     module = written(source)
 
     with pytest.raises(ConfigurationError) as refusal:
@@ -81,7 +81,7 @@ def test_an_entry_point_that_cannot_be_imported_is_a_mistake_of_the_job(written)
 
 
 def test_a_name_that_the_module_lacks_is_to_be_corrected(written):
-    """The module itself is there: nothing is to be installed."""
+    """The module itself exists, so nothing is to be installed."""
     module = written("")
 
     with pytest.raises(ConfigurationError, match=r"has no attribute 'Own'\); correct the name$"):
@@ -89,7 +89,7 @@ def test_a_name_that_the_module_lacks_is_to_be_corrected(written):
 
 
 def test_an_argument_may_be_given_by_name_if_python_takes_it_by_name():
-    """So the options of environments and callbacks are checked alike, as are hyperparameters."""
+    """The options of environments and callbacks are then checked like hyperparameters."""
 
     def made(first, /, second, *others, third=3, **rest):
         del first, second, others, third, rest

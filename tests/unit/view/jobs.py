@@ -1,4 +1,4 @@
-"""A TrainingJob in the middle of its life; a test says what is different."""
+"""Build a TrainingJob in the middle of its life; a test sets the differences."""
 
 from copy import deepcopy
 from datetime import UTC, datetime

@@ -8,12 +8,12 @@ from tests.unit.view.jobs import CREATED, NOW, make_job
 
 
 def told(job):
-    """Return the lines about a job, without their indents."""
+    """Return the lines about a job, without indentation."""
     return [line.strip() for line in describe(job, CREATED, NOW)]
 
 
 def test_a_running_job_is_described_from_spec_to_last_attempt():
-    """In the order in which a person asks."""
+    """A person reads them in this order."""
     lines = told(make_job())
 
     assert "Algorithm:     DQN, 50,000 steps, seed 1" in lines
@@ -26,7 +26,7 @@ def test_a_running_job_is_described_from_spec_to_last_attempt():
 
 
 def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none():
-    """A rate of twenty episodes looks as sure as one of a thousand without it."""
+    """Without it, a rate of twenty episodes looks as certain as one of a thousand."""
     interval = {"low": 0.91, "high": 0.99, "episodes": 100}
 
     assert "Success rate:   40% in the last evaluation" in told(make_job())
@@ -36,7 +36,7 @@ def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none()
 
 
 def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
-    """Given up is more than its last state."""
+    """The mark `given up` is more important than its last state."""
     lines = told(make_job())
 
     assert "collect-0    Collect    ready      3          -         did not answer" in lines
@@ -44,7 +44,7 @@ def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
 
 
 def test_what_simulators_leave_out_has_lines_of_its_own():
-    """The numbers of a job mean less if its world was not whole."""
+    """The results of a job mean less if its world was incomplete."""
     line = "collect: the stub simulates no Drone: 1 node left out (line 7)"
     job = make_job()
     status = job.status.model_copy(update={"left_out": (line,)})
@@ -56,7 +56,7 @@ def test_what_simulators_leave_out_has_lines_of_its_own():
 
 
 def test_what_is_not_known_is_left_out():
-    """A job that nobody has looked at yet has a name and no progress."""
+    """A job that no operator has reconciled has a name, but no progress."""
     lines = told(make_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))
 
     assert not [line for line in lines if line.startswith(("Step", "Time spent", "Last attempt"))]
@@ -69,7 +69,7 @@ def test_a_time_ledger_of_no_seconds_is_left_out():
 
 
 def test_slow_steps_are_listed_apart_from_faults():
-    """`Faults: slow 1` made people look for a simulator that broke."""
+    """People searched for a broken simulator because of `Faults: slow 1`."""
     both = told(make_job(faults={"dead": 2, "slow": 1}))
 
     assert "Faults:         dead 2" in both
@@ -78,14 +78,14 @@ def test_slow_steps_are_listed_apart_from_faults():
 
 
 def test_recycling_is_listed_apart_from_recovering():
-    """It is planned: nothing has to be mended. An older release reports none."""
+    """It is planned: nothing has to be mended."""
     lines = told(make_job(goodput={"stepping": 75, "recycling": 25}))
 
     assert "Time spent:     stepping 75%, recycling 25%" in lines
 
 
 def test_the_storage_of_the_run_is_shown():
-    """The storage decides what is left when the job is deleted."""
+    """It determines what is left when the job is deleted."""
     assert "Storage:       in the pod, deleted with it" in told(
         make_job(spec={"storage": {"ephemeral": True}})
     )
@@ -93,7 +93,7 @@ def test_the_storage_of_the_run_is_shown():
 
 
 def test_events_have_an_age_and_a_count():
-    """A message that the API server broke into lines is one."""
+    """A message that the API server has split into lines is shown as one."""
     event = Event(
         time=NOW - timedelta(minutes=3),
         warning=True,

@@ -1,4 +1,4 @@
-"""What `palaestra watch` draws."""
+"""The screen of `palaestra watch`."""
 
 import io
 
@@ -12,7 +12,7 @@ from tests.unit.view.jobs import NOW, make_job
 
 @pytest.fixture
 def draw():
-    """Return what a terminal of 80 columns shows of a job that came to these steps."""
+    """Return the screen, on a terminal of 80 columns, of a job with these earlier states."""
 
     def drawn(job, *before):
         history = History()
@@ -26,7 +26,7 @@ def draw():
 
 
 def test_a_line_rises_as_training_goes_on(draw):
-    """Success from 0 to 1 is the whole height."""
+    """The height stands for success from 0 to 1."""
     before = [make_job(step=step, successRate=rate) for step, rate in ((1000, 0.0), (2000, 0.5))]
 
     text = draw(make_job(step=3000, successRate=1.0), *before)
@@ -36,7 +36,7 @@ def test_a_line_rises_as_training_goes_on(draw):
 
 
 def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
-    """A figure that is cut off at its newest end would be the wrong one."""
+    """If the newest end of a line were cut off, the wrong values would be shown."""
     before = [make_job(step=step, successRate=0.0) for step in range(MOST)]
 
     text = draw(make_job(step=MOST, successRate=1.0), *before)
@@ -46,7 +46,7 @@ def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
 
 
 def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
-    """Why a job stands where it does is seen without another command."""
+    """The reason of a state must be visible without another command."""
     text = draw(make_job())
 
     assert "job  Running" in text
@@ -56,7 +56,7 @@ def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
 
 
 def test_a_job_that_nobody_has_seen_is_drawn(draw):
-    """The command is typed right after `kubectl apply`."""
+    """People run the command right after `kubectl apply`."""
     job = make_job(step=None, target=None, simulators=[], lastCheckpoint=None)
     unseen = job.model_copy(update={"status": type(job.status)()})
 
@@ -64,7 +64,7 @@ def test_a_job_that_nobody_has_seen_is_drawn(draw):
 
 
 def test_a_status_without_news_adds_nothing_to_the_history():
-    """Ages change each second, figures do not."""
+    """Ages change each second, but figures do not."""
     history = History()
     history.add(make_job().status)
     history.add(make_job().status)

@@ -1,4 +1,4 @@
-"""Durations, lines of figures, and tables: what they look like is what they are for."""
+"""Durations, sparklines and tables as text."""
 
 import pytest
 from hypothesis import given
@@ -18,45 +18,45 @@ def test_a_duration_is_shown_in_its_two_largest_units(seconds, told):
 
 
 def test_a_duration_whose_second_unit_is_zero_has_one():
-    """Not the third instead: 1h and 5 s is not `1h5s`."""
+    """The third unit is not used instead: 1 h and 5 s is not `1h5s`."""
     assert short(3605) == "1h"
 
 
 def test_the_line_rises_with_the_figures():
-    """From the least to the greatest."""
+    """The lowest and the highest bar stand for the smallest and the largest figure."""
     assert sparkline([0, 1, 2, 3, 4, 5, 6, 7]) == BARS
 
 
 def test_equal_figures_are_neither_low_nor_high():
-    """No noise is made of nothing."""
+    """Equal figures must not look like noise."""
     assert sparkline([5.0, 5.0]) == "▅▅"
 
 
 def test_what_is_not_known_is_a_gap():
-    """Never a zero."""
+    """An unknown value is never shown as zero."""
     assert sparkline([0.0, None, 1.0]) == "▁ █"
     assert sparkline([None]) == " "
 
 
 def test_a_scale_may_be_given():
-    """A success rate of 0.5 is half way, also when it never was otherwise."""
+    """A success rate of 0.5 is half-way, even if it was always near that."""
     assert sparkline([0.5, 0.51], lowest=0.0, highest=1.0) == "▅▅"
 
 
 @given(st.lists(st.none() | st.floats(-1e9, 1e9), max_size=40))
 def test_each_figure_has_one_character(values):
-    """So that lines below each other are of the same times."""
+    """Lines below each other then show the same times."""
     assert len(sparkline(values)) == len(values)
     assert set(sparkline(values)) <= set(BARS) | {" "}
 
 
 def test_columns_stand_below_each_other_and_lines_end_without_blanks():
-    """They are pasted into issues."""
+    """Tables are pasted into issues."""
     assert lines_of([("A", "LONG"), ("wide", ""), ("b", "c")]) == ["A      LONG", "wide", "b      c"]
 
 
 def test_a_table_of_the_server_is_shown_as_kubectl_shows_it():
-    """The columns are those of the CRD, so that both list the same."""
+    """The columns are those of the CRD, so both programs list the same."""
     columns = [
         {"name": "Name", "priority": 0},
         {"name": "Step", "priority": 0},

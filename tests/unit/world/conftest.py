@@ -1,4 +1,4 @@
-"""What the tests of worlds share: small worlds, and the identity of one simulator."""
+"""Small worlds and the identity of one simulator, for the tests of worlds."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ HEADER = b"#VRML_SIM R2023b utf8\n"
 
 @pytest.fixture
 def world() -> Callable[[str], bytes]:
-    """Return what makes a world of the text below its first line."""
+    """Return a function that adds the first line to the text of a world."""
     return lambda text: HEADER + text.encode()
 
 

@@ -1,4 +1,4 @@
-"""The worlds that ship: what they hold, and that simulators can be made of them."""
+"""The built-in worlds: their content, and the generation of simulators' worlds from them."""
 
 import math
 from itertools import pairwise
@@ -17,7 +17,7 @@ from palaestra_sim.world import (
     robots,
 )
 
-# Every type of node in the shipped worlds; all are Webots' own, so nothing is ever downloaded.
+# Every type of node in the built-in worlds; all are Webots' own, so nothing is ever downloaded.
 PLAIN = {
     "Background", "Box", "Camera", "ContactProperties", "Cylinder", "DirectionalLight", "DistanceSensor",
     "HingeJoint", "HingeJointParameters", "PBRAppearance", "Physics", "Pose", "PositionSensor",
@@ -27,13 +27,13 @@ PLAIN = {
 
 @pytest.fixture(params=["arena", "seeing", "two_robots"])
 def shipped(request: pytest.FixtureRequest) -> bytes:
-    """Return each shipped world in turn."""
+    """Return each built-in world in turn."""
     return builtin(request.param)
 
 
 @pytest.fixture
 def scene(shipped: bytes) -> World:
-    """Return the same, as read."""
+    """Return the parsed world."""
     return parse(shipped)
 
 
@@ -54,7 +54,7 @@ def sees(world: World) -> bool:
 
 
 def test_an_unknown_world_names_those_that_ship() -> None:
-    """A path is not a name."""
+    """The argument is a name, not a path."""
     message = 'no world "../secret" ships; choose one of arena, court, pen, seeing, two_robots'
 
     with pytest.raises(UnknownWorldError, match=message):
@@ -62,7 +62,7 @@ def test_an_unknown_world_names_those_that_ship() -> None:
 
 
 def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
-    """One ROS node then steps the simulation, senses and sets the scene."""
+    """One ROS node then steps the simulation, reads the sensors and places the scene."""
     assert robots(builtin("arena")) == (
         WorldRobot(
             robot="robotino", ros_name="robotino", supervisor=True, synchronize=True, definition="ROBOTINO"
@@ -71,7 +71,7 @@ def test_the_arena_has_one_robot_that_is_its_own_supervisor() -> None:
 
 
 def test_worlds_with_a_separate_supervisor_work_too() -> None:
-    """Only one of its two robots asks for the clock."""
+    """Only one of its two robots has the option for the clock."""
     supervisor, robotino = robots(builtin("two_robots"))
 
     assert (supervisor.robot, supervisor.supervisor) == ("supervisor", True)
@@ -80,7 +80,7 @@ def test_worlds_with_a_separate_supervisor_work_too() -> None:
 
 
 def test_simulators_can_be_made_of_it(shipped: bytes, identity: RunIdentity) -> None:
-    """Without a file beside it, and again and again."""
+    """The generation needs no other file and can be repeated."""
     made = generate(shipped, identity, clock=True)
 
     assert generate(made, identity, clock=True) == made
@@ -88,13 +88,13 @@ def test_simulators_can_be_made_of_it(shipped: bytes, identity: RunIdentity) -> 
 
 
 def test_it_needs_nothing_from_elsewhere(scene: World) -> None:
-    """A pod has no network, and no folder of PROTOs."""
+    """A pod has no network and no folder of PROTOs."""
     assert scene.externs == ()
     assert {node.type_name for node in scene.walk() if not node.uses} <= PLAIN
 
 
 def test_every_use_has_its_def_before_it(scene: World) -> None:
-    """Webots leaves out what isn't defined yet."""
+    """Webots leaves out a USE whose DEF comes later."""
     seen = set()
     for node in scene.walk():
         seen.add(node.def_name)
@@ -102,7 +102,7 @@ def test_every_use_has_its_def_before_it(scene: World) -> None:
 
 
 def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> None:
-    """Rollers are modelled by friction across the wheel that is zero."""
+    """Rollers are modeled by zero friction across the wheel."""
     (info,) = of_type(scene, "WorldInfo")
     (contact,) = info.nodes("contactProperties")
 
@@ -113,7 +113,7 @@ def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> 
 
 
 def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
-    """Centerd on the origin."""
+    """It is centered on the origin."""
     floor = defined(scene, "FLOOR")
     size = defined(scene, "FLOOR_BOX").numbers("size") or ()
 
@@ -125,7 +125,7 @@ def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
 def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
     scene: World, wall: int, axis: int, side: int
 ) -> None:
-    """0.1 m thick, 0.3 m high, felt as they are seen."""
+    """They are 0.1 m thick and 0.3 m high; their shape for collisions equals the visible one."""
     center = defined(scene, f"WALL_{wall}").numbers("translation") or ()
     size = defined(scene, f"WALL_{wall}_BOX").numbers("size") or ()
 
@@ -137,7 +137,7 @@ def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
 
 
 def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
-    """They are what the robot has to drive around, if an episode wants it."""
+    """A robot must drive around them, if an episode uses them."""
     cylinders = [defined(scene, f"CYLINDER_{number}") for number in range(4)]
     shapes = [defined(scene, f"CYLINDER_{number}_SHAPE") for number in range(4)]
 
@@ -153,7 +153,7 @@ def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
 
 
 def test_the_target_is_seen_and_never_felt(scene: World) -> None:
-    """A disk of the radius within which it counts as reached; for cameras, a pole of 0.5 m on the floor."""
+    """It is a disk with the radius within which it counts as reached; for cameras, a pole of 0.5 m."""
     target = defined(scene, "TARGET")
     (shape,) = target.nodes("children")[0].nodes("geometry")
     form = tuple(shape.numbers(name) for name in ("radius", "height"))
@@ -166,7 +166,7 @@ def test_the_target_is_seen_and_never_felt(scene: World) -> None:
 
 @pytest.mark.parametrize("wheel", [0, 1, 2])
 def test_wheels_turn_about_the_line_from_the_middle_of_the_robot(scene: World, wheel: int) -> None:
-    """So that a positive speed turns the robot clockwise, as in the Robotino 3 of Webots."""
+    """A positive speed then turns the robot clockwise, as in the Robotino 3 of Webots."""
     joint = of_type(scene, "HingeJoint")[wheel]
     motor, sensor = joint.nodes("device")
     (parameters,) = joint.nodes("jointParameters")
@@ -186,7 +186,7 @@ def test_wheels_turn_about_the_line_from_the_middle_of_the_robot(scene: World, w
 
 
 def test_nine_infrared_rays_leave_the_rim_every_40_degrees(scene: World) -> None:
-    """From the front, counterclockwise; each looks along its own x."""
+    """They start at the front and go counterclockwise; each looks along its own x axis."""
     sensors = of_type(scene, "DistanceSensor")
 
     assert [sensor.text("name") for sensor in sensors] == [f"ir{n}" for n in range(1, 10)]
@@ -199,7 +199,7 @@ def test_nine_infrared_rays_leave_the_rim_every_40_degrees(scene: World) -> None
 
 
 def test_infrared_sensors_answer_in_volts_with_noise(scene: World) -> None:
-    """The table of the Sharp GP2Y0A41SK0F: farther is less."""
+    """The table is that of the Sharp GP2Y0A41SK0F: farther gives less."""
     for sensor in of_type(scene, "DistanceSensor"):
         table = sensor.numbers("lookupTable") or ()
         meters, volts, noise = table[0::3], table[1::3], table[2::3]
@@ -212,7 +212,7 @@ def test_infrared_sensors_answer_in_volts_with_noise(scene: World) -> None:
 
 
 def test_the_bumper_is_wider_than_the_body_and_clear_of_the_floor(scene: World) -> None:
-    """The one of the PROTO has no boundingObject, and never fires."""
+    """The bumper of Webots' PROTO has no boundingObject, so it never fires."""
     (bumper,) = of_type(scene, "TouchSensor")
     (rim,) = bumper.nodes("boundingObject")
     (height,) = rim.numbers("height") or ()
@@ -225,7 +225,7 @@ def test_the_bumper_is_wider_than_the_body_and_clear_of_the_floor(scene: World) 
 
 
 def test_the_body_weighs_20_kg(scene: World) -> None:
-    """And is felt as it is seen."""
+    """Its shape for collisions equals the visible one."""
     robot = defined(scene, "ROBOTINO")
     (physics,) = robot.nodes("physics")
     (bounds,) = robot.nodes("boundingObject")
@@ -235,7 +235,7 @@ def test_the_body_weighs_20_kg(scene: World) -> None:
 
 
 def test_both_cameras_look_forward_from_one_place() -> None:
-    """A pixel of the depth image belongs to the same pixel of the color image."""
+    """A pixel of the depth image then belongs to the same pixel of the color image."""
     scene = parse(builtin("seeing"))
     (camera,), (depth_camera,) = of_type(scene, "Camera"), of_type(scene, "RangeFinder")
 

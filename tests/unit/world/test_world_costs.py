@@ -1,7 +1,7 @@
-"""Reading a world costs a time that is proportional to its bytes, whatever is in it.
+"""The time to read a world is proportional to its bytes, whatever it contains.
 
 An operator reads worlds of authors who may want to keep it busy. Each shape is written at one size and at
-four times that size; a quadratic reading would take sixteen times as long.
+four times that size; a quadratic time would be sixteen times as long.
 """
 
 import time
@@ -33,7 +33,7 @@ def filled(head: bytes, unit: bytes, tail: bytes = b"", first: bytes = HEADER + 
 
 
 def numbered(head: bytes, unit: str, tail: bytes = b"", first: bytes = HEADER) -> Shape:
-    """Return a shape that repeats `unit` with another number each time."""
+    """Return a shape that repeats `unit` with a different number each time."""
 
     def shape(size: int) -> bytes:
         count = (size - len(first) - len(head) - len(tail)) // (len(unit) + 2)
@@ -43,7 +43,7 @@ def numbered(head: bytes, unit: str, tail: bytes = b"", first: bytes = HEADER) -
 
 
 def halves(first: Shape, second: Shape) -> Shape:
-    """Return a shape whose first half is of one shape and whose second is of another, without its header."""
+    """Return a shape whose halves are of two shapes, with only the first one's header."""
     return lambda size: first(size // 2) + second(size // 2).removeprefix(HEADER)
 
 
@@ -53,7 +53,7 @@ def model(head: bytes, unit: bytes, tail: bytes = b"") -> Shape:
 
 
 def several(head: str, unit: str, tail: str) -> Shape:
-    """Return a shape of MJCF that repeats `unit` with another number each time."""
+    """Return a shape of MJCF that repeats `unit` with a different number each time."""
     root = b"<mujoco><actuator><motor/></actuator>"
     return numbered(head.encode(), unit, tail.encode() + b"</mujoco>", first=root)
 
@@ -123,7 +123,7 @@ SHAPES: dict[str, Shape] = {
 
 
 def seconds(source: bytes) -> float:
-    """Return the processor time of a check, and of a generation if there is nothing wrong."""
+    """Return the processor time of a check, and of a generation if the world is valid."""
     began = time.process_time()
     with suppress(WorldError):
         check(source)
@@ -133,7 +133,7 @@ def seconds(source: bytes) -> float:
 
 @pytest.mark.parametrize("unit", [b'<a file="/"/>', b'<a file="b"/>\n'])
 def test_an_error_has_so_many_places_and_no_more(unit: bytes) -> None:
-    """A message with 80,000 places helps nobody, and each place costs memory."""
+    """A message with 80,000 positions helps nobody, and each position costs memory."""
     with pytest.raises(WorldError, match=r"100 or more places") as caught:
         check(model(b"", unit)(SMALL))
 
@@ -142,7 +142,7 @@ def test_an_error_has_so_many_places_and_no_more(unit: bytes) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 def test_a_larger_world_costs_more_only_in_proportion(shape: Shape) -> None:
-    """A world of a megabyte that costs minutes would keep an operator from the jobs of all others."""
+    """If a world of a megabyte took minutes, an operator could not serve other jobs."""
     ratios = []
     for _ in range(TRIES):
         small = seconds(shape(SMALL))

@@ -1,4 +1,4 @@
-"""The world of a TurtleBot3 Burger: its robot, and the same things as on the floor of the fake."""
+"""The world of a TurtleBot3 Burger has its robot, and the same obstacles as the fake."""
 
 import pytest
 
@@ -15,7 +15,7 @@ def defined(name: str) -> Node:
 
 
 def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
-    """An instance of a PROTO of Webots, which the stub has too."""
+    """It is an instance of a PROTO of Webots, which the stub has too."""
     assert defined("BURGER").type_name == "TurtleBot3Burger"
     assert robots(builtin("court")) == (
         WorldRobot(robot="burger", ros_name="burger", supervisor=True, synchronize=True, definition="BURGER"),
@@ -23,7 +23,7 @@ def test_the_court_has_one_robot_that_is_its_own_supervisor() -> None:
 
 
 def test_simulators_can_be_made_of_it(identity: RunIdentity) -> None:
-    """Its only address is one of Webots' own files."""
+    """Its only address is that of one of Webots' own files."""
     made = generate(builtin("court"), identity, clock=True)
 
     assert generate(made, identity, clock=True) == made
@@ -32,7 +32,7 @@ def test_simulators_can_be_made_of_it(identity: RunIdentity) -> None:
 
 @pytest.mark.parametrize("thing", COURT.obstacles, ids=lambda thing: thing.name)
 def test_the_fake_has_the_things_of_the_world(thing) -> None:
-    """A policy that learned on one meets the same things on the other."""
+    """A policy that learned in one must find the same obstacles in the other."""
     node, shape = defined(thing.name), defined(f"{thing.name}_SHAPE")
     size = shape.numbers("size") or (0.0, 0.0, 0.3)
 

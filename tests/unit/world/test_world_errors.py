@@ -1,4 +1,4 @@
-"""Every bad world is refused with its place, the fact and the remedy, and in no other way."""
+"""Every invalid world is refused with position, fact and remedy, and in no other way."""
 
 import pickle
 from collections.abc import Callable
@@ -13,14 +13,14 @@ IDENTITY = RunIdentity(job="job", replica=0, group="collect", index=0)
 
 
 def refusal(source: bytes) -> str:
-    """Return what is said about a world that can't be read."""
+    """Return the message about a world that cannot be read."""
     with pytest.raises(WorldError) as caught:
         parse(source, "arena.wbt")
     return str(caught.value)
 
 
 def problem(attempt: Callable[[], object]) -> WorldError | None:
-    """Return what is wrong with a world; any other exception is a failure of the test."""
+    """Return the WorldError of a call, or None; any other exception fails the test."""
     try:
         attempt()
     except WorldError as error:
@@ -65,7 +65,7 @@ def problem(attempt: Callable[[], object]) -> WorldError | None:
     ],
 )
 def test_a_mistake_is_pointed_at(world: Callable[[str], bytes], text: str, message: str) -> None:
-    """Line and column count from 1; the column counts characters, as an editor does."""
+    """Line and column count from 1, and the column counts characters, as an editor does."""
     assert refusal(world(text)).startswith(f"arena.wbt:{message}")
 
 
@@ -81,14 +81,14 @@ def test_a_file_without_the_header_of_a_world_is_refused(first_line: bytes) -> N
 
 
 def test_a_byte_that_is_not_utf_8_is_pointed_at(world: Callable[[str], bytes]) -> None:
-    """The characters before it count as one each."""
+    """Each character before it counts as one."""
     assert refusal(world("# ü ") + b"\xff\n") == (
         "arena.wbt:2:5: byte 0xff is not UTF-8; save the world as UTF-8"
     )
 
 
 def test_nodes_a_hundred_deep_are_read_and_more_are_refused(world: Callable[[str], bytes]) -> None:
-    """The limit is a number of ours: Python's stack is never the one to complain."""
+    """The limit is Palaestra's own, so Python's stack never overflows."""
     deepest = "Group { children " * 99 + "Group { }" + " }" * 99
 
     assert len(list(parse(world(deepest)).walk())) == 100
@@ -96,7 +96,7 @@ def test_nodes_a_hundred_deep_are_read_and_more_are_refused(world: Callable[[str
 
 
 def test_an_error_can_be_taken_apart_and_sent_on() -> None:
-    """A tool that shows errors in an editor needs the numbers; a process pool needs a copy."""
+    """A tool that shows errors in an editor needs the numbers, and a process pool needs a copy."""
     error = WorldError("arena.wbt", 12, 5, "this is wrong", "do that")
 
     copy = pickle.loads(pickle.dumps(error))
@@ -109,7 +109,7 @@ def test_an_error_can_be_taken_apart_and_sent_on() -> None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
-    """No other exception, whatever the file is."""
+    """Whatever the file is, no other exception may come."""
     error = problem(lambda: parse(b"#VRML_SIM R2023b utf8\n" + data))
 
     assert error is None or (error.line >= 1 and error.column >= 1)
@@ -124,7 +124,7 @@ def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
     ),
 )
 def test_a_damaged_world_is_generated_from_or_refused(at: float, cut: int, new: bytes) -> None:
-    """Half-saved files, lost braces, editors gone wrong; the check finds what the generator would."""
+    """The file may be half saved or lack braces; the check must find what the generator would."""
     arena = builtin("two_robots")
     place = int(at * len(arena))
     damaged = arena[:place] + new + arena[place + cut :]

@@ -1,4 +1,4 @@
-"""PROTO files beside a world are found by their EXTERNPROTO lines, and only read from there."""
+"""PROTO files next to a world are found by their EXTERNPROTO lines, and read only from there."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ WORLD = Path("/project/worlds/room.wbt")
 
 
 def found(world: str, files: Mapping[str, str], **options: object) -> Protos:
-    """Return the PROTOs of a world whose files are in memory; a file is its text below the first line."""
+    """Return the PROTOs of a world whose files are in memory, as texts without the first line."""
 
     def read(path: Path) -> bytes:
         text = files.get(
@@ -39,7 +39,7 @@ def refusals(result: Protos) -> dict[str, str]:
 
 
 def test_relative_addresses_count_from_the_file_that_names_them() -> None:
-    """A PROTO names its neighbors, wherever the world lies."""
+    """A PROTO refers to its neighbors, wherever the world is."""
     result = found(
         'EXTERNPROTO "../protos/Stool.proto"',
         {
@@ -54,7 +54,7 @@ def test_relative_addresses_count_from_the_file_that_names_them() -> None:
 
 
 def test_an_address_with_a_scheme_is_a_name_only() -> None:
-    """Webots brings those PROTOs; nothing is loaded from a network."""
+    """Webots provides those PROTOs; nothing is loaded from a network."""
     result = found(
         'EXTERNPROTO "https://example.com/objects/protos/WoodenBox.proto"\n'
         'IMPORTABLE EXTERNPROTO "webots://projects/objects/floors/protos/Floor.proto"\n'
@@ -67,7 +67,7 @@ def test_an_address_with_a_scheme_is_a_name_only() -> None:
 
 
 def test_a_file_that_several_name_is_read_once() -> None:
-    """Two spellings of its address are one file."""
+    """Two spellings of its address mean the same file."""
     result = found(
         'EXTERNPROTO "../protos/A.proto"\nEXTERNPROTO "../protos/Leg.proto"',
         {
@@ -81,7 +81,7 @@ def test_a_file_that_several_name_is_read_once() -> None:
 
 
 def test_a_missing_file_is_refused_at_the_line_that_names_it() -> None:
-    """The error is in the file with the EXTERNPROTO, a world or a PROTO."""
+    """The error is in the file with the EXTERNPROTO line, which is a world or a PROTO."""
     result = found(
         'EXTERNPROTO "Gone.proto"\nEXTERNPROTO "Stool.proto"',
         {"/project/worlds/Stool.proto": proto("Stool", "Leg.proto")},
@@ -97,7 +97,7 @@ def test_a_missing_file_is_refused_at_the_line_that_names_it() -> None:
 
 
 def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> None:
-    """No instance of them could ever be finished."""
+    """An instance of them could never be completed."""
     result = found(
         'EXTERNPROTO "A.proto"',
         {
@@ -113,14 +113,14 @@ def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> Non
 
 
 def test_a_proto_that_is_made_of_itself_is_refused() -> None:
-    """The shortest ring has one file."""
+    """The shortest cycle has one file."""
     result = found('EXTERNPROTO "A.proto"', {"/project/worlds/A.proto": proto("A", "A.proto")})
 
     assert refusals(result)["A"].endswith("A is made of itself; remove A from A")
 
 
 def test_a_chain_of_files_has_a_bounded_length() -> None:
-    """The bound is a number of ours: Python's stack is never the one to complain."""
+    """The limit is Palaestra's own, so Python's stack never overflows."""
     files = {f"/project/worlds/P{n}.proto": proto(f"P{n}", f"P{n + 1}.proto") for n in range(200)}
 
     result = found('EXTERNPROTO "P0.proto"', files)
@@ -130,7 +130,7 @@ def test_a_chain_of_files_has_a_bounded_length() -> None:
 
 
 def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
-    """The world may do without that type, so the caller decides."""
+    """The world may not need that type, so the caller decides."""
     result = found(
         'EXTERNPROTO "A.proto"\nEXTERNPROTO "B.proto"\nEXTERNPROTO "C.proto"',
         {
@@ -148,7 +148,7 @@ def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:
 
 
 def test_two_files_of_one_type_are_refused() -> None:
-    """Types have one meaning in the whole world here."""
+    """A type has only one meaning in a world."""
     result = found(
         'EXTERNPROTO "Leg.proto"\nEXTERNPROTO "a/A.proto"',
         {
@@ -162,14 +162,14 @@ def test_two_files_of_one_type_are_refused() -> None:
 
 
 def test_types_that_are_described_otherwise_are_not_read() -> None:
-    """A stand-in takes the place of a PROTO, with a template or without a file."""
+    """A stand-in replaces a PROTO that has a template or no file."""
     result = found('EXTERNPROTO "Gone.proto"', {}, without={"Gone"})
 
     assert result == Protos()
 
 
 def test_a_world_without_a_file_has_no_relative_addresses() -> None:
-    """A world from a ConfigMap lies in no folder."""
+    """A world from a ConfigMap has no folder."""
     source = f'{HEADER}EXTERNPROTO "Stool.proto"'.encode()
 
     error = local_protos(None, parse(source)).refused["Stool"]
@@ -181,7 +181,7 @@ def test_a_world_without_a_file_has_no_relative_addresses() -> None:
 
 
 def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
-    """Without a reader of the caller's own."""
+    """The caller gives no reader of its own."""
     (tmp_path / "Stool.proto").write_text(HEADER + proto("Stool"))
     source = f'{HEADER}EXTERNPROTO "Stool.proto"\nEXTERNPROTO "a\0b.proto"'.encode()
     with pytest.raises(WorldError):
@@ -194,7 +194,7 @@ def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
 
 
 def test_files_from_before_r2022b_find_the_protos_of_their_project_by_name(tmp_path: Path) -> None:
-    """They have no EXTERNPROTO lines, neither the world nor its PROTOs; folders below protos/ count too."""
+    """Neither the world nor its PROTOs have EXTERNPROTO lines; folders below protos/ are searched too."""
     (tmp_path / "worlds").mkdir()
     (tmp_path / "protos" / "parts").mkdir(parents=True)
     old = "#VRML_SIM R2022a utf8\n"
@@ -215,5 +215,5 @@ def test_files_from_before_r2022b_find_the_protos_of_their_project_by_name(tmp_p
 
 
 def test_a_world_without_a_file_has_no_project() -> None:
-    """So nothing is looked for beside it."""
+    """No files are searched next to it."""
     assert local_protos(None, parse(b"#VRML_SIM R2021b utf8\nStool { }")) == Protos()

@@ -1,4 +1,4 @@
-"""What the generator does to each way of writing a robot, and what it refuses.
+"""The generator's changes to each way of writing a robot, and its refusals.
 
 Each example shows a world before and after; `NAME` stands for the generated name.
 """
@@ -17,7 +17,7 @@ COMPLETE = '\nRobot { name "robotino" controller "ros" controllerArgs ["--name=N
 
 @pytest.fixture
 def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
-    """Return what turns the text of a world into that of the generated one, names shortened."""
+    """Return a function that generates from the text of a world and shortens the names."""
 
     def make(text: str, robot: str = "robotino", *, clock: bool = True) -> str:
         made = generate(world(text), identity, clock=clock)
@@ -29,7 +29,7 @@ def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
 
 @pytest.fixture
 def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
-    """Return a function that returns the refusal of a world."""
+    """Return a function that returns the error for a world."""
 
     def tell(text: str, *, relative_addresses: bool = False) -> str:
         with pytest.raises(WorldError) as caught:
@@ -46,7 +46,7 @@ def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
 
 
 def robot(arguments: str, name: str = "robotino") -> str:
-    """Return a robot on one line, with these words in it."""
+    """Return a robot on one line, with these arguments."""
     return f'Robot {{ name "{name}" controller "ros" {arguments} }}'
 
 
@@ -126,12 +126,12 @@ def robot(arguments: str, name: str = "robotino") -> str:
     ],
 )
 def test_the_arguments_of_a_robot(generated: Callable[..., str], before: str, after: str) -> None:
-    """Only what is between controllerArgs and its end may change."""
+    """Only the text between controllerArgs and its end may change."""
     assert generated(robot(before)) == robot(after)
 
 
 def test_lines_and_comments_stay_where_they_are(generated: Callable[..., str]) -> None:
-    """A generated world is read by people, beside its source."""
+    """People read a generated world next to its source."""
     before = """Robot {
   name "robotino"  # the one and only
   controllerArgs [
@@ -150,7 +150,7 @@ def test_lines_and_comments_stay_where_they_are(generated: Callable[..., str]) -
 def test_added_strings_are_on_lines_of_their_own_in_a_list_that_is(
     generated: Callable[..., str],
 ) -> None:
-    """As Webots would have saved it, in the line ends of the file."""
+    """Webots would save it in the same way, with the line ends of the file."""
     text = 'Robot {{\r\n  name "robotino"\r\n  controller "ros"\r\n  controllerArgs [{}\r\n  ]\r\n}}\r\n'
     before = text.format('\r\n    "--name=a"')
     after = text.format('\r\n    "--name=NAME"\r\n    "--synchronize"')
@@ -161,7 +161,7 @@ def test_added_strings_are_on_lines_of_their_own_in_a_list_that_is(
 def test_an_added_list_is_on_lines_of_its_own_if_the_controller_is(
     generated: Callable[..., str],
 ) -> None:
-    """With the indentation of the robot."""
+    """The indentation is that of the robot."""
     before = (
         'Group {\n  children [\n    Robot {\n      name "robotino"\n      controller "ros"\n    }\n  ]\n}'
     )
@@ -171,7 +171,7 @@ def test_an_added_list_is_on_lines_of_its_own_if_the_controller_is(
 
 
 def test_a_clock_goes_with_the_gap_before_it(generated: Callable[..., str]) -> None:
-    """Unless a comment is in it, which stays."""
+    """If the gap has a comment, it stays."""
     arguments = 'controllerArgs ["--clock"\n"--name=a" "--synchronize"{}"--clock" ]'
     kept = 'controllerArgs [\n"--name=NAME" "--synchronize"{} ]'
 
@@ -194,7 +194,7 @@ def test_one_clock_of_a_world_may_stay_and_it_is_the_first(
 
 
 def test_a_clock_is_never_added(generated: Callable[..., str]) -> None:
-    """Whether anyone needs it is for the world to say, `clock` only allows it."""
+    """The world decides whether a clock is needed; `clock` only allows it."""
     assert "--clock" not in generated(robot('controllerArgs ["--name=a"]'), clock=True)
 
 
@@ -213,7 +213,7 @@ def test_a_robot_is_found_wherever_it_is_nested(generated: Callable[..., str], a
 
 
 def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIdentity) -> None:
-    """Wherever the arguments of the outer one stand."""
+    """The arguments of the outer robot may be anywhere."""
     inner = robot('controllerArgs ["--name=a"]', name="arm")
     made = generate(world(robot(f'children [ {inner} ] controllerArgs "--name=b"')), identity, clock=False)
 
@@ -224,7 +224,7 @@ def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIden
 
 
 def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunIdentity) -> None:
-    """Its default name is in the PROTO file, so its type stands in for it."""
+    """Its default name is in the PROTO file, so its type is used instead."""
     made = generate(world('Robotino3 { controller "ros" }'), identity, clock=False)
 
     assert [found.robot for found in robots(made)] == ["Robotino3"]
@@ -232,7 +232,7 @@ def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunId
 
 
 def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdentity) -> None:
-    """That is the default of Webots."""
+    """This is the default of Webots."""
     made = generate(world('Robot { controller "ros" }'), identity, clock=False)
 
     assert robots(made)[0].ros_name == ros_name(identity, "robot")
@@ -249,7 +249,7 @@ def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdenti
     ],
 )
 def test_other_controllers_are_left_alone(generated: Callable[..., str], text: str) -> None:
-    """They don't speak ROS, so their arguments are their own affair."""
+    """They do not use ROS, so their arguments must not change."""
     assert generated(text + COMPLETE, clock=False) == text + COMPLETE
 
 
@@ -274,12 +274,12 @@ def test_other_controllers_are_left_alone(generated: Callable[..., str], text: s
 def test_a_world_without_a_robot_that_speaks_ros_is_refused_with_the_controllers_that_there_are(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
-    """A run of it would find no robot, whatever else it says."""
+    """A run would find no robot in it."""
     assert refusal(text) == message
 
 
 def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> None:
-    """In the order of the file, one line for each kind."""
+    """They are in the order of the file, one line for each kind."""
     text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
 
     assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [
@@ -290,7 +290,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
 
 
 def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
-    """Some editors write it; what is in front of the header is nothing to a reader."""
+    """Some editors write it before the header, and it must not matter."""
     source = b"\xef\xbb\xbf#VRML_SIM R2023b utf8\n" + COMPLETE.encode()
 
     made = generate(source, identity, clock=False)
@@ -299,7 +299,7 @@ def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
 
 
 def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
-    """Generated or not; the controller takes the last of two names."""
+    """This holds before and after the generation; the controller uses the last of two names."""
     text = (
         'Robot { controller "ros" supervisor TRUE controllerArgs ["--name=a" "--name=b"] }'
         'DEF ARM Robot { controller "ros" name "arm" controllerArgs "--synchronize" }'
@@ -371,13 +371,13 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
 def test_a_world_that_no_simulator_can_have_is_refused(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
-    """With its place, the fact and the remedy."""
+    """The message has the position, the fact and the remedy."""
     with_robot = text if "controller" in text else text + COMPLETE
     assert refusal(with_robot).startswith(message)
 
 
 def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> None:
-    """Shapes are used again all the time."""
+    """Shapes are often reused."""
     text = "Solid { children DEF BODY Shape { } boundingObject USE BODY }" + COMPLETE
 
     assert generated(text) == text
@@ -397,14 +397,14 @@ def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> Non
 def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
     generated: Callable[..., str], text: str
 ) -> None:
-    """And so is what only looks like an address."""
+    """The same holds for text that only looks like an address."""
     assert generated(text + COMPLETE) == text + COMPLETE
 
 
 def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
     world: Make, identity: RunIdentity, refusal: Callable[..., str]
 ) -> None:
-    """But nothing else is allowed to it."""
+    """No other rule is relaxed."""
     text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }' + COMPLETE
 
     made = generate(world(text), identity, clock=False, relative_addresses=True)
@@ -440,7 +440,7 @@ def test_a_world_beside_another_has_a_suffix_behind_its_names_and_no_clock(world
     ids=["none", "too long"],
 )
 def test_a_name_that_cannot_have_a_suffix_is_refused(world: Make, arguments: str, message: str) -> None:
-    """The controller would cut it off."""
+    """The controller would truncate the name."""
     with pytest.raises(WorldError) as caught:
         rename(world(robot(arguments)), "_2", name="my.wbt")
 

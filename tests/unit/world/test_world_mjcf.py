@@ -1,4 +1,4 @@
-"""MJCF worlds as text: what is read, what is refused, and which bytes change."""
+"""MJCF worlds as text: reading, refusals, and the bytes that change."""
 
 import pytest
 
@@ -44,7 +44,7 @@ def test_a_clock_stays_in_the_one_simulator_that_may_keep_it():
 
 
 def test_a_world_without_arguments_gets_them_behind_its_root():
-    """Most models of others have no such text."""
+    """Most other people's models have no such element."""
     made = generate(PLAIN, IDENTITY, clock=False)
 
     assert made.startswith(b'<mujoco><custom><text name="controllerArgs" data="--name=balance_')
@@ -53,19 +53,19 @@ def test_a_world_without_arguments_gets_them_behind_its_root():
 
 @pytest.mark.parametrize("source", [NAMED, PLAIN])
 def test_the_world_of_a_generated_world_is_the_same(source):
-    """ConfigMaps of older releases hold generated worlds."""
+    """A person may take the world of a simulator that ran for the source of a job."""
     made = generate(source, IDENTITY, clock=True)
 
     assert generate(made, IDENTITY, clock=True) == made
 
 
 def test_a_standby_has_the_same_name_with_an_ending():
-    """It runs beside the first on one ROS master."""
+    """It runs together with the first on one ROS master."""
     assert robots(rename(NAMED, "_2"))[0].ros_name == "mine_2"
 
 
 def test_a_standby_of_a_world_without_a_name_is_refused():
-    """There is nothing to append to."""
+    """There is no name to which the suffix could be appended."""
     with pytest.raises(WorldError, match='the robot "robot" has no ROS name; add <text'):
         rename(PLAIN, "_2")
 
@@ -99,7 +99,7 @@ def test_the_end_of_the_file_name_follows_from_the_content():
     ],
 )
 def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
-    """The operator checks a world before it creates anything, without MuJoCo."""
+    """The operator checks a world before it creates anything, and without MuJoCo."""
     with pytest.raises(WorldError, match=message):
         check(source)
 
@@ -114,7 +114,7 @@ def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
     ],
 )
 def test_a_path_that_does_not_count_from_the_world_is_refused(path, element):
-    """A model of a stranger must not read files of the pod."""
+    """A model from somebody else must not read files of the pod."""
     source = with_custom(b"", element.format(path).encode())
 
     with pytest.raises(WorldError, match="does not count from the folder of the world; write its path from"):
@@ -122,7 +122,7 @@ def test_a_path_that_does_not_count_from_the_world_is_refused(path, element):
 
 
 def test_a_path_that_leads_above_the_world_is_fine():
-    """Models of a package share meshes; where they lead is known only beside the files."""
+    """Models of a package share meshes, and only the files show where such a path leads."""
     assets = b'<asset><mesh file="../../arm.stl"/></asset>'
 
     check(with_custom(b"", b'<compiler meshdir="../stls/fetch"/>' + assets), relative_addresses=True)
@@ -133,7 +133,7 @@ def test_a_path_that_leads_above_the_world_is_fine():
     [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013"), ("1e-09", "1e-05 or 1.0101e-05")],
 )
 def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
-    """A basic step of two seconds was taken, at which no robot could be driven."""
+    """A basic step of two seconds was accepted before, at which no robot could be driven."""
     with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
         check(with_custom(b"", f'<option timestep="{timestep}"/>'.encode()))
 
@@ -151,7 +151,7 @@ def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(times
     ],
 )
 def test_a_rounded_timestep_makes_the_step_that_is_meant(timestep, step_ms):
-    """1/240, 1/60, 1/120 and 1/300 of a second have no end in decimals."""
+    """1/240, 1/60, 1/120 and 1/300 of a second have no finite decimal form."""
     assert whole_step_ms(float(timestep)) == step_ms
 
 
@@ -168,7 +168,7 @@ GROWING = [
 
 @for_each("element, fact", GROWING)
 def test_a_line_that_would_take_all_memory_is_refused(element, fact):
-    """MuJoCo allocates what it asks for: minutes, or gigabytes."""
+    """MuJoCo allocates whatever size it reads, which takes minutes or gigabytes."""
     with pytest.raises(WorldError) as refused:
         check(with_custom(b"", element.encode()))
 
@@ -176,7 +176,7 @@ def test_a_line_that_would_take_all_memory_is_refused(element, fact):
 
 
 def test_large_models_are_no_attack():
-    """A height field of a few kilometers, and a rope of a thousand parts."""
+    """Examples are a height field of a few kilometers, and a rope with a thousand parts."""
     check(with_custom(b"", b'<asset><hfield nrow="2000" ncol="2000"/></asset><replicate count="1000"/>'))
 
 

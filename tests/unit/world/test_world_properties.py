@@ -1,4 +1,4 @@
-"""What holds for every world: drawn by hypothesis, written with random gaps between its tokens."""
+"""Properties of all worlds; hypothesis draws worlds with random gaps between their tokens."""
 
 from itertools import chain, product
 
@@ -25,13 +25,13 @@ ARGUMENTS = st.sampled_from(
 
 
 def listed(items: st.SearchStrategy[list[str]]) -> st.SearchStrategy[list[str]]:
-    """Draw a bracketed list of what `items` draws."""
+    """Draw a bracketed list of items."""
     return st.lists(items, max_size=3).map(lambda rows: ["[", *chain(*rows), "]"])
 
 
 @st.composite
 def nodes(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
-    """Draw the tokens of a node of any kind; `inner` draws those within it."""
+    """Draw the tokens of a node of any kind; `inner` draws those inside it."""
     values = st.one_of(SCALARS, listed(SCALARS), inner, listed(inner))
     fields = draw(st.dictionaries(st.sampled_from(["f", "g", "name", "hidden x"]), values))
     body = [token for name, value in fields.items() for token in (*name.split(), *value)]
@@ -40,7 +40,7 @@ def nodes(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
 
 @st.composite
 def ros_robots(draw: st.DrawFn, inner: st.SearchStrategy[list[str]]) -> list[str]:
-    """Draw the tokens of a robot that speaks ROS; `Robot.name` is filled in later."""
+    """Draw the tokens of a robot with the ros controller; `Robot.name` is filled in later."""
     controller = ["controller", '"ros"']
     arguments = draw(
         st.one_of(
@@ -63,7 +63,7 @@ TREES = st.recursive(
 
 @st.composite
 def worlds(draw: st.DrawFn) -> bytes:
-    """Draw a world whose robots have different names; at least one speaks ROS."""
+    """Draw a world whose robots have different names; at least one has the ros controller."""
     lamp = st.just(["Lamp", "{", "}"])
     tokens = chain(*draw(st.lists(TREES, max_size=3)), draw(ros_robots(lamp)))
     pieces = [draw(st.sampled_from(["#VRML_SIM R2023b utf8\n", "#VRML_SIM V8.6.2 utf8 \r\n"]))]
@@ -86,12 +86,12 @@ def without_arguments(source: bytes) -> bytes:
 
 
 def rewritten(world: World) -> str:
-    """Return a world written anew from its tree, without anything that means nothing."""
+    """Return a world that is written from its tree, without comments and formatting."""
     return " ".join(token for node in world.nodes for token in written(node))
 
 
 def written(node: Node) -> list[str]:
-    """Return the tokens of a node, from its tree alone."""
+    """Return the tokens of a node, written from its tree."""
     tokens = [node.type_name, "{"]
     for name, value in node.fields.items():
         tokens += [name, "["] if value.bracketed else [name]
@@ -111,7 +111,7 @@ def written(node: Node) -> list[str]:
 
 @given(worlds())
 def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
-    """The tree holds all that a world means, and nothing of how it was written."""
+    """The tree holds the whole meaning of a world, but not its formatting."""
     once = rewritten(parse(source))
 
     assert rewritten(parse(f"#VRML_SIM R2023b utf8\n{once}".encode())) == once
@@ -119,7 +119,7 @@ def test_a_world_survives_being_read_and_written_anew(source: bytes) -> None:
 
 @given(source=worlds(), clock=st.booleans())
 def test_only_the_arguments_of_robots_change(source: bytes, *, clock: bool) -> None:
-    """Byte for byte: comments, commas, line ends and saved states included."""
+    """All other bytes stay, including comments, commas, line ends and saved states."""
     made = generate(source, IDENTITY, clock=clock)
 
     assert without_arguments(made) == without_arguments(source)
@@ -139,7 +139,7 @@ def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None
     b'Robot { name "r" controller "ros" controllerArgs [ "--name=a"  # c\n"--name=a" "--clock" ] } '
 )
 def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: bytes) -> None:
-    """The order of the two generations does not matter."""
+    """The order of the two generations must not matter."""
     allowed = generate(source, IDENTITY, clock=True)
 
     assert generate(allowed, IDENTITY, clock=False) == generate(source, IDENTITY, clock=False)
@@ -147,7 +147,7 @@ def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: by
 
 @given(source=worlds(), clock=st.booleans())
 def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clock: bool) -> None:
-    """And they are the robots of the source, in its order."""
+    """They are the robots of the source, in its order."""
     made = robots(generate(source, IDENTITY, clock=clock))
 
     assert [robot.robot for robot in made] == [robot.robot for robot in robots(source)]
@@ -157,7 +157,7 @@ def test_every_robot_has_its_name_and_waits_for_its_client(source: bytes, *, clo
 
 @given(source=worlds(), clock=st.booleans())
 def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> None:
-    """One clock if it is allowed and the source has one, else none."""
+    """A world has one clock if it is allowed and the source has one."""
     world = parse(generate(source, IDENTITY, clock=clock))
     found = [node.texts("controllerArgs") for node in world.walk() if node.text("controller")]
 
@@ -170,7 +170,7 @@ def test_no_world_has_two_clocks_or_two_names(source: bytes, *, clock: bool) -> 
 def test_no_two_worlds_of_a_job_share_a_ros_name(
     source: bytes, replicas: set[int], indices: set[int]
 ) -> None:
-    """Over replicas, groups, indices and robots."""
+    """This holds over replicas, groups, indices and robots."""
     names = [
         robot.ros_name
         for replica, group, index in product(replicas, ("collect", "evaluate"), indices)

@@ -1,4 +1,4 @@
-"""A PROTO file without a template is read, and every other one is refused with place, fact and remedy."""
+"""A PROTO file without a template is read; every other one is refused with position, fact and remedy."""
 
 import pytest
 from hypothesis import given
@@ -35,24 +35,24 @@ PROTO Stool [
 
 
 def read(text: str) -> Proto:
-    """Return the PROTO of the text below its first line."""
+    """Return the PROTO of a text without its first line."""
     return parse_proto((HEADER + text).encode(), "Stool.proto")
 
 
 def refusal(text: str) -> str:
-    """Return the message for a PROTO that can't be read."""
+    """Return the message for a PROTO that cannot be read."""
     with pytest.raises(WorldError) as caught:
         read(text)
     return str(caught.value).removeprefix("Stool.proto:")
 
 
 def declaring(declaration: str) -> str:
-    """Return a PROTO with one declaration, in line 3."""
+    """Return a PROTO with one declaration, on line 3."""
     return f"PROTO Stool [\n{declaration}\n] {{ Solid {{ }} }}"
 
 
 def test_a_proto_has_its_type_fields_files_and_body() -> None:
-    """The fields keep their order, since Webots lists them in it."""
+    """The fields keep their order, because Webots lists them in it."""
     stool = read(STOOL)
 
     assert stool.name == "Stool"
@@ -68,7 +68,7 @@ def test_a_proto_has_its_type_fields_files_and_body() -> None:
 
 
 def test_a_field_has_its_type_access_default_and_allowed_values() -> None:
-    """A list of one item needs no brackets, as in a world."""
+    """As in a world, a list of one item needs no brackets."""
     fields = read(STOOL).fields
 
     assert (fields["translation"].type, fields["translation"].default.items) == ("SFVec3f", (0, 0, 0.5))
@@ -80,7 +80,7 @@ def test_a_field_has_its_type_access_default_and_allowed_values() -> None:
 
 
 def test_is_refers_to_a_field_of_the_proto() -> None:
-    """The reader resolves nothing: only an instance has the value."""
+    """The reader does not resolve it, because only an instance has the value."""
     body = read(STOOL).body
 
     assert body.fields["translation"].items == (Is(name="translation"),)
@@ -89,7 +89,7 @@ def test_is_refers_to_a_field_of_the_proto() -> None:
 
 
 def test_a_world_still_has_no_is() -> None:
-    """IS refers to a field of a PROTO, and a world declares none."""
+    """IS refers to a field of a PROTO, and a world declares no fields."""
     with pytest.raises(WorldError, match="2:21: IS outside a PROTO file; write the value of translation"):
         parse(f"{HEADER}Solid {{ translation IS place }}".encode())
 
@@ -133,7 +133,7 @@ def test_a_mistake_is_pointed_at(text: str, message: str) -> None:
 
 
 def test_every_is_without_a_field_is_named_at_once() -> None:
-    """A field that was renamed is usually used at several places."""
+    """A renamed field is usually used in several places."""
     message = refusal("PROTO Stool [ ] { Solid { name IS a model IS b } }")
 
     assert "no field a" in message
@@ -150,7 +150,7 @@ def test_every_is_without_a_field_is_named_at_once() -> None:
     ],
 )
 def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: int) -> None:
-    """Its code could only be run by an engine of Lua or JavaScript."""
+    """Only an engine of Lua or JavaScript could run its code."""
     message = refusal(text)
 
     assert message.startswith(f"{line}:")
@@ -160,14 +160,14 @@ def test_a_template_is_refused_with_its_line_and_the_remedies(text: str, line: i
 
 
 def test_a_percent_sign_in_a_comment_or_alone_is_no_template() -> None:
-    """Comments give proportions, and addresses have escapes."""
+    """Comments have percentages, and addresses have escapes."""
     text = 'PROTO Stool [ ] # 5 %{ of all\n{ Solid { name "%20" } } # %<'
 
     assert read(text).body.text("name") == "%20"
 
 
 def test_the_first_line_of_a_proto_is_checked_as_that_of_a_world() -> None:
-    """The message names the kind of file."""
+    """The message has the kind of file."""
     with pytest.raises(WorldError, match="the first line is not the header of a Webots PROTO"):
         parse_proto(b"PROTO Stool [ ] { Solid { } }", "Stool.proto")
     with pytest.raises(WorldError, match="save the PROTO as UTF-8"):
@@ -175,7 +175,7 @@ def test_the_first_line_of_a_proto_is_checked_as_that_of_a_world() -> None:
 
 
 def problem(data: bytes) -> WorldError | None:
-    """Return the error of a PROTO; any other exception is a failure of the test."""
+    """Return the error of a PROTO; any other exception fails the test."""
     try:
         parse_proto(data, "Stool.proto")
     except WorldError as error:
@@ -185,7 +185,7 @@ def problem(data: bytes) -> WorldError | None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_proto_or_a_world_error(data: bytes) -> None:
-    """No other exception, whatever the file is."""
+    """Whatever the file is, no other exception may come."""
     error = problem(HEADER.encode() + data)
 
     assert error is None or (error.line >= 1 and error.column >= 1)
@@ -197,7 +197,7 @@ def test_arbitrary_bytes_are_a_proto_or_a_world_error(data: bytes) -> None:
     new=st.sampled_from(["", '"', "{", "}", "[", "]", " IS ", "#", "\r\n", "%", "%<", " field ", "SFBool"]),
 )
 def test_a_damaged_proto_is_read_or_refused(at: float, cut: int, new: str) -> None:
-    """Half-saved files and lost braces have no other outcome."""
+    """Half-saved files and missing braces have no other result."""
     place = int(at * len(STOOL))
     damaged = STOOL[:place] + new + STOOL[place + cut :]
 

@@ -1,4 +1,4 @@
-"""The descriptions of Webots' robots: their fields, devices and wheels are those that Webots documents.
+"""The descriptions of Webots' robots have the fields, devices and wheels that Webots documents.
 
 The numbers here were taken from Webots' user guide and PROTO files, not from the descriptions.
 """
@@ -42,7 +42,7 @@ NAMES = {
     "Robotino3": "Robotino 3",
     "TurtleBot3Burger": "TurtleBot3Burger",
 }
-# Fields that choose among variants, of which the default one is described.
+# Fields that choose among variants; only the default variant is described.
 WITHOUT_EFFECT = {
     "E-puck": {"version", "kinematic"},
     "Robotino3": {"infraredSensorModel"},
@@ -83,7 +83,7 @@ _IS = re.compile(r"\bIS (\w+)")
 
 
 class Description(NamedTuple):
-    """A PROTO file: the name in it, its fields with their defaults, and its body with those put in."""
+    """A PROTO file: its name, its fields with their defaults, and its body with the defaults filled in."""
 
     name: str
     defaults: dict[str, str]
@@ -92,7 +92,7 @@ class Description(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Documented numbers of a drive; m, rad/s and kg."""
+    """Documented values of a drive, in m, rad/s and kg."""
 
     radius: float
     wheels: set[tuple[float, float]]
@@ -112,7 +112,7 @@ DRIVES = {
 
 
 def described(name: str) -> Description:
-    """Return a description, with the default of each field where the body has `IS`."""
+    """Return a description, with the default of each field in place of `IS`."""
     text = (PROTOS / f"{name}.proto").read_text()
     header, _, _ = text.partition("\n")
     found = _FILE.search(text)
@@ -140,7 +140,7 @@ def numbers(node: Node, field: str) -> tuple[float, ...]:
 
 
 def within(node: Node, world: World) -> list[Node]:
-    """Return a node and all that is inside it."""
+    """Return a node and its descendants."""
     start, end = node.span
     return [inner for inner in world.walk() if start <= inner.span[0] and inner.span[1] <= end]
 
@@ -155,7 +155,7 @@ def driven(name: str) -> list[tuple[Node, Node]]:
 
 
 def headings(name: str, prefix: str) -> list[float]:
-    """Return where the distance sensors of a name look, in degrees about z, in the order of their number."""
+    """Return the directions of the distance sensors with a name prefix, in degrees about z, by number."""
     found = {}
     for sensor in of_type(described(name).body.walk(), "DistanceSensor"):
         number = (sensor.text("name") or "").removeprefix(prefix)
@@ -164,7 +164,7 @@ def headings(name: str, prefix: str) -> list[float]:
 
 
 def heading(rotation: tuple[float, ...]) -> float:
-    """Return the direction of x about z after a rotation, in rad."""
+    """Return the heading of the x axis after a rotation, in rad."""
     x, y, z, angle = rotation
     cosine, sine = math.cos(angle), math.sin(angle)
     return math.atan2(x * y * (1 - cosine) + z * sine, x * x * (1 - cosine) + cosine)
@@ -180,13 +180,13 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
-    """And no other one: a misspelled field is an error in Webots too."""
+    """No other field is accepted: a misspelled field is an error in Webots too."""
     assert set(described(name).defaults) == set(COMMON.split()) | set(FIELDS[name].split())
 
 
 @pytest.mark.parametrize("name", ROBOTS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
-    """All others are used in the body, so setting them has the effect that it has in Webots."""
+    """The body uses all other fields, so they have the same effect as in Webots."""
     description = described(name)
     is_lidar = name == "RobotisLds01" or name.startswith("Hokuyo")
     without = {"enablePhysics"} if is_lidar else WITHOUT_EFFECT.get(name, set())
@@ -196,7 +196,7 @@ def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_robot_has_its_documented_name(name: str) -> None:
-    """ROS names are made of it."""
+    """ROS names are made from it."""
     (robot,) = described(name).body.nodes
 
     assert robot.type_name == "Robot"
@@ -214,7 +214,7 @@ def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
 
 
 def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
-    """It is the default of extensionSlot, so a world that leaves the slot out has one."""
+    """It is the default of extensionSlot, so a world that leaves the slot out has a lidar."""
     text = (PROTOS / "TurtleBot3Burger.proto").read_text()
     (address,) = re.findall(r'^EXTERNPROTO "(.*)"$', text, re.MULTILINE)
     (lidar,) = described("RobotisLds01").body.nodes
@@ -227,7 +227,7 @@ def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
 
 @pytest.mark.parametrize("name", LIDARS)
 def test_a_lidar_has_the_documented_rays(name: str) -> None:
-    """Field of view in degrees, rays, least and greatest range."""
+    """These are the field of view in degrees, the number of rays, and the range."""
     (lidar,) = described(name).body.nodes
     degrees, rays, nearest, farthest = LIDARS[name]
 
@@ -239,7 +239,7 @@ def test_a_lidar_has_the_documented_rays(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
-    """Each once: programs look them up by name."""
+    """Each occurs once, because programs look them up by name."""
     devices = of_type(described(name).body.walk(), *TYPES_OF_DEVICES)
     names = [device.text("name") for device in devices]
 
@@ -248,7 +248,7 @@ def test_a_robot_has_the_documented_devices(name: str) -> None:
 
 
 def test_the_ground_sensors_of_the_e_puck_look_down_from_left_to_right() -> None:
-    """They come through groundSensorsSlot only."""
+    """They are only added through groundSensorsSlot."""
     sensors = of_type(described("E-puckGroundSensors").body.walk(), "DistanceSensor")
 
     assert [it.text("name") for it in sensors] == ["gs0", "gs1", "gs2"]
@@ -258,7 +258,7 @@ def test_the_ground_sensors_of_the_e_puck_look_down_from_left_to_right() -> None
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_wheels_are_where_webots_has_them_and_as_large(name: str) -> None:
-    """So odometry that a program computes from radius and track is right."""
+    """A program's odometry from wheel radius and track is then right."""
     body = described(name).body
     centers = {numbers(wheel, "translation")[:2] for _, wheel in driven(name)}
     radii = [
@@ -272,7 +272,10 @@ def test_wheels_are_where_webots_has_them_and_as_large(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_wheels_stand_on_the_floor(name: str) -> None:
-    """With the default translation; those of the Robotino 3 are pressed in by 4 mm, as in Webots."""
+    """This holds for the default translation.
+
+    Those of the Robotino 3 are pressed in by 4 mm, as in Webots.
+    """
     height = float(described(name).defaults["translation"].split()[2])
 
     lowest = [height + numbers(wheel, "translation")[2] - DRIVES[name].radius for _, wheel in driven(name)]
@@ -296,7 +299,7 @@ def test_a_wheel_turns_about_its_axle(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_motors_and_bodies_have_the_documented_limits_and_masses(name: str) -> None:
-    """A program asks motors for their maxVelocity to scale its commands."""
+    """A program reads maxVelocity of the motors to scale its commands."""
     (robot,) = described(name).body.nodes
     (physics,) = robot.nodes("physics")
 
@@ -315,7 +318,7 @@ def test_infrared_sensors_of_the_e_puck_look_where_the_user_guide_says() -> None
 
 @pytest.mark.parametrize("name", ["Pioneer3at", "Pioneer3dx"])
 def test_sonars_of_the_pioneers_are_20_degrees_apart_and_40_at_the_sides(name: str) -> None:
-    """Clockwise from the left, as in the user guide's figure."""
+    """They go clockwise from the left, as in the user guide's figure."""
     front = [90, 50, 30, 10, -10, -30, -50, -90]
     expected = front + [-180 - it if it <= 0 else 180 - it for it in reversed(front)]
 
@@ -323,7 +326,7 @@ def test_sonars_of_the_pioneers_are_20_degrees_apart_and_40_at_the_sides(name: s
 
 
 def test_the_robotino_is_the_one_of_the_arena() -> None:
-    """The same wheels, rollers and infrared sensors, so a policy fits both."""
+    """Wheels, rollers and infrared sensors are the same, so a policy fits both."""
     arena, robotino = parse(builtin("arena")), described("Robotino3").body
     ours = {it.text("name"): it for it in of_type(arena.walk(), "DistanceSensor")}
     theirs = {it.text("name"): it for it in of_type(robotino.walk(), "DistanceSensor")}

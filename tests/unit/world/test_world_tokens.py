@@ -1,4 +1,4 @@
-"""How the bytes of a world are cut into tokens, and how strings are written."""
+"""The bytes of a world become tokens, and strings are written."""
 
 import pytest
 from hypothesis import given
@@ -10,17 +10,17 @@ from palaestra_sim.world.tokens import Token, quoted, tokenize, unquoted
 
 
 def tokens(text: str) -> tuple[Token, ...]:
-    """Return the tokens of a text, without the one that ends them."""
+    """Return the tokens of a text without the end token."""
     return tokenize(Source(data=text.encode(), name="world"))[:-1]
 
 
 def words(text: str) -> list[str]:
-    """Return what the tokens of a text look like."""
+    """Return the texts of the tokens."""
     return [token.text.decode() for token in tokens(text)]
 
 
 def test_a_comma_is_as_good_as_a_blank() -> None:
-    """Webots writes vectors with commas between them and reads them as blanks."""
+    """Webots writes vectors with commas between them, and reads commas as blanks."""
     assert words("point [ 0 0 1, 1 0 0 ]") == words("point [ 0 0 1 1 0 0 ]")
 
 
@@ -30,17 +30,17 @@ def test_braces_and_brackets_need_no_blanks() -> None:
 
 
 def test_a_comment_ends_with_its_line_even_glued_to_a_word() -> None:
-    """A number sign begins a comment wherever it stands outside a string."""
+    """Outside a string, a number sign always begins a comment."""
     assert words("name#the robot\n  TRUE") == ["name", "TRUE"]
 
 
 def test_a_number_sign_in_a_string_is_data() -> None:
-    """Addresses and colors have them."""
+    """Addresses and colors have number signs."""
     assert words('url "https://host/a#b"') == ["url", '"https://host/a#b"']
 
 
 def test_line_ends_of_windows_are_blanks() -> None:
-    """A world that was edited on Windows is a world."""
+    """A world may have been edited on Windows."""
     assert words("Robot {\r\n}\r\n") == ["Robot", "{", "}"]
 
 
@@ -53,32 +53,32 @@ def test_every_token_knows_where_it_stands() -> None:
 
 @pytest.mark.parametrize("number", ["0", "-1", "+.5", "1.", "1e5", "-1.5E-3"])
 def test_a_number_is_what_begins_like_one(number: str) -> None:
-    """These are the forms that Webots reads."""
+    """Webots reads these forms."""
     assert [token.kind for token in tokens(number)] == ["number"]
 
 
 @pytest.mark.parametrize("text", ["1x", "-", ".", "1.2.3", "+-1", "3D", '1"a"'])
 def test_what_begins_like_a_number_and_is_none_is_refused(text: str) -> None:
-    """A name can't begin with a digit, so it's nothing else either."""
+    """A name cannot begin with a digit, so such a token has no meaning."""
     with pytest.raises(WorldError, match=r"world:1:1: .* is neither a number nor a name"):
         tokens(text)
 
 
 @pytest.mark.parametrize("text", ['"', '"abc', 'name "abc\n"', '"\\"', '"a\\\n"'])
 def test_a_string_ends_on_its_line(text: str) -> None:
-    """Webots never writes a line end into a string, so a missing quote is found where it is."""
+    """Webots never writes a line end into a string, so a missing quote is found on its line."""
     with pytest.raises(WorldError, match="this string is not closed on its line"):
         tokens(text)
 
 
 def test_a_control_character_is_refused() -> None:
-    """It can't be seen, so it must be pointed at."""
+    """It is invisible, so the message must locate it."""
     with pytest.raises(WorldError, match=r"world:2:3: control character 0x00 outside a string"):
         tokens("\n  \x00")
 
 
 def test_only_quotes_and_backslashes_are_escaped() -> None:
-    """Every other backslash stands for itself, as in a path of Windows."""
+    """Any other backslash stands for itself, as in a path of Windows."""
     (token,) = tokens(r'"a \" b \\ c \n"')
 
     assert unquoted(token) == r'a " b \ c \n'
@@ -94,7 +94,7 @@ def test_a_written_string_reads_as_what_it_was(text: str) -> None:
 
 @given(st.lists(st.sampled_from(["Robot", "{", "}", "[", "]", '"a # b"', "-1.5", "TRUE", "ä"])))
 def test_tokens_survive_whatever_stands_between_them(texts: list[str]) -> None:
-    """Blanks, commas, line ends and comments separate, and mean nothing."""
+    """Blanks, commas, line ends and comments only separate tokens."""
     gap = ' ,\t# a "comment" with { and \\ \r\n'
 
     assert words(gap + gap.join(texts) + gap) == texts

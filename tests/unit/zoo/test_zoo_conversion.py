@@ -1,4 +1,4 @@
-"""Files of RL-Baselines3-Zoo become TrainingJobs, and each difference has a note."""
+"""Files of RL-Baselines3-Zoo are converted to TrainingJobs, with a note for each difference."""
 
 import pytest
 
@@ -42,7 +42,7 @@ OFF_POLICY = "a-v1:\n  n_timesteps: 1000\n"
 
 @pytest.fixture
 def converted():
-    """Return the job of an entry with more words, and its notes."""
+    """Return a function that converts an entry with more lines, and returns its trainer and notes."""
 
     def convert_words(*words, algorithm="SAC"):
         text = OFF_POLICY + "".join(f"  {word}\n" for word in words)
@@ -54,7 +54,7 @@ def converted():
 
 
 def test_each_word_of_an_entry_has_its_place():
-    """The numbers of a published entry must arrive unchanged."""
+    """The values of a published entry must arrive unchanged."""
     spec = load(convert(FILE, "hyperparams/ppo.yml", env="Reach-v1").text).spec
 
     assert spec.trainer.steps == 250_000
@@ -83,7 +83,7 @@ def test_each_word_of_an_entry_has_its_place():
 
 
 def test_an_entry_that_refers_to_another_has_its_words_too():
-    """Half of Zoo's entries are references with one other number."""
+    """Half of Zoo's entries are references that change one value."""
     spec = load(convert(FILE, "ppo.yml", env="Push-v1").text).spec
 
     assert spec.trainer.steps == 250_000
@@ -92,7 +92,7 @@ def test_an_entry_that_refers_to_another_has_its_words_too():
 
 
 def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note():
-    """Zoo does the same, and a mistyped id would get values that were tuned for nothing."""
+    """Zoo does the same; without the note a mistyped id would silently get general values."""
     result = convert(FILE, "ppo.yml", env="Own-v0")
 
     assert load(result.text).spec.trainer.steps == 1_000_000
@@ -100,7 +100,7 @@ def test_an_environment_that_the_file_does_not_name_gets_the_default_with_a_note
 
 
 def test_every_note_is_a_comment_in_the_job():
-    """Standard error is gone when the file is opened weeks later."""
+    """The output on standard error is gone when the file is opened weeks later."""
     result = convert(OFF_POLICY + '  frame_stack: 4\n  vec_env_wrapper: "a\\nb: 1"\n', "td3.yml")
 
     assert all(f"# - {note}\n" in result.text for note in result.notes)
@@ -117,7 +117,7 @@ def test_every_note_is_a_comment_in_the_job():
     ],
 )
 def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
-    """Zoo's files have the name of their algorithm and do not repeat it inside."""
+    """Zoo's files are named after their algorithm and do not contain the name."""
     result = convert(OFF_POLICY, file, algorithm=algorithm)
 
     assert load(result.text).spec.trainer.algorithm.name == name
@@ -146,7 +146,7 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
     ],
 )
 def test_a_file_or_option_that_is_wrong_is_an_error_with_a_remedy(text, file, options, problem):
-    """Guessing would train something else for hours."""
+    """A guess would train something else for hours."""
     with pytest.raises(ZooError) as error:
         convert(text, file, **options)
 
@@ -160,7 +160,7 @@ def test_a_value_beyond_the_bounds_of_a_job_is_refused_by_the_job():
 
 
 def test_a_flat_file_is_one_entry():
-    """People keep the words of one run in a file of their own."""
+    """Users keep the keys of one run in a separate file."""
     spec = load(convert("n_timesteps: 5\ngamma: 0.9", "sac.yml", env="a-v1").text).spec
 
     assert spec.trainer.algorithm.hyperparameters == {"gamma": 0.9}
@@ -209,7 +209,7 @@ NOTED = [
 
 @pytest.mark.parametrize(("word", "note"), NOTED)
 def test_what_a_job_cannot_hold_exactly_is_noted(converted, word, note):
-    """A word that vanished would train something else than the file says."""
+    """If a key were dropped silently, the job would train something else than the file says."""
     _, notes = converted(word)
 
     assert any(note in line for line in notes)
@@ -223,7 +223,7 @@ def test_the_rest_of_an_expression_is_kept_where_one_part_cannot_be_read(convert
 
 
 def test_hindsight_is_written_as_in_a_job(converted):
-    """Today's form and that of Zoo's her.yml are the same replay."""
+    """The current form and that of Zoo's her.yml give the same replay."""
     buffer = {
         "replay_buffer_class": "HerReplayBuffer",
         "replay_buffer_kwargs": {"n_sampled_goal": 4, "goal_selection_strategy": "future"},
@@ -243,7 +243,7 @@ def test_hindsight_is_written_as_in_a_job(converted):
 
 @pytest.mark.parametrize(("kind", "algorithm"), [("replay", "DQN"), ("rollout", "PPO")])
 def test_a_buffer_of_ones_own_is_named_as_in_a_job(converted, kind, algorithm):
-    """With its own options; what a run does anyway is left out."""
+    """It keeps its own options; settings that a run has anyway are left out."""
     trainer, notes = converted(
         f"{kind}_buffer_class: my.lab.Own",
         f'{kind}_buffer_kwargs: "dict(alpha=0.5, handle_timeout_termination=True)"',
@@ -259,7 +259,7 @@ def test_a_buffer_of_ones_own_is_named_as_in_a_job(converted, kind, algorithm):
 
 @pytest.mark.parametrize("word", ["frame_stack: 4", "vec_env_wrapper: [{sb3.VecFrameStack: {n_stack: 4}}]"])
 def test_wrappers_and_stacked_frames_are_fields_of_the_environment(converted, word):
-    """Both words of Zoo stack in the same layout as a job."""
+    """Zoo stacks in the same layout as a job, with both of its keys."""
     trainer, notes = converted("env_wrapper: [a.b.Own: {k: 1}, a.Other]", word)
 
     own, other = trainer.environment.wrappers
@@ -269,7 +269,7 @@ def test_wrappers_and_stacked_frames_are_fields_of_the_environment(converted, wo
 
 
 def test_frames_of_normalized_observations_have_a_note(converted):
-    """Zoo stacks after it has normalized; rewards are the same either way."""
+    """Zoo stacks after the normalization; rewards are the same either way."""
     _, notes = converted("frame_stack: 4", "normalize: true")
     _, of_rewards = converted("frame_stack: 4", "normalize: {norm_obs: false}")
 
@@ -278,7 +278,7 @@ def test_frames_of_normalized_observations_have_a_note(converted):
 
 
 def test_own_callbacks_and_policies_are_classes_of_the_job(converted):
-    """A job names them as module:Class, Zoo with a dot."""
+    """A job names them as module:Class, and Zoo with a dot."""
     trainer, notes = converted("callback: [a.b.Own: {k: 1}, a.Other]", "policy: a.b.Policy")
 
     own, other = trainer.algorithm.callbacks
@@ -304,7 +304,7 @@ def test_own_callbacks_and_policies_are_classes_of_the_job(converted):
     ],
 )
 def test_words_mean_what_they_mean_in_zoo(converted, words, hyperparameters):
-    """Noise of 0 is none; a schedule with any name falls linearly; null is as if absent."""
+    """Noise of 0 means no noise, a schedule with any name falls linearly, and null counts as absent."""
     trainer, _ = converted(*words)
 
     assert trainer.algorithm.hyperparameters == hyperparameters
@@ -319,7 +319,7 @@ def test_words_mean_what_they_mean_in_zoo(converted, words, hyperparameters):
     ],
 )
 def test_normalization_keeps_only_limits_that_have_an_effect(converted, normalize, expected):
-    """The job refuses a limit of something that is not normalized; Zoo ignores it."""
+    """The job refuses a limit for values that are not normalized, and Zoo ignores it."""
     trainer, _ = converted(f"normalize: {normalize}")
 
     found = trainer.algorithm.normalize
@@ -335,7 +335,7 @@ def test_normalizing_nothing_is_no_normalization(converted):
 
 @pytest.mark.parametrize("environment", ["MoveToTargetEnv-v0", "Navigate-v0"])
 def test_the_environments_of_palaestra_need_no_note_about_simulators(environment):
-    """They take a robot. Only the arena has defaults of its own, which the file does not show."""
+    """They take a robot. Only the arena has its own defaults, which the file does not show."""
     result = convert("n_timesteps: 5", "ppo.yml", env=environment)
 
     assert [note.partition(":")[0] for note in result.notes] == (

@@ -19,7 +19,7 @@ from palaestra.zoo.expressions import NotPlain, entries, value
     ],
 )
 def test_literals_and_classes_are_read(text, expected):
-    """These are all that Zoo's own files contain."""
+    """Zoo's own files contain nothing else."""
     assert value(text) == expected
 
 
@@ -46,13 +46,13 @@ def test_literals_and_classes_are_read(text, expected):
     ],
 )
 def test_anything_else_is_refused(text):
-    """An expression that runs code could come from a stranger's file."""
+    """The file may be from anybody, and an expression could run code."""
     with pytest.raises(NotPlain):
         value(text)
 
 
 def test_an_entry_that_cannot_be_read_does_not_hide_the_others():
-    """Its fact takes the place of its value."""
+    """The error takes the place of its value."""
     read = dict(entries("dict(a=1, b=f(), c={'d': 2})"))
 
     assert (read["a"], read["c"]) == (1, {"d": 2})

@@ -142,8 +142,7 @@ class Evaluation(_Section):
         episodes: episodes of one evaluation, shared among all evaluating simulators.
         stop_at_success_rate: training ends when this share (0 to 1) succeeds, in an evaluation and then in
             its confirmation.
-        confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`. The file
-            omits None, because the trainer of commit a5276f3 refuses the field.
+        confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`.
     """
 
     every_steps: Annotated[int, Field(ge=0)] = 2500
@@ -196,7 +195,6 @@ class SimulatorConfiguration(_Section):
         driver: the simulator program: stub, mujoco, webots or command.
         options: its command-line options.
         world: path of its generated world.
-        names_prefix: readable start of the ROS names of its robots; not used.
         standby: whether its sidecar runs a second simulator as a standby for this one.
         start_deadline_seconds: seconds after its start within which it must respond.
     """
@@ -210,7 +208,6 @@ class SimulatorConfiguration(_Section):
     driver: str = "stub"
     options: tuple[str, ...] = ()
     world: str = ""
-    names_prefix: str = ""
     recycle: Recycle | None = None
     standby: bool = False
     restart: Restart = Field(default_factory=Restart)
@@ -228,8 +225,7 @@ class Configuration(_Section):
             the newest checkpoint there.
         initial_policy: a model.zip whose policy a new run begins with; None: random weights.
         stall_deadline_seconds: the run fails after this long without an environment step.
-        robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`. The
-            file omits None, because an older trainer ignores the field.
+        robot: class of the robot, `module:Class` or a name of `robots.registry`; None: `DEFAULT_ROBOT`.
         command: the user's own program that replaces the built-in loop; not used here.
         status_address: `host:port` of /metrics, /status and /healthz.
     """

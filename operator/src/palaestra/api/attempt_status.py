@@ -100,11 +100,10 @@ class Goodput(StatusModel):
 
     recovering: Seconds = 0
     """Seconds in which every simulator was broken, or a resumed run restored its simulators to the state at
-    the checkpoint. In releases that do not report `recycling`, this includes recycling."""
+    the checkpoint."""
 
-    recycling: Seconds | None = None
-    """Seconds in which training waited for a healthy simulator to restart, as `recycle` schedules it; absent:
-    none, or not reported."""
+    recycling: Seconds = 0
+    """Seconds in which training waited for a healthy simulator to restart, as `recycle` schedules it."""
 
 
 class MemoryKills(StatusModel):
@@ -123,7 +122,7 @@ class MemoryKills(StatusModel):
     """Time of the last kill, by the node's clock."""
 
     pod: Word | None = None
-    """UID of the pod of the last kill; absent: an older release counted it."""
+    """UID of the pod of the last kill; absent: the status had no room for it."""
 
     run: Count | None = None
     """Number of the container's run that was killed last in that pod, from 0; absent if `pod` is absent."""

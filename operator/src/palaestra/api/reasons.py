@@ -15,10 +15,7 @@ LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a reg
 
 
 class Reason(StrEnum):
-    """The reason for a state or an event, in one word.
-
-    A reason that an older release wrote into a status is read under its current name.
-    """
+    """The reason for a state or an event, in one word."""
 
     ACCEPTED = "Accepted"
     INVALID_SPEC = "InvalidSpec"
@@ -85,13 +82,6 @@ class Reason(StrEnum):
     def known(cls, word: str) -> "Reason":
         """Return the reason of this name; `JobFailed` for an unknown one, for example of a newer release."""
         return cls(word) if word in set(cls) else cls.JOB_FAILED
-
-    @classmethod
-    def _missing_(cls, value: object) -> "Reason | None":
-        return _RENAMED.get(value) if isinstance(value, str) else None
-
-
-_RENAMED = {"FaultBudgetSpent": Reason.SIMULATOR_BUDGET_SPENT}
 
 
 # Reasons for which a job is not planned or resumed until a person acts.

@@ -4,8 +4,7 @@ Numbers come from the trainers and are as old as the last poll. An unknown value
 
 Another release may have written a status. The reader ignores unknown fields, and conditions and simulators
 with an unknown enum value. It refuses an unknown phase or a value of another type, because that could mean
-that a replica has ended. A field added after a5276f3 is absent unless it is set, because the programs of
-that release refuse a status with an unknown field.
+that a replica has ended. A field that a later release adds is absent unless it is set.
 """
 
 from datetime import datetime
@@ -106,10 +105,10 @@ class Restarts(StatusModel):
     suspension: Count = 0
     """Pods replaced because the job was suspended and resumed."""
 
-    operator: Count | None = None
+    operator: Count = 0
     """Pods that the operator replaced because the kubelet does not recover them: `TrainerNotStarted`,
     `RestartPolicyDropped`, `Stalled`; pods whose trainer a failed probe interrupted: `ProbeFailed`; and pods
-    that a container of others kept alive. At most `backoffLimit`; absent: none."""
+    that a container of others kept alive. At most `backoffLimit`."""
 
 
 class PodReference(StatusModel):
@@ -229,7 +228,7 @@ class ReplicaStatus(StatusModel):
     or the environment reports no success."""
 
     success_interval: SuccessInterval | None = None
-    """Interval of the true success rate. Absent: `successRate` is absent, or the trainer is older."""
+    """Interval of the true success rate; absent: `successRate` is absent."""
 
     mean_return: float | None = None
     """Mean return of recent training episodes; absent: no episode has ended yet."""
@@ -290,15 +289,11 @@ class Release(StatusModel):
     stub: Image
     """Image of the stub simulator."""
 
-    mujoco: Image | None = None
-    """Image of MuJoCo; absent: the job has no simulator with driver `mujoco`."""
+    mujoco: Image
+    """Image of MuJoCo."""
 
     webots: Image
     """Image of Webots, which Palaestra does not build yet."""
-
-    pull_secrets_for_jobs: bool | None = None
-    """`true`: the Secrets of `imagePullSecrets` had the label `palaestra.dev/for-jobs: "true"` at acceptance,
-    and need it for each new pod. Absent: the job names none, or an older release accepted it."""
 
 
 class Status(StatusModel):

@@ -108,7 +108,7 @@ def gone(attempt: EndedAttempt) -> Explanation | None:
     if after.trainer > before.trainer:
         return explain(Reason.TRAINER_FAILED, how=GONE)
     mark = attempt.situation.seen.job.replaced if attempt.situation.seen.job is not None else None
-    if mark is not None and (after.operator or 0) > (before.operator or 0):
+    if mark is not None and after.operator > before.operator:
         return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
     if after.suspension > before.suspension:
         return paused(attempt.situation)

@@ -80,8 +80,7 @@ def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> Conditio
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
     """Return the conditions of an ended job: those that it has, and `Stalled` if it failed.
 
-    `Stalled` may be missing: an earlier release wrote the end, or the cluster's definition was not yet known
-    to have this condition.
+    `Stalled` may be missing: the cluster's definition was not yet known to have this condition.
     """
     failed = condition(ended, ConditionType.FAILED)
     if ended.phase is not Phase.FAILED or failed is None or condition(ended, ConditionType.STALLED):

@@ -89,8 +89,7 @@ def starts(situation: ReplicaContext) -> Finding | None:
 def runs(situation: ReplicaContext) -> bool:
     """Return whether the trainer runs, in a pod of the replica's Job, and has answered once.
 
-    The kubelet reports the first answer to its startup probe. A program of the job's own has no such probe,
-    nor has a pod of an earlier release.
+    The kubelet reports the first answer to its startup probe. A program of the job's own has no such probe.
     """
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.trainer is None or not _in_trainer(pod):

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from palaestra.api import Driver, TrainingJob
+from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.actions import actions
@@ -28,7 +28,6 @@ from palaestra.decide.replica_context import ReplicaContext, ReplicaVerdict
 from palaestra.decide.replica_policy import ReplicaActions
 from palaestra.decide.replicas import Decided, decided
 from palaestra.decide.restart_counts import counted
-from palaestra.decide.suspend import seen_generation
 from palaestra.decide.ttl import expired, expires
 from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import Observed, ReplicaObserved
@@ -155,9 +154,9 @@ def _status(
     }
     now, generation = times.now, job.metadata.generation
     return Status(
-        observed_generation=old.observed_generation if prepared.closed else seen_generation(job, observed),
+        observed_generation=generation,
         phase=where.phase,
-        release=old.release or _release(job, prepared),
+        release=old.release or _release(prepared),
         conditions=conditions(old, current, generation, now),
         start_time=started(old, observed),
         completion_time=now if where.phase in TERMINAL else None,
@@ -194,16 +193,8 @@ def _accepted(job: TrainingJob, prepared: Prepared) -> ConditionState:
     )
 
 
-def _release(job: TrainingJob, prepared: Prepared) -> Release | None:
+def _release(prepared: Prepared) -> Release | None:
     images = prepared.images if prepared.plan is not None else None
     if images is None:
         return None
-    # An older release refuses a status with a field that it does not know, so only jobs that need it have it.
-    needs_mujoco = any(group.driver is Driver.MUJOCO for group in job.spec.simulators)
-    return Release(
-        trainer=images.trainer,
-        stub=images.stub,
-        mujoco=images.mujoco if needs_mujoco else None,
-        webots=images.webots,
-        pull_secrets_for_jobs=True if job.spec.image_pull_secrets else None,
-    )
+    return Release(trainer=images.trainer, stub=images.stub, mujoco=images.mujoco, webots=images.webots)

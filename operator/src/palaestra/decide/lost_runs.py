@@ -14,7 +14,7 @@ from palaestra.api.status import LostPart, LostRun, ReplicaStatus
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.restart_counts import counted
 from palaestra.observe.models import ReplicaObserved
-from palaestra.plan.claim import claim_name, former_name
+from palaestra.plan.claim import claim_name
 from palaestra.plan.replica import RESTART_LOST_RUNS
 
 
@@ -78,9 +78,8 @@ def _lacks_claim(
     storage = job.spec.storage
     if storage.ephemeral or storage.existing_claim is not None or not counted(old, seen).furthest_step:
         return False
-    parts = (job.metadata.name, old.index, job.metadata.uid or "")
-    names = (claim_name(*parts), former_name(*parts))
-    return not any(("PersistentVolumeClaim", name) in present for name in names)
+    name = claim_name(job.metadata.name, old.index, job.metadata.uid or "")
+    return ("PersistentVolumeClaim", name) not in present
 
 
 def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bool:

@@ -46,8 +46,8 @@ def memory_kills(situation: ReplicaContext) -> tuple[MemoryKills, ...]:
 def _known(before: MemoryKills | None, pod: PodView, container: ContainerView) -> bool:
     """Return whether a kill was counted.
 
-    A kill that an older release counted, or that a definition without the new fields stored, is recognized by
-    its time. The two times may come from the clocks of two nodes.
+    If the status had no room for its pod and run, a kill is recognized by its time. The two times may come
+    from the clocks of two nodes.
     """
     if before is None:
         return False

@@ -5,7 +5,7 @@ release, has no effect on it.
 """
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob, broken_guards
@@ -21,7 +21,7 @@ from palaestra.observe.json_access import part
 from palaestra.observe.models import Observed, ReferencedObject, ReferenceKind, ReplicaObserved
 from palaestra.observe.references import open_to_jobs, references
 from palaestra.plan import ClusterLayout, GivenWorld, Images, Plan, PlanError, given_worlds, plan
-from palaestra.plan.claim import claim_name, former_name
+from palaestra.plan.claim import claim_name
 from palaestra_sim.errors import WorldError
 
 
@@ -216,30 +216,20 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
     return not unfinished(job, observed) or (policy and accepted and not _lacking(job, observed))
 
 
-def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
-    """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts.
-
-    A replica whose run is lost gets none. A replica without a Job keeps the claim of an earlier release.
-    """
+def _lacking(job: TrainingJob, observed: Observed) -> tuple[int, ...]:
+    """Return the unfinished replicas that lack an object; a replica whose run is lost gets none."""
     named = {source.name for source in references(job) if source.kind is ReferenceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     lost = _lost(job, observed)
-    return {
-        replica.index: _mounted(job, replica, there)
+    return tuple(
+        replica.index
         for replica in unfinished(job, observed)
         if replica.index not in lost and (replica.job is None or not replica.job.volumes <= there)
-    }
+    )
 
 
 def _lost(job: TrainingJob, observed: Observed) -> Mapping[int, LostRun]:
     return lost_runs(job, unfinished(job, observed), observed.present)
-
-
-def _mounted(job: TrainingJob, replica: ReplicaObserved, there: Collection[str]) -> frozenset[str]:
-    if replica.job is not None:
-        return replica.job.volumes
-    former = former_name(job.metadata.name, replica.index, job.metadata.uid or "")
-    return frozenset({former}).intersection(there)
 
 
 def resuming(job: TrainingJob, observed: Observed) -> bool:
@@ -254,7 +244,7 @@ def _at_acceptance(job: TrainingJob, layout: ClusterLayout) -> ClusterLayout:
     images = Images(
         trainer=release.trainer,
         stub=release.stub,
-        mujoco=release.mujoco or layout.images.mujoco,
+        mujoco=release.mujoco,
         webots=release.webots,
     )
     return replace(layout, images=images)

@@ -21,7 +21,7 @@ from palaestra.decide.restart_counts import of_this_run
 from palaestra.observe.json_access import MOST_COUNT, as_time
 from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
-from palaestra_protocol.pod.status import Cause, CheckpointStatus, Termination, TrainerStatus
+from palaestra_protocol.pod.status import CheckpointStatus, Termination, TrainerStatus
 
 EVALUATING = "evaluating"  # the trainer's phase in which it does not learn
 LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
@@ -79,8 +79,8 @@ def last_progress(situation: ReplicaContext) -> datetime | None:
 def standstill(situation: ReplicaContext) -> Wait | None:
     """Return the wait for the next step, of learning or of an evaluation; None if it does not train.
 
-    If the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
-    release reports the time by its own clock, which is compared only with its earlier reports.
+    The wait began when an environment stepped last, by the age that the trainer reports. The time of that
+    step is by the trainer's own clock, so it is compared only with its earlier reports.
     """
     polled = situation.seen.polled
     if polled is None or not situation.trains or situation.pod is None:
@@ -102,11 +102,7 @@ def _spent(situation: ReplicaContext, polled: TrainerStatus) -> dict[str, object
     if not polled.goodput:
         return {}
     before = situation.old.goodput or Goodput()
-    seconds = {
-        cause: min(int(spent), MOST_COUNT)
-        for cause, spent in polled.goodput.items()
-        if cause != Cause.RECYCLING or spent >= 1.0  # older readers refuse a field that they do not know
-    }
+    seconds = {cause: min(int(spent), MOST_COUNT) for cause, spent in polled.goodput.items()}
     faults = {kind: min(times, MOST_COUNT) for kind, times in polled.faults.items()}
     return {
         "goodput": before.model_copy(update=seconds),

@@ -122,7 +122,7 @@ def _attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]
 
 def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView], attempt: int) -> Restarts:
     before = old.restarts
-    explained = before.trainer + before.disruption + before.suspension + (before.operator or 0)
+    explained = before.trainer + before.disruption + before.suspension + before.operator
     replaced = max(attempt - 1 - explained, 0)
     trainer = min(max(_by_evidence(old, seen, newer), _by_the_job(old, seen)), replaced)
     operator = min(_by_the_operator(old, seen), replaced - trainer)
@@ -130,7 +130,7 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
     return before.model_copy(
         update={
             "trainer": before.trainer + trainer,
-            "operator": (before.operator or 0) + operator or None,
+            "operator": before.operator + operator,
             "suspension": before.suspension + suspension,
             "disruption": before.disruption + replaced - trainer - operator - suspension,
         }
@@ -166,7 +166,7 @@ def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
     if mark is None:
         return 0
     last = seen.pod is not None and seen.pod.uid == mark.pod
-    return max(mark.times - last - (old.restarts.operator or 0), 0)
+    return max(mark.times - last - old.restarts.operator, 0)
 
 
 def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:

@@ -3,22 +3,18 @@
 from palaestra.api import TrainingJob
 from palaestra.api.status import PodReference
 from palaestra.decide.restart_counts import lives
-from palaestra.observe.models import JobView, Observed, PodView, ReplicaObserved, Suspended
+from palaestra.observe.models import JobView, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to continue"
 SOMEBODY = "somebody else"  # where no field manager is known
 
 
-def set_last(job: TrainingJob, seen: JobView) -> bool:
-    """Return the `spec.suspend` that the operator set last on a Job of its own, by the Job's annotation.
+def set_last(seen: JobView) -> bool:
+    """Return the `spec.suspend` that the operator set last on a Job, by the Job's annotation.
 
-    A Job of an earlier release has no annotation, but that release kept the Job as the spec was. So a
-    difference comes from another client, unless the spec changed since the last status write.
+    If another client has removed the annotation, the current value counts as the operator's.
     """
-    if seen.suspend_set is not None:
-        return seen.suspend_set
-    changed = job.status.observed_generation != job.metadata.generation
-    return seen.suspended if changed else job.spec.suspend
+    return seen.suspended if seen.suspend_set is None else seen.suspend_set
 
 
 def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = None) -> bool:
@@ -31,22 +27,7 @@ def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = Non
     """
     if seen is None or job.spec.scheduling.queue_name is not None or seen.queue or seen.end is not None:
         return False
-    return set_last(job, seen) != (job.spec.suspend if suspend is None else suspend)
-
-
-def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
-    """Return the `observedGeneration` for the status.
-
-    It stays at the old value while a Job without the annotation is not yet as the spec asks; otherwise a
-    patch that was refused or held back would look done.
-    """
-    jobs = (
-        replica.job
-        for replica in observed.replicas
-        if replica.job is not None and replica.job.stopped is None
-    )
-    waits = any(known.suspend_set is None and to_set(job, known) for known in jobs)
-    return job.status.observed_generation if waits else job.metadata.generation
+    return set_last(seen) != (job.spec.suspend if suspend is None else suspend)
 
 
 def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
@@ -80,7 +61,7 @@ def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
 def overruled(job: TrainingJob, seen: JobView) -> bool:
     """Return whether another client has suspended or resumed a Job since the operator set it."""
     queued = job.spec.scheduling.queue_name is not None or seen.queue
-    return not queued and seen.end is None and seen.suspended != set_last(job, seen)
+    return not queued and seen.end is None and seen.suspended != set_last(seen)
 
 
 def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:

@@ -31,7 +31,7 @@ MAKING = frozenset(
     {"CreateContainerConfigError", "CreateContainerError", "RunContainerError", "PreStartHookError",
      "PostStartHookError"}
 )  # fmt: skip
-FULL = ("StorageFull", "DiskFull")  # beginnings of a termination message; the second in older releases
+FULL = "StorageFull"  # beginning of a termination message
 
 
 def objects_refused(situation: ReplicaContext) -> Finding | None:

@@ -60,7 +60,7 @@ OPERATOR = (
     may("networking.k8s.io", "networkpolicies", "list watch create patch"),
     may("", "events", "get list create patch"),
 )
-# Used only for messages in a status; an operator with the role of an earlier release works without it.
+# Used only for messages in a status; an operator whose role lacks it works without it.
 OPERATOR_WITH_KUEUE = (may("kueue.x-k8s.io", "workloads", "list"),)
 
 TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (

@@ -114,7 +114,7 @@ def _place_of(program: str) -> str:
 
 
 def _success(rate: float | None, run_directory: Path) -> str:
-    """Return the rate with its interval, if the run has one; unfinished and older runs have none."""
+    """Return the rate with its interval, if the run has one; an unfinished run has none."""
     try:
         content = json.loads((run_directory / "summary.json").read_bytes())
         interval = SuccessInterval.from_json(content["success_interval"])

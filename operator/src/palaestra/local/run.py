@@ -64,7 +64,7 @@ def run(job: TrainingJob, options: RunOptions) -> int:
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: RunOptions) -> None:
     """Do all checks that need no file to be written; raises the same errors as `run`."""
-    planned = plan(job, layout(directory, options, Ports()), mounted=dict.fromkeys(chosen, ()))
+    planned = plan(job, layout(directory, options, Ports()), replicas=chosen)
     for replica in planned.replicas.values():
         read_pod(replica.job["spec"]["template"], uid="")
     preflight.check(preflight.PreflightRequest(job=job, runs=options.runs.absolute()))
@@ -119,7 +119,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
             _tell(before, path)
             return before
         run_directory.prepare(path, record)
-        planned = plan(job, layout(path.parent, options, ports), mounted={replica: ()}).replicas[replica]
+        planned = plan(job, layout(path.parent, options, ports), replicas=[replica]).replicas[replica]
         say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
         say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
         return _trained(planned, path, options, job.spec.active_deadline_seconds)

@@ -52,8 +52,6 @@ def _mutable() -> Iterator[str]:
 
 
 MUTABLE = frozenset(_mutable())  # `STEPS` may be raised, which prolongs the run
-# In records up to a5276f3; since then the plan decides these.
-DEFAULTS_UNTIL_A5276F3 = {"spec.simulators.recycle.afterResets": 24}
 
 
 def job_directory(runs: Path, job: str) -> Path:
@@ -179,8 +177,7 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
     old, new = dict(_flat(before)), dict(_flat(now))
     for field in sorted(old.keys() | new.keys()):
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
-        left_out = is_now is None and DEFAULTS_UNTIL_A5276F3.get(name) == was
-        allowed = name in MUTABLE or left_out or (name == STEPS and _raised(was, is_now))
+        allowed = name in MUTABLE or (name == STEPS and _raised(was, is_now))
         if was != is_now and not allowed:
             remedy = "; raise it to prolong the run, it cannot be lowered" if name == STEPS else ""
             yield f"{field}: was {_short(was)}, is {_short(is_now)}{remedy}"

@@ -245,8 +245,8 @@ class JobView:
     Attributes:
         version: its resourceVersion.
         suspended: `spec.suspend`.
-        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: an earlier
-            release created the Job, or the Job has a queue.
+        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: it has
+            none, as a Job that the operator created for a queue.
         suspension: our mark of the pod that our last suspension ended; None: it has none.
         paused: since when it is suspended, by the Job controller; None: it is not.
         resumed: when it was resumed last, by the Job controller; None: it never was suspended or still is.

@@ -35,12 +35,9 @@ def _secrets(job: TrainingJob) -> Iterator[ReferencedObject]:
 
 
 def _pull_secrets(job: TrainingJob) -> Iterator[ReferencedObject]:
-    """Yield the Secrets for pulling images; an earlier release accepted them without the label."""
-    release = job.status.release
-    if release is None or release.pull_secrets_for_jobs:
-        for place, secret in enumerate(job.spec.image_pull_secrets):
-            field = f"spec.imagePullSecrets[{place}]"
-            yield ReferencedObject(kind=ReferenceKind.SECRET, name=secret.name, field=field)
+    for place, secret in enumerate(job.spec.image_pull_secrets):
+        field = f"spec.imagePullSecrets[{place}]"
+        yield ReferencedObject(kind=ReferenceKind.SECRET, name=secret.name, field=field)
 
 
 def _of_variables(env: tuple[Variable, ...], owner: str) -> Iterator[ReferencedObject]:

@@ -27,7 +27,7 @@ from palaestra.observe.json_access import part, parts, text
 READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
 MOST_SHOWN = 20
-_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # since a5276f3
+_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # a definition may lack them
 
 log = structlog.get_logger(__name__)
 

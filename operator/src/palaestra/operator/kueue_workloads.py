@@ -42,7 +42,7 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
     def _words(self, namespace: str, uid: str) -> str:
         try:
             return why_not_admitted(self._api.list(WORKLOADS, namespace, labels=f"{JOB_UID_LABEL}={uid}"))
-        except (Forbidden, NotFound):  # a role of an earlier release, or a Kueue without this version
+        except (Forbidden, NotFound):  # a role without Workloads, or a Kueue without this version
             return ""
 
 

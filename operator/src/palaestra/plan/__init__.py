@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from palaestra.api import TrainingJob
 from palaestra.errors import PlanError
 from palaestra.objects import Object
-from palaestra.plan.claim import claim, claim_of
+from palaestra.plan.claim import claim
 from palaestra.plan.config_map import config_map
 from palaestra.plan.job import job as replica_job
 from palaestra.plan.layout import Allowed, ClusterLayout, ContainerPaths, Images, Layout, LocalLayout, Ports
@@ -20,7 +20,7 @@ from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
 from palaestra.plan.world_verdicts import GivenWorld, Verdicts, WorldVerdict
-from palaestra.plan.worlds import ConfigMaps, Files, given_worlds, named_files, source_files
+from palaestra.plan.worlds import ConfigMaps, Files, given_worlds, source_files
 
 __all__ = [
     "Allowed",
@@ -41,10 +41,6 @@ __all__ = [
     "identified",
     "plan",
 ]
-
-Mounted = Mapping[
-    int, Collection[str]
-]  # replica -> names of the volumes that its Job mounts, or of its claim
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,13 +79,13 @@ def plan(
     job: TrainingJob,
     layout: Layout,
     config_maps: ConfigMaps | None = None,
-    mounted: Mounted | None = None,
+    replicas: Collection[int] | None = None,
     verdicts: Verdicts | None = None,
 ) -> Plan:
     """Return the plan of a job that has a uid.
 
-    `config_maps` holds the worlds of `configMap` sources, by name and key. `mounted` names the replicas to
-    plan; by default all of them, as if none had a Job. `verdicts` are the results of the checks of its
+    `config_maps` holds the worlds of `configMap` sources, by name and key. `replicas` are the indices of the
+    replicas to plan; by default all of them. `verdicts` are the results of the checks of its
     worlds; without them the worlds are checked here.
 
     Raises:
@@ -97,12 +93,9 @@ def plan(
         WorldError: one of its worlds is wrong.
     """
     sources = source_files(job, config_maps or {}, verdicts)
-    chosen = dict.fromkeys(range(job.spec.replicas), ()) if mounted is None else mounted
+    chosen = range(job.spec.replicas) if replicas is None else replicas
     planned = {
-        index: _replica_plan(
-            Replica(job=job, index=index, layout=layout, volumes=frozenset(volumes)), sources
-        )
-        for index, volumes in chosen.items()
+        index: _replica_plan(Replica(job=job, index=index, layout=layout), sources) for index in chosen
     }
     return Plan(network_policy=network_policy(job, layout), replicas=planned)
 
@@ -114,11 +107,6 @@ def identified(job: TrainingJob, uid: str) -> TrainingJob:
 
 
 def _replica_plan(replica: Replica, sources: Files) -> ReplicaPlan:
-    worlds = sources
-    configured = config_map(replica, worlds)
-    mounted = replica.volumes - {claim_of(replica)}
-    if mounted and configured["metadata"]["name"] not in mounted:  # its Job is of an earlier version
-        worlds = named_files(replica, sources)
-        configured = config_map(replica, worlds)
-    template = pod_template(replica, configured, worlds)
+    configured = config_map(replica, sources)
+    template = pod_template(replica, configured, sources)
     return ReplicaPlan(config_map=configured, claim=claim(replica), job=replica_job(replica, template))

@@ -33,7 +33,7 @@ def claim(replica: Replica) -> dict[str, Any] | None:
     return {
         "apiVersion": "v1",
         "kind": "PersistentVolumeClaim",
-        "metadata": replica.metadata(claim_of(replica), owned=storage.retain is Retain.DELETE),
+        "metadata": replica.metadata(_claim_of(replica), owned=storage.retain is Retain.DELETE),
         "spec": spec,
     }
 
@@ -43,7 +43,7 @@ def run_volume(replica: Replica) -> dict[str, Any]:
     storage = replica.job.spec.storage
     if storage.ephemeral:
         return {"name": "run", "emptyDir": {"sizeLimit": storage.size}}
-    name = storage.existing_claim or claim_of(replica)
+    name = storage.existing_claim or _claim_of(replica)
     return {"name": "run", "persistentVolumeClaim": {"claimName": name}}
 
 
@@ -83,20 +83,12 @@ def claim_name(job: str, index: int, uid: str) -> str:
 
     If that is too long, the job's name is cut, and a hash over all of it takes the place of the uid.
     """
-    whole = former_name(job, index, uid)
+    whole = f"{job}-{index}-{uid}"
     if len(whole) <= LONGEST_NAME:
         return whole
     end = f"-{index}-{sha256(whole.encode()).hexdigest()[:DIGITS]}"
     return f"{job[: LONGEST_NAME - len(end)].rstrip('-.')}{end}"
 
 
-def former_name(job: str, index: int, uid: str) -> str:
-    """Return the name that an earlier release gave to the claim of a replica, of any length."""
-    return f"{job}-{index}-{uid}"
-
-
-def claim_of(replica: Replica) -> str:
-    """Return the name of the replica's claim; one of an earlier release keeps its name."""
-    parts = (replica.job.metadata.name, replica.index, replica.uid)
-    before = former_name(*parts)
-    return before if before in replica.volumes else claim_name(*parts)
+def _claim_of(replica: Replica) -> str:
+    return claim_name(replica.job.metadata.name, replica.index, replica.uid)

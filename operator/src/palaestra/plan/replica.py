@@ -70,12 +70,11 @@ def owner(job: TrainingJob) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replica:
-    """One replica of a job in a layout; `volumes` are those that its Job mounts, or its claim, by name."""
+    """One replica of a job in a layout."""
 
     job: TrainingJob
     index: int
     layout: Layout
-    volumes: frozenset[str] = frozenset()
 
     @property
     def uid(self) -> str:

@@ -9,7 +9,6 @@ from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.worlds import world_path
 from palaestra.plan.yaml_text import as_yaml
-from palaestra_sim.world import name_prefix
 
 FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
@@ -69,8 +68,6 @@ def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str
         "options": list(group.options),
         "control": f"http://{LOOPBACK}:{port}",
         "world": world_path(replica, simulator, files),
-        # No trainer uses it; without it the ConfigMap of an accepted job could not be made again by its name.
-        "namesPrefix": name_prefix(simulator.identity),
     }
     if limits := _limits(recycling(group)):
         described["recycle"] = limits

@@ -11,10 +11,9 @@ from palaestra.api import Driver, SimulatorGroup, TrainingJob, WorldSource
 from palaestra.errors import PlanError
 from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.world_verdicts import GivenWorld, Verdicts, require_fine
-from palaestra_sim.world import MJCF, WBT, builtin, check, generate, suffix
+from palaestra_sim.world import MJCF, WBT, builtin, check, suffix
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
-MOST_GENERATED_BYTES = 65_536  # of the worlds that are generated here: each costs time of the operator itself
 FOLDER = "worlds"
 
 _READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
@@ -86,45 +85,17 @@ def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
     return sources
 
 
-def named_files(replica: Replica, sources: Files) -> Files:
-    """Return a replica's worlds as earlier versions put them into its ConfigMap.
-
-    They wrote the names in already, a world for each simulator, unless those were too big together.
-    A Job that mounts such a ConfigMap gets the same one again, if that costs the operator little.
-    """
-    given = [(simulator, _file_of(simulator.group, sources)) for simulator in replica.simulators]
-    if sum(len(source) for _, source in given if source is not None) > MOST_GENERATED_BYTES:
-        return sources
-    copies: dict[str, bytes] = {}
-    for simulator, source in given:
-        if source is not None:
-            copies[f"{simulator.name}{suffix(source)}"] = generate(
-                source, simulator.identity, clock=simulator.keeps_clock
-            )
-    return copies
-
-
 def world_path(replica: Replica, simulator: PlannedSimulator, files: Files) -> str:
     """Return the path of the world that a simulator's sidecar is given."""
     if simulator.group.world.file is not None:
         return simulator.group.world.file
     folder = f"{replica.places(simulator.container).config}/{FOLDER}"
-    for stem in (simulator.name, simulator.group.name):
-        for ending in (WBT, MJCF):
-            if f"{stem}{ending}" in files:
-                return f"{folder}/{stem}{ending}"
-    return f"{folder}/{simulator.group.name}{WBT}"
+    name = simulator.group.name
+    return f"{folder}/{name}{MJCF if f'{name}{MJCF}' in files else WBT}"
 
 
 def _of_group(group: SimulatorGroup, source: bytes) -> str:
     return f"{group.name}{suffix(source)}"
-
-
-def _file_of(group: SimulatorGroup, sources: Files) -> bytes | None:
-    """Return the world of a group; None: it lies in the image."""
-    return next(
-        (sources[name] for ending in (WBT, MJCF) if (name := f"{group.name}{ending}") in sources), None
-    )
 
 
 def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> None:

@@ -37,7 +37,7 @@ class Cause(StrEnum):
     STEPPING: training waited for a step of the simulators. TRANSPORT: the rest of a step: requests, reading,
     the environment. LEARNING: the rest of the algorithm. EVALUATING, CHECKPOINTING: as named. STARTING: until
     the first step. RECOVERING: every simulator was broken, or a resumed run was restored to its last state.
-    RECYCLING: a planned restart of a healthy simulator; older releases count it as recovering.
+    RECYCLING: a planned restart of a healthy simulator.
     """
 
     STEPPING = "stepping"

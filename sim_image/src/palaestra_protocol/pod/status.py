@@ -176,15 +176,13 @@ class TrainerStatus:
         mean_return: of recent training episodes; None if none has ended yet.
         success_rate: of the last evaluation or confirmation, 0 to 1; None before the first one, or if the
             environment does not report success.
-        success_interval: around `success_rate`; None in the same cases, and from a trainer of an older
-            release. Absent, not null.
+        success_interval: around `success_rate`; None in the same cases.
         steps_per_second: recently; None if unknown.
         simulators: one status for each.
         last_checkpoint: the newest; None if there is no checkpoint yet.
         last_progress: time of the last environment step (RFC 3339); None before the first one.
         last_progress_age_s: seconds since then by the trainer's monotonic clock, which does not depend on
-            the wall clock. None before the first step, and from a trainer of an older release. Absent, not
-            null.
+            the wall clock; None before the first step.
         phase: the current activity of the trainer, in one word.
         attempt: number of this attempt in the run directory's record, from 1; None if not recorded yet.
         faults: how many of each `FaultKind`, over all attempts.
@@ -192,7 +190,6 @@ class TrainerStatus:
         steps_lost: valid steps that were lost, over all attempts: steps after the checkpoint from which an
             attempt resumed, and steps in a training or evaluation episode that a fault cut short.
         left_out: the nodes that the simulators leave out of their worlds, in lines that begin with the group.
-            Absent, not empty.
     """
 
     step: int
@@ -214,30 +211,27 @@ class TrainerStatus:
     left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data; a number that is not finite becomes null or absent, which means unknown."""
-        checkpoint, age_s = self.last_checkpoint, known(self.last_progress_age_s)
-        content = {
+        """Return it as JSON data; a number that is not finite becomes null, which means unknown."""
+        checkpoint, interval = self.last_checkpoint, self.success_interval
+        return {
             "step": self.step,
             "target": self.target,
             "episodes": self.episodes,
             "phase": clipped(self.phase, MOST_NAME),
             "mean_return": known(self.mean_return),
             "success_rate": known(self.success_rate),
+            "success_interval": None if interval is None else interval.to_json(),
             "steps_per_second": known(self.steps_per_second),
             "simulators": [simulator.to_json() for simulator in self.simulators[:MOST_SIMULATORS]],
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "last_progress": self.last_progress,
+            "last_progress_age_s": known(self.last_progress_age_s),
             "attempt": self.attempt,
             "faults": dict(self.faults),
             "goodput": {cause: known(seconds) for cause, seconds in self.goodput.items()},
             "steps_lost": self.steps_lost,
+            "left_out": enumerated(self.left_out, MOST_NAME, MOST_LEFT_OUT),
         }
-        newer = {
-            "success_interval": None if self.success_interval is None else self.success_interval.to_json(),
-            "last_progress_age_s": age_s,
-            "left_out": enumerated(self.left_out, MOST_NAME, MOST_LEFT_OUT) or None,
-        }
-        return content | _without_absent(newer)
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -322,7 +316,7 @@ class Termination:
         reason: the reason for its end, in a sentence.
         success_rate: of the last evaluation or confirmation, 0 to 1; None if there was none, or if the
             environment does not report success.
-        success_interval: around `success_rate`; None in the same cases. Absent, not null.
+        success_interval: around `success_rate`; None in the same cases.
         last_checkpoint: the newest; None if there is no checkpoint.
         attempt: number of this attempt in the run directory's record, from 1; None if not recorded.
         restarts: of simulators after faults, in this attempt; None if not reported.
@@ -361,21 +355,18 @@ class Termination:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, with texts and lists cut to the lengths that a reader accepts."""
-        checkpoint = self.last_checkpoint
-        content = {
+        checkpoint, interval = self.last_checkpoint, self.success_interval
+        return {
             "step": self.step,
             "reason": clipped(self.reason, MOST_REASON),
             "success_rate": known(self.success_rate),
+            "success_interval": None if interval is None else interval.to_json(),
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "attempt": self.attempt,
             "restarts": self.restarts,
             "log": [clipped(line, MOST_LINE) for line in self.log[-MOST_LINES:]],
             "faults": [fault.to_json() for fault in self.faults[-MOST_FAULTS:]],
         }
-        interval = self.success_interval
-        return content | _without_absent(
-            {"success_interval": None if interval is None else interval.to_json()}
-        )
 
     @classmethod
     def from_message(cls, message: str) -> Self:
@@ -441,11 +432,6 @@ def _share(fields: Fields) -> float | None:
 def _interval(fields: Fields) -> SuccessInterval | None:
     name = "success_interval"
     return fields.part(name, SuccessInterval.from_json) if fields.has(name) else None
-
-
-def _without_absent(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields that are set; releases up to a5276f3 refuse a field that they do not know."""
-    return {name: value for name, value in content.items() if value is not None}
 
 
 def _speed(fields: Fields) -> float | None:

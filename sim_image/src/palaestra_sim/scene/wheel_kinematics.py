@@ -135,8 +135,7 @@ def _ring(wheels: Sequence[Wheel]) -> Ring | None:
     """Return the drive of three wheels on radial axles, 120 degrees apart counterclockwise, else None.
 
     The first wheel defines the ring: the others may differ by the rounding of a file. Otherwise a robot would
-    turn slightly as it drives straight on, and the arena's Robotino would not repeat its motion of earlier
-    releases.
+    turn slightly as it drives straight on.
     """
     if len(wheels) != _THREE or any(wheel.roller for wheel in wheels):
         return None

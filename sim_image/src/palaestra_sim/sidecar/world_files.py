@@ -1,8 +1,7 @@
 """Write the file of the world that the simulator will run, in a folder where it finds all other files.
 
 Only the sidecar writes ROS names into a world. It gets a source world, from the image or from the replica's
-ConfigMap. ConfigMaps of older releases hold a generated world for each simulator. From a generated world, the
-generator produces the same world again.
+ConfigMap.
 """
 
 import os

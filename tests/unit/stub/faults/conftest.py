@@ -1,4 +1,4 @@
-"""Faults as they are written, and the course of a life with them."""
+"""Fault specifications, and the state of a simulator's life with them."""
 
 import pytest
 
@@ -19,5 +19,5 @@ def schedule():
 
 @pytest.fixture
 def course(schedule):
-    """The course of a life: the same arguments as `schedule`."""
+    """Return the fault state of a life; it takes the same arguments as `schedule`."""
     return lambda text, **life: FaultState(schedule(text, **life))

@@ -1,4 +1,4 @@
-"""Wrong messages and answers, as bytes."""
+"""Corrupted messages and responses, as bytes."""
 
 import math
 
@@ -19,7 +19,7 @@ def message(type_name, **fields):
 
 
 def payload(data):
-    """Return what is in a frame, which has to be whole."""
+    """Return the content of a frame, which must be complete."""
     (found,) = FrameReader().feed(data)
     return found
 
@@ -28,7 +28,7 @@ def payload(data):
     ("type_name", "field"), [("sensor_msgs/Range", "range"), ("webots_ros/Float64Stamped", "data")]
 )
 def test_the_reading_becomes_nan_and_the_rest_stays(type_name, field):
-    """A client that looks at the header sees a message like any other."""
+    """Otherwise a client that checks only the header would notice the fault."""
     sound = message(type_name, header={"seq": 7, "frame_id": "robotino/ir1"}, **{field: 1.5})
 
     read = message_type(type_name).codec.decode(payload(damaged_message(type_name, sound, WRONG_VALUE)))
@@ -38,7 +38,7 @@ def test_the_reading_becomes_nan_and_the_rest_stays(type_name, field):
 
 
 def test_all_numbers_of_a_reading_become_nan():
-    """A client that checks one coordinate of a GPS would be wrong."""
+    """Otherwise a client that checks only one coordinate of a GPS would miss the fault."""
     sound = message("geometry_msgs/PointStamped", point={"x": 1.0, "y": 2.0, "z": 3.0})
 
     wrong = payload(damaged_message("geometry_msgs/PointStamped", sound, WRONG_VALUE))
@@ -48,7 +48,7 @@ def test_all_numbers_of_a_reading_become_nan():
 
 
 def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
-    """A gyro and an accelerometer send the same type; -1 in a covariance says what has no reading."""
+    """A gyro and an accelerometer send the same type; -1 in a covariance marks the part without a reading."""
     fields = {
         "angular_velocity": {"x": 1.0, "y": 2.0, "z": 3.0},
         "orientation_covariance": [-1.0, *[0.0] * 8],
@@ -68,18 +68,18 @@ def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
     [("sensor_msgs/Image", "height"), ("sensor_msgs/Image", "data"), ("std_msgs/Header", "stamp")],
 )
 def test_a_field_without_a_fixed_place_or_without_numbers_has_no_reading(type_name, field):
-    """The bytes of another field would be overwritten."""
+    """Otherwise bytes of another field would be overwritten."""
     assert reading_field(type_name, field) is None
 
 
 def test_a_reading_that_the_message_does_not_have_is_an_error():
-    """A row of the table of devices that is wrong fails its tests, not a client."""
+    """A wrong row in the table of devices must fail its own tests, not a client."""
     with pytest.raises(KeyError, match=r"sensor_msgs/Range\.distance"):
         reading_field("sensor_msgs/Range", "distance")
 
 
 def test_a_message_too_short_for_a_reading_stays_short():
-    """Cut three times, a message of a GPS has fewer bytes than its reading."""
+    """If a GPS message is cut three times, it has fewer bytes than its reading."""
     sound = message("geometry_msgs/PointStamped")
     damages = (*WRONG_SHAPE * 3, *WRONG_VALUE)
 
@@ -87,14 +87,14 @@ def test_a_message_too_short_for_a_reading_stays_short():
 
 
 def test_a_bumper_has_nothing_to_become_nan():
-    """True and False are all there is."""
+    """A bumper has only True and False."""
     sound = message("webots_ros/BoolStamped", data=True)
 
     assert damaged_message("webots_ros/BoolStamped", sound, WRONG_VALUE) == sound
 
 
 def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
-    """The stream stays in step; the next message is right."""
+    """The stream stays in step, and the next message is correct."""
     sound = message("sensor_msgs/Range", range=1.5)
 
     short = payload(damaged_message("sensor_msgs/Range", sound, WRONG_SHAPE))
@@ -117,7 +117,7 @@ def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
     ],
 )
 def test_each_float_of_an_answer_is_replaced(service, fields, numbers):
-    """Also inside of points and lists."""
+    """This includes floats inside points and lists."""
     codec = service_type(f"webots_ros/{service}").response
 
     answer = damaged_answer(codec, b"\1" + frame(codec.encode(fields)), WRONG_VALUE)
@@ -127,7 +127,7 @@ def test_each_float_of_an_answer_is_replaced(service, fields, numbers):
 
 
 def test_floats_of_messages_in_a_list_are_replaced_too():
-    """The points where a robot touches something."""
+    """An example is the list of a robot's contact points."""
     codec = service_type("webots_ros/node_get_contact_points").response
     sound = codec.encode({"contact_points": [{"node_id": 7}]})
 
@@ -143,7 +143,7 @@ def test_floats_of_messages_in_a_list_are_replaced_too():
     ("service", "fields"), [("set_int", {"success": True}), ("get_string", {"value": "robotino"})]
 )
 def test_an_answer_without_floats_keeps_its_values(service, fields):
-    """Whole numbers, flags and texts are left alone."""
+    """Integers, booleans and texts do not change."""
     codec = service_type(f"webots_ros/{service}").response
     sound = b"\1" + frame(codec.encode(fields))
 
@@ -151,7 +151,7 @@ def test_an_answer_without_floats_keeps_its_values(service, fields):
 
 
 def test_an_answer_cut_short_is_a_whole_frame():
-    """One byte becomes none."""
+    """A response of one byte becomes empty."""
     codec = service_type("webots_ros/set_int").response
 
     assert damaged_answer(codec, b"\1" + frame(b"\1"), WRONG_SHAPE) == b"\1" + frame(b"")
@@ -159,7 +159,7 @@ def test_an_answer_cut_short_is_a_whole_frame():
 
 @pytest.mark.parametrize("service", ["get_float", "get_string"])
 def test_an_answer_cut_short_has_no_value_to_replace(service):
-    """Both faults may come to one answer, in either order."""
+    """Both faults may apply to one response, in either order."""
     codec = service_type(f"webots_ros/{service}").response
     sound = b"\1" + frame(codec.encode({}))
 
@@ -169,7 +169,7 @@ def test_an_answer_cut_short_has_no_value_to_replace(service):
 
 
 def test_a_failure_stays_as_it_is():
-    """Its text is no data."""
+    """Its text is not data."""
     codec = service_type("webots_ros/get_float").response
     failure = b"\0" + frame(b"no such node")
 

@@ -1,4 +1,4 @@
-"""Where faults are ordered, and how a stub knows which life it lives."""
+"""Faults come from options or the environment, and so does the number of the life."""
 
 import argparse
 
@@ -13,7 +13,7 @@ from palaestra_sim.world import builtin
 
 @pytest.fixture
 def read():
-    """`read("--fault", "crash", PALAESTRA_STUB_FAULTS="hang")`: the requested faults."""
+    """`read("--fault", "crash", PALAESTRA_STUB_FAULTS="hang")` returns the requested faults."""
 
     def make(*arguments, **environment):
         parser = argparse.ArgumentParser()
@@ -25,28 +25,28 @@ def read():
 
 @pytest.fixture
 def arena(tmp_path):
-    """The shipped arena, as a file."""
+    """The built-in arena as a file."""
     path = tmp_path / "arena.wbt"
     path.write_bytes(builtin("arena"))
     return path
 
 
 def test_nothing_is_ordered_by_default(read):
-    """An empty variable is none."""
+    """An empty variable means no fault."""
     assert read() is None
     assert read(PALAESTRA_STUB_FAULTS=" ") is None
     assert read("--fault-seed=7", PALAESTRA_SIMULATOR_START="x") is None
 
 
 def test_options_and_environment_add_up(read):
-    """Options first."""
+    """The options' faults come first."""
     ordered = read("--fault=crash:step=5", "--fault=exit:step=6", PALAESTRA_STUB_FAULTS="hang:step=4")
 
     assert [it.text for it in ordered.faults] == ["crash:step=5", "exit:step=6", "hang:step=4"]
 
 
 def test_seed_and_life_come_from_options_before_the_environment(read):
-    """A person at a shell is stronger than what a job set."""
+    """A person's option overrides the environment of a job."""
     environment = {"PALAESTRA_STUB_FAULT_SEED": "7", "PALAESTRA_SIMULATOR_START": "3"}
 
     told, chosen = (
@@ -60,7 +60,7 @@ def test_seed_and_life_come_from_options_before_the_environment(read):
 
 
 def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
-    """A restart under somebody else's care does not replay the life before."""
+    """If nobody numbers the lives, a restart must not repeat the faults of the previous one."""
     lives = {read("--fault=crash").life for _ in range(8)}
 
     assert len(lives) > 1
@@ -80,7 +80,7 @@ def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
     ],
 )
 def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, words):
-    """An option, or a variable of a job that was written somewhere else."""
+    """The message names the option, or the variable, which may be set in another file."""
     with pytest.raises(FaultError, match=words):
         read(*arguments, **environment)
 
@@ -97,7 +97,7 @@ def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, w
     ],
 )
 def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read, arena, fault, words):
-    """Found by starting its controllers on nodes that only listen."""
+    """The names are found by starting the world's controllers on nodes that only register."""
     with pytest.raises(FaultError, match=words):
         begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena)
 
@@ -106,14 +106,14 @@ def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read
     "fault", ["lost:topic=touch_sensor/value", "lost:topic=/model_name", "hang:service=*/enable"]
 )
 def test_what_the_world_has_can_be_named(read, arena, fault):
-    """Topics of sensors are there before anybody enables one."""
+    """Topics of sensors can be named before a client enables them."""
     assert (
         begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena).schedule.faults[0].text == fault
     )
 
 
 def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
-    """The same job meets the same faults again, though its UID is another."""
+    """The same job has the same faults again, although its UID differs."""
     names = []
     for name in (b"job_r0_collect_0a_robotino_8c31f2", b"job_r0_collect_0a_robotino_00ff00"):
         arena.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=" + name))
@@ -123,7 +123,7 @@ def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
 
 
 def test_faults_are_looked_up_in_the_world_as_it_will_run(read, tmp_path):
-    """A world that starts only with --leave-out has faults too."""
+    """A world that starts only with --leave-out can have faults too."""
     world = tmp_path / "odd.wbt"
     world.write_bytes(builtin("arena") + b"Unheard { }")
     load = Loader(physics=StubPhysics, leave_out=LeaveOut(everything=True))

@@ -1,4 +1,4 @@
-"""How faults are written, and what is said about one that is written wrongly."""
+"""The syntax of faults, and the messages for mistakes in it."""
 
 import math
 from signal import Signals
@@ -13,13 +13,13 @@ from palaestra_sim.faults.parser import KINDS, FaultError, parse
 
 
 def one(text):
-    """Return the fault that a text orders."""
+    """Return the fault that a text specifies."""
     (fault,) = parse(text, "test")
     return fault
 
 
 def test_a_kind_and_its_keys_become_a_fault():
-    """Units go into the base unit: milliseconds are seconds in the code."""
+    """Values are converted to base units: milliseconds become seconds."""
     fault = one("slow:service=ir1/enable,latency_ms=50,jitter_ms=20,call=3")
 
     assert fault == kinds.Slow(
@@ -32,7 +32,7 @@ def test_a_kind_and_its_keys_become_a_fault():
 
 
 def test_blanks_and_new_lines_stand_between_faults():
-    """A variable in YAML may be folded over lines."""
+    """A variable in YAML may be folded over several lines."""
     faults = parse(" crash:step=2000\n hang:every=5000  ", "test")
 
     assert [type(it) for it in faults] == [kinds.Crash, kinds.Hang]
@@ -41,7 +41,7 @@ def test_blanks_and_new_lines_stand_between_faults():
 
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_makes_its_own_class(name):
-    """Code distinguishes faults by class, not by their text."""
+    """The code distinguishes faults by class, not by text."""
     text = f"{name}:latency_ms=1" if KINDS[name].needs else name
 
     assert type(one(text)) is KINDS[name].make
@@ -65,12 +65,12 @@ def test_every_kind_makes_its_own_class(name):
     ],
 )
 def test_the_keys_about_time_make_the_trigger(text, trigger):
-    """`every` and `probability` are about steps, or about the calls of the service that is named."""
+    """`every` and `probability` count steps, or calls of the service that is named."""
     assert one(text).trigger == trigger
 
 
 def test_messages_of_all_sensors_are_meant_unless_one_is_named():
-    """The same for what makes them wrong, unless it names a service."""
+    """The same holds for faults that corrupt messages, unless they name a service."""
     assert one("lost").topic == "*"
     assert one("wrong_value").topic == "*"
     assert one("wrong_value:service=a/b").topic == ""
@@ -78,14 +78,14 @@ def test_messages_of_all_sensors_are_meant_unless_one_is_named():
 
 
 def test_a_crash_can_be_any_signal_that_ends_a_simulator():
-    """A bus error is what the paper saw; SIGTERM is an order, no crash."""
+    """A bus error is the crash of the paper; SIGTERM is a request to end, not a crash."""
     assert one("crash:signal=SIGBUS").signal is Signals.SIGBUS
     with pytest.raises(FaultError, match="signal is 'SIGTERM'; give one of SIGABRT, SIGBUS"):
         one("crash:signal=SIGTERM")
 
 
 def test_a_value_may_be_no_number():
-    """And is one that the narrowest field can hold."""
+    """The narrowest field must be able to hold the value."""
     assert math.isnan(one("wrong_value").value)
     assert one("wrong_value:value=-inf").value == -math.inf
     with pytest.raises(FaultError, match="value is '1e300'; give a number that fits into 32 bits"):
@@ -120,7 +120,7 @@ def test_a_value_may_be_no_number():
     ],
 )
 def test_the_error_for_a_wrong_fault_has_place_fact_and_remedy(text, words):
-    """Its author can fix it without the documentation; a trailing colon does no harm."""
+    """The author can correct it without the documentation; a trailing colon is accepted."""
     if words is None:
         assert one(text).trigger == Trigger(event=FaultEvent.STEP)
         return
@@ -132,7 +132,7 @@ def test_the_error_for_a_wrong_fault_has_place_fact_and_remedy(text, words):
 
 @given(st.text(alphabet="acehlnorstwy_:=,.0123456789-* ²", max_size=40))
 def test_any_text_is_a_fault_or_an_error_that_names_it(text):
-    """Nothing that a person may type ends in a traceback."""
+    """No text that a person types may cause a traceback."""
     told = None
     try:
         faults = parse(text, "test")

@@ -1,4 +1,4 @@
-"""What faults do to a process, but for those that end it; those are tested with real ones."""
+"""The effects of faults on a process, except those that end it; those are tested with real processes."""
 
 import pytest
 
@@ -7,27 +7,27 @@ from palaestra_sim.faults.parser import parse
 
 
 class Endings:
-    """Notes what a process would do to itself."""
+    """Record the effects that a process would have on itself."""
 
     def __init__(self):
         self.done = []
 
     def end(self, status):
-        """Note the exit code."""
+        """Record the exit code."""
         self.done.append(("end", status))
 
     def lose_master(self):
-        """Note it."""
+        """Record the loss of the master."""
         self.done.append("lose_master")
 
     def lose_names(self):
-        """Note it."""
+        """Record the loss of the names."""
         self.done.append("lose_names")
 
 
 @pytest.fixture
 def endings():
-    """What happened to the process."""
+    """The recorder of effects."""
     return Endings()
 
 
@@ -42,20 +42,20 @@ def endings():
     ],
 )
 def test_faults_happen_in_order_until_one_ends_the_stub(endings, text, done, goes_on):
-    """Nothing happens to a stub that has ended."""
+    """No fault follows after the stub has ended."""
     assert ProcessFaults(endings).happen(parse(text, "test")) is goes_on
 
     assert endings.done == done
 
 
 def test_no_fault_lets_the_stub_go_on(endings):
-    """The ordinary request."""
+    """Most requests have no fault."""
     assert ProcessFaults(endings).happen(())
     assert endings.done == []
 
 
 def test_a_fault_is_logged(endings, caplog):
-    """It must not be taken for a bug of the stub."""
+    """Otherwise it would be taken for a bug of the stub."""
     ProcessFaults(endings).happen(parse("exit:step=5", "test"))
 
     assert caplog.messages == ["fault: exit:step=5"]

@@ -1,4 +1,4 @@
-"""When faults happen: a function of seed, simulator, life and number, and of nothing else."""
+"""The times of faults follow from seed, simulator, life and number, and from nothing else."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,22 +11,22 @@ STEPS = range(1, 4001)
 
 
 def happenings(schedule, event=FaultEvent.STEP, numbers=STEPS):
-    """Return at which events anything happens."""
+    """Return the numbers of the events that have a fault."""
     return [number for number in numbers if schedule.at(event, number)]
 
 
 def test_a_step_is_one_step(schedule):
-    """Neither the one before nor any after."""
+    """No step before or after it has the fault."""
     assert happenings(schedule("crash:step=2000")) == [2000]
 
 
 def test_every_means_each_multiple(schedule):
-    """From the first on."""
+    """The first multiple counts."""
     assert happenings(schedule("lost:every=1000")) == [1000, 2000, 3000, 4000]
 
 
 def test_steps_and_resets_are_counted_apart(schedule):
-    """A fault is about one of them."""
+    """A fault counts only one of them."""
     both = schedule("crash:step=5 crash:reset=7")
 
     assert happenings(both) == [5]
@@ -34,20 +34,20 @@ def test_steps_and_resets_are_counted_apart(schedule):
 
 
 def test_a_probability_is_a_share_of_the_steps(schedule):
-    """Within four standard deviations of 4000 draws."""
+    """The limit is four standard deviations of 4000 draws."""
     share = len(happenings(schedule("crash:probability=0.1"))) / len(STEPS)
 
     assert 0.08 < share < 0.12
 
 
 def test_probability_0_is_never_and_1_is_always(schedule):
-    """The ends of a sweep."""
+    """These are the ends of a sweep."""
     assert happenings(schedule("crash:probability=0")) == []
     assert happenings(schedule("crash:probability=1")) == list(STEPS)
 
 
 def test_another_life_is_another_draw(schedule):
-    """Else a simulator that crashed would crash at the same step for ever."""
+    """Otherwise a simulator that crashed would crash at the same step for ever."""
     lives = [happenings(schedule("crash:probability=0.001", number=number))[:1] for number in range(1, 9)]
 
     assert len({tuple(it) for it in lives}) > 4
@@ -64,21 +64,21 @@ def test_over_many_lives_the_probability_is_what_was_written(schedule):
 
 
 def test_equal_simulators_do_not_fail_together(schedule):
-    """A group shares its environment, so also its seed."""
+    """A group shares its environment variables, and so its seed."""
     first, second = (schedule("crash:probability=0.01", simulator=f"job_r0_collect_{it}a") for it in (0, 1))
 
     assert happenings(first) != happenings(second)
 
 
 def test_another_seed_is_another_course(schedule):
-    """And the same one is the same."""
+    """The same seed gives the same faults."""
     draws = [happenings(schedule("crash:probability=0.01", seed=seed)) for seed in (1, 2, 1)]
 
     assert draws[0] == draws[2] != draws[1]
 
 
 def test_a_fault_that_is_added_changes_no_other(schedule):
-    """So that two experiments can be compared."""
+    """Two experiments can then be compared."""
     alone = schedule("crash:probability=0.01")
     beside = schedule("slow:latency_ms=5,probability=0.5 crash:probability=0.01")
     (crash,) = alone.faults
@@ -87,7 +87,7 @@ def test_a_fault_that_is_added_changes_no_other(schedule):
 
 
 def test_the_draws_are_the_same_in_every_release():
-    """A run can be repeated years later; hash() of Python would differ from process to process."""
+    """A run can be repeated years later; Python's hash() would differ between processes."""
     (fault,) = parse("crash:probability=0.05", "test")
     schedule = FaultSchedule(faults=[fault], life=Life(simulator="robotino", number=1))
 
@@ -96,7 +96,7 @@ def test_the_draws_are_the_same_in_every_release():
 
 @given(st.integers(1, 10**12), st.integers(0, 2**64))
 def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
-    """Evenly; never negative."""
+    """The distribution is uniform, and never negative."""
     (fault,) = parse("slow:latency_ms=50,jitter_ms=20", "test")
     schedule = FaultSchedule(faults=[fault], life=Life(seed=seed))
 
@@ -105,7 +105,7 @@ def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
 
 @given(st.integers(1, 10**6), st.integers(1, 1000), st.floats(0, 1, exclude_max=True))
 def test_a_trigger_needs_both_its_multiple_and_its_chance(number, every, draw):
-    """One that says nothing fires always."""
+    """A trigger without conditions always fires."""
     assert Trigger(event=FaultEvent.STEP).fires(number, draw)
     assert Trigger(event=FaultEvent.STEP, every=every).fires(number, draw) == (number % every == 0)
     assert Trigger(event=FaultEvent.STEP, at=every).fires(number, draw) == (number == every)

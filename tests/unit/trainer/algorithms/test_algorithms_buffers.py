@@ -23,7 +23,7 @@ def replay(size=8, members=2):
 
 
 def add(buffer, marks, valid):
-    """Add one vector step, whose rows are marked by their rewards."""
+    """Add one vector step whose rows are identified by their rewards."""
     column = np.array(marks, np.float32)
     buffer.add(
         column[:, None],
@@ -60,7 +60,7 @@ def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
 
 
 def test_a_row_is_valid_unless_it_says_otherwise():
-    """Environments of others say nothing."""
+    """The infos of other environments have no such entry."""
     assert valid_rows([{}, {"palaestra": {"valid": True}}, {"palaestra": {"valid": False}}]).tolist() == [
         True,
         True,
@@ -70,7 +70,7 @@ def test_a_row_is_valid_unless_it_says_otherwise():
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=20))
 def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
-    """Whatever pattern the faults have."""
+    """This holds for every pattern of faults."""
     buffer = replay(size=8)
     expected = []
     for number, valid in enumerate(steps):
@@ -83,7 +83,7 @@ def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
 
 
 def test_the_row_before_a_fault_ends_as_truncated():
-    """Its value is bootstrapped: the fault was not the policy's."""
+    """Its value is bootstrapped, because the policy did not cause the fault."""
     buffer = replay()
     add(buffer, [1, 2], [True, True])
 
@@ -96,10 +96,10 @@ def test_the_row_before_a_fault_ends_as_truncated():
 
 
 def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated():
-    """The buffer is full, and the member that broke is away for longer than the buffer is long."""
+    """The buffer is full, and the broken member is away for longer than the length of the buffer."""
     buffer = replay(size=4)
     add(buffer, [1.0, 2.0], [True, True])
-    for mark in (3.0, 4.0, 5.0):  # the last one takes the place of row 1.0
+    for mark in (3.0, 4.0, 5.0):  # the last one replaces row 1.0
         add(buffer, [0.0, mark], [False, True])
 
     add(buffer, [0.0, 6.0], [False, True])
@@ -109,7 +109,7 @@ def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated()
 
 
 def test_a_fault_at_once_truncates_nothing():
-    """There is no row before it."""
+    """No row exists before the fault."""
     buffer = replay()
 
     add(buffer, [1, 2], [False, False])
@@ -136,7 +136,7 @@ def test_a_replay_buffer_goes_back_to_where_it_stood(steps):
 
 @pytest.mark.parametrize("steps", [2, 7])
 def test_a_replay_buffer_can_do_without_some_rows(steps):
-    """Those that a damaged file held; the others stay in order, and the oldest is overwritten first."""
+    """A damaged file held them; the other rows stay in order, and the oldest is overwritten first."""
     buffer = replay(size=8)
     for number in range(steps):
         add(buffer, [2 * number, 2 * number + 1], [True, True])
@@ -153,7 +153,7 @@ def test_a_replay_buffer_can_do_without_some_rows(steps):
 
 
 def test_a_replay_buffer_knows_which_chunks_changed(monkeypatch):
-    """Only those are written to a checkpoint again."""
+    """A checkpoint writes only these chunks again."""
     monkeypatch.setattr(buffers, "CHUNK_BYTES", 4 * 28)  # a row has two observations, an action and 3 numbers
     buffer = replay(size=10)
     add(buffer, [1, 2], [True, True])
@@ -178,7 +178,7 @@ def test_without_faults_a_rollout_is_what_stable_baselines_computes():
 
 
 def test_the_row_before_an_invalid_one_is_bootstrapped_with_the_state_they_share():
-    """Its advantage is r + gamma V(s') - V(s), and nothing from beyond the fault."""
+    """Its advantage is r + gamma V(s') - V(s), without values from after the fault."""
     buffer = rollout([1.0, 123.0, 5.0], [True, False, True], [True, False, True])
 
     buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([False]))
@@ -189,7 +189,7 @@ def test_the_row_before_an_invalid_one_is_bootstrapped_with_the_state_they_share
 
 
 def test_an_invalid_row_at_the_end_of_a_rollout_is_no_different():
-    """There the next episode's first value is at hand, and must not be taken."""
+    """The next episode's first value is available there, but must not be used."""
     buffer = rollout([1.0, 123.0], [True, False], [True, False])
 
     buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([True]))
@@ -199,7 +199,7 @@ def test_an_invalid_row_at_the_end_of_a_rollout_is_no_different():
 
 @given(st.lists(st.booleans(), min_size=1, max_size=20), st.integers(1, 7))
 def test_minibatches_hold_every_valid_row_once_and_no_other(valid, batch_size):
-    """An empty minibatch would make a mean of nothing: NaN."""
+    """The mean of an empty minibatch would be NaN."""
     buffer = rollout([0.0] * len(valid), valid, [False] * len(valid))
     buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
 
@@ -211,7 +211,7 @@ def test_minibatches_hold_every_valid_row_once_and_no_other(valid, batch_size):
 
 
 def test_a_rollout_is_read_several_times():
-    """PPO does so, an epoch each."""
+    """PPO reads it once in each epoch."""
     buffer = rollout([0.0] * 4, [True, False, True, True], [False] * 4)
     buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
 
@@ -221,7 +221,7 @@ def test_a_rollout_is_read_several_times():
 
 
 def test_an_emptied_rollout_has_forgotten_its_faults():
-    """The next rollout has its own."""
+    """The next rollout has its own faults."""
     buffer = rollout([0.0] * 2, [False, False], [False] * 2)
 
     buffer.reset()

@@ -1,4 +1,4 @@
-"""Which hyperparameters a run has that its job leaves out."""
+"""The hyperparameters of a run that its job leaves out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARENA = "MoveToTargetEnv-v0"
 
 @pytest.fixture
 def interrupted(play, job):
-    """Interrupt a run of DQN whose job leaves the discount out; return its configuration."""
+    """Interrupt a run of DQN whose job has no discount, and return its configuration."""
     calls = iter(range(1, 10_000))
 
     def interrupt():
@@ -38,14 +38,14 @@ def interrupted(play, job):
 
 
 def discount(directory):
-    """Return the discount of the newest checkpoint's model."""
+    """Return the discount in the model of the newest checkpoint."""
     with zipfile.ZipFile(checkpoint.newest(directory.checkpoints).path / "model.zip") as archive:
         return json.loads(archive.read("data"))["gamma"]
 
 
 @pytest.mark.parametrize("name", sorted(SB3))
 def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
-    """Those of the arena were found in the arena."""
+    """The defaults of the arena were found in the arena."""
     theirs = inspect.signature(SB3[name].__init__).parameters
 
     resolved = resolve(Algorithm(name=name), "hall:Hall-v0").hyperparameters
@@ -57,7 +57,7 @@ def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 @pytest.mark.parametrize("environment", [ARENA, f"palaestra_trainer.environments:{ARENA}"])
 def test_the_arena_keeps_its_own_defaults(name, environment):
-    """However its module is named."""
+    """This does not depend on the name of its module."""
     resolved = resolve(Algorithm(name=name), environment).hyperparameters
 
     assert resolved.items() >= ALGORITHMS[name].arena.items()
@@ -65,7 +65,7 @@ def test_the_arena_keeps_its_own_defaults(name, environment):
 
 
 def test_what_a_job_gives_precedes_every_default():
-    """One by one."""
+    """This holds for each hyperparameter on its own."""
     given = Algorithm(name="DQN", hyperparameters={"gamma": 0.5})
 
     resolved = resolve(given, ARENA).hyperparameters
@@ -74,7 +74,7 @@ def test_what_a_job_gives_precedes_every_default():
 
 
 def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play, directory):
-    """Here it began at a release that had another discount."""
+    """This run began with a release that had another discount."""
     kept = json.loads(directory.hyperparameters.read_text())
     assert kept["gamma"] == discount(directory) == 0.99
     directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
@@ -85,29 +85,9 @@ def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play,
     assert json.loads(directory.hyperparameters.read_text())["gamma"] == 0.5
 
 
-def test_a_run_that_began_at_a5276f3_goes_on_with_what_it_had(interrupted, play, directory):
-    """That release gave every environment the arena's defaults, and wrote no such file."""
-    directory.hyperparameters.unlink()
-
-    code, _ = play(interrupted)
-
-    assert (code, discount(directory)) == (0, 0.93)
-    assert not directory.hyperparameters.exists()
-
-
-def test_a_run_of_a5276f3_without_a_checkpoint_goes_on_with_what_it_had(play, job, directory):
-    """It was interrupted before its first one."""
-    directory.path.mkdir()
-    directory.begin_attempt("", "new run")
-
-    play(job("DQN"))
-
-    assert discount(directory) == 0.93
-
-
 @pytest.mark.usefixtures("interrupted")
 def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, directory, tmp_path):
-    """And keeps them: the other may be gone when it resumes."""
+    """The run also stores them, because the other run may be deleted when it resumes."""
     kept = json.loads(directory.hyperparameters.read_text())
     directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
     further = RunDirectory(tmp_path / "further")
@@ -119,7 +99,7 @@ def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, director
 
 
 def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play, directory, last_word):
-    """Defaults in their place would be another run."""
+    """With defaults instead, it would be another run."""
     directory.hyperparameters.write_text("{")
 
     code, _ = play(interrupted)
@@ -129,7 +109,7 @@ def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play
 
 
 def test_a_policy_is_measured_with_the_hyperparameters_of_its_run(play, job, directory):
-    """Its network has the shape that they say."""
+    """They determine the shape of its network."""
     hyperparameters = {"learning_starts": 10, "batch_size": 8, "buffer_size": 500}
     configuration = job("DQN", algorithm={"name": "DQN", "hyperparameters": hyperparameters})
     _, members = play(configuration)

@@ -1,4 +1,4 @@
-"""Where networks live: on the CPU, or on the GPU that a job asked for."""
+"""The device of networks: the CPU, or the GPU that a job requests."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="PyTorch sees no 
 
 @pytest.fixture
 def no_gpu(monkeypatch):
-    """Let PyTorch see no GPU, also where there is one."""
+    """Hide every GPU from PyTorch."""
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
 
 
 @pytest.fixture
 def make(make_member, make_configuration):
-    """Make a small model of an algorithm on a device; return it with its environment and configuration."""
+    """Make a small model of an algorithm on a device. Return it with its environment and configuration."""
 
     def made(name, device):
         member = make_member()
@@ -53,13 +53,13 @@ def make(make_member, make_configuration):
 
 
 def missing_gpus(logs):
-    """Return the lines of a log that tell of a GPU that is not there."""
+    """Return the log lines about a missing GPU."""
     return [line for line in logs if "GPU" in line["event"]]
 
 
 @pytest.mark.usefixtures("no_gpu")
 def test_where_there_is_no_gpu_a_job_that_asks_for_one_trains_on_the_cpu_and_says_so(play, job, directory):
-    """The same file runs on a laptop; in a cluster the line tells why the GPU is idle, and the remedy."""
+    """The same file works on a laptop; in a cluster the warning has the reason and the remedy."""
     with capture_logs() as logs:
         code, _ = play(job("PPO", device="cuda"))
 
@@ -72,7 +72,7 @@ def test_where_there_is_no_gpu_a_job_that_asks_for_one_trains_on_the_cpu_and_say
 
 @pytest.mark.usefixtures("no_gpu")
 def test_a_run_that_asked_for_a_gpu_is_measured_where_there_is_none(play, job, directory, make_member):
-    """A model from a cluster is evaluated on a laptop with the training.yaml of the cluster."""
+    """A user evaluates a model from a cluster on a laptop, with the cluster's training.yaml."""
     play(job())
 
     with capture_logs() as logs:
@@ -85,7 +85,7 @@ def test_a_run_that_asked_for_a_gpu_is_measured_where_there_is_none(play, job, d
 
 
 def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch, make):
-    """Also beside a GPU: small networks are faster there, and resume exactly."""
+    """This holds also if there is a GPU: small networks are faster on the CPU, and resume exactly."""
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
 
     with capture_logs() as logs:
@@ -107,7 +107,7 @@ def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch
     ],
 )
 def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, before, after):
-    """Its networks, optimizers and noise come to where it goes on, and it learns there."""
+    """Its networks, optimizers and noise move to the new device, where it learns."""
     trained, env, configuration = make(name, before)
     trained.learn(40)
     state = checkpoint.TrainingState.of(trained, env.snapshot(), {"returns": [0.0]})
@@ -127,7 +127,7 @@ def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, 
 
 
 def test_where_the_generator_of_a_gpu_stands_is_kept_with_the_others():
-    """Actions are drawn there, and would be drawn again after each interruption."""
+    """The GPU draws actions, and would draw the same again after each interruption."""
     space = spaces.Discrete(2)
     now = Generators.now(space, torch.device("cpu"))
     state = torch.arange(16, dtype=torch.uint8)

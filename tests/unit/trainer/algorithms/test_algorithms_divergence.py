@@ -1,4 +1,4 @@
-"""NaN and infinity: where they are looked for, and how they are reported."""
+"""The places that are checked for NaN and infinity, and the reports."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def model(job, make_member):
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_new_model_holds_numbers_only(model, name):
-    """Nothing is found where nothing is wrong."""
+    """A valid model must pass the check."""
     assert Learner(model(name)).not_finite() == ""
 
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_one_wrong_number_in_any_tensor_is_found_and_named(model, name, number):
-    """The last weight of the last layer spoils no output at first."""
+    """The last weight of the last layer does not affect any output at first."""
     made = model(name)
     learner = Learner(made)
     for tensor, parameter in made.policy.named_parameters():
@@ -71,7 +71,7 @@ def test_a_refusal_names_step_loss_and_tensors(model):
 
 
 def test_a_figure_that_is_no_loss_may_be_unknown(model):
-    """Where all returns are equal, what of them is explained is not-a-number."""
+    """If all returns are equal, the explained variance is NaN."""
     made = model("PPO")
     made.logger.record("train/explained_variance", math.nan)
     made.logger.record("rollout/loss", math.nan)
@@ -80,7 +80,7 @@ def test_a_figure_that_is_no_loss_may_be_unknown(model):
 
 
 def test_very_large_numbers_are_numbers(model):
-    """Their norm is infinite, and none of them is."""
+    """Their norm is infinite, but each of them is finite."""
     made = model("PPO")
     with torch.no_grad():
         for parameter in made.policy.parameters():
@@ -90,7 +90,7 @@ def test_very_large_numbers_are_numbers(model):
 
 
 def test_a_coefficient_that_is_learnt_beside_the_networks_is_looked_at_too(model):
-    """The temperature of SAC is a tensor of the model's own."""
+    """The temperature of SAC is a tensor of the model, not of a network."""
     made = model("PPO")
     made.log_ent_coef = torch.tensor([math.nan])
 

@@ -1,4 +1,4 @@
-"""Every algorithm in tasks of every pair of spaces that it fits: a fault, a signal, an exact resume."""
+"""Every algorithm trains with every pair of spaces that it supports, and survives a fault and a resume."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from tools.algorithms import refusal
 pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
-STEPS = 26  # three rollouts on policy
-# A step of the first of two simulators: during the second rollout on policy, after learning began off policy.
+STEPS = 26  # three rollouts of an on-policy algorithm
+# At this step of the first of two simulators, on-policy algorithms are in their second rollout, and
+# off-policy ones already learn.
 SIGNAL_AT = 7
 OFF_POLICY = {
     "learning_starts": 6,
@@ -34,7 +35,7 @@ OFF_POLICY = {
     "train_freq": 3,
     "gradient_steps": 1,
 }
-# A soft update of the target comes between the boundary and the signal, so its second one would be noticed.
+# A soft update of the target comes between the boundary and the signal, so a second one would be noticed.
 SOFT = {"target_update_interval": 4, "tau": 0.5}
 NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
 ON_POLICY = {"n_steps": 4, "batch_size": 8}
@@ -56,8 +57,8 @@ HYPERPARAMETERS = {
 }
 CELLS = [(name, seen, acted) for name in ALGORITHMS for seen in OBSERVATIONS for acted in ACTIONS]
 WORKING = [cell for cell in CELLS if not refusal(*cell)]
-# What a checkpoint must hold follows from algorithm and observation, and from algorithm and action: each of
-# these pairs is in at least one of these cells.
+# The content of a checkpoint depends on algorithm and observation, and on algorithm and action; the cells
+# here cover each of these pairs.
 PAIRS = [
     cell
     for place, cell in enumerate(WORKING)
@@ -68,7 +69,10 @@ PAIRS = [
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path):
-    """Train into a folder; the first simulator dies at each of `deaths`, a signal comes at a step of it."""
+    """Train into a folder.
+
+    The first simulator dies at each of `deaths` and gets a signal at step `signal_at`.
+    """
 
     def run(folder, cell, *, signal_at=0, deaths=(), steps=STEPS, **more):
         name, seen, acted = cell
@@ -88,7 +92,7 @@ def play(make_member, make_configuration, tmp_path):
 
         configuration = make_configuration(
             algorithm=algorithm,
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs one that is registered
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
             steps=steps,
             collectors=COLLECTORS,
             evaluation={"everySteps": STEPS // 2, "episodes": 1, "confirmEpisodes": 0},
@@ -101,7 +105,7 @@ def play(make_member, make_configuration, tmp_path):
 
 
 class Interrupted(FakeTask):
-    """A task during which a signal comes."""
+    """A task that sends a signal at one step."""
 
     def __init__(self, seen, acted, deaths, taken, signal_at):
         super().__init__(seen, acted, deaths)
@@ -115,14 +119,14 @@ class Interrupted(FakeTask):
 
 
 class MaskedInterrupted(Interrupted, MaskedTask):
-    """A task that forbids actions, during which a signal comes."""
+    """A task that forbids actions and sends a signal."""
 
 
 KINDS = {"MaskablePPO": (MaskedTask, MaskedInterrupted)}
 
 
 def tensors(path):
-    """Return every tensor of a model's file by name, as bytes, and what it normalizes by."""
+    """Return every tensor of a model's file by name, as bytes, and the statistics for normalization."""
     with zipfile.ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist() if name.endswith(".pth")}
         normalized = [name for name in archive.namelist() if name == "normalize.json"]
@@ -144,7 +148,7 @@ def flat(value, place=""):
 
 
 def outcome(directory):
-    """Return all that a run came to, by name."""
+    """Return all results of a run by name."""
     found = checkpoint.newest(directory.checkpoints)
     state = json.loads((found.path / "state.json").read_text())
     state["episodes"] = [episode | {"t": 0} for episode in state["episodes"]]
@@ -156,12 +160,12 @@ def outcome(directory):
 
 
 def test_the_job_names_the_algorithms_of_the_table():
-    """The operator accepts what the trainer trains."""
+    """The operator must accept exactly the algorithms of the trainer."""
     assert set(NAMES) == set(ALGORITHMS)
 
 
 def test_what_is_refused_is_refused_before_a_model_is_made(play):
-    """By the sentence that the table in docs/reference/algorithms.md has."""
+    """The message is the sentence in the table of docs/reference/algorithms.md."""
     for cell in (("RecurrentPPO", "Box", "MultiBinary"), ("PPO", "Tuple", "Box"), ("CrossQ", "image", "Box")):
         assert play("refused", cell)[0] == 2
 
@@ -169,7 +173,7 @@ def test_what_is_refused_is_refused_before_a_model_is_made(play):
 @pytest.mark.parametrize("name", ["PPO", "SAC", "RecurrentPPO"])
 @pytest.mark.parametrize("seen", ["Dict", "Dict with image"])
 def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
-    """Each Box of numbers has statistics of its own; an image and a discrete value have none."""
+    """Each Box of numbers has its own statistics; images and discrete values do not."""
     cell, normalize = (name, seen, "Box"), {"normalize": {}}
     whole, reference = play("whole", cell, **normalize)
     interrupted, directory = play("cut", cell, signal_at=SIGNAL_AT, **normalize)
@@ -186,7 +190,7 @@ def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
 
 @pytest.mark.parametrize("cell", WORKING, ids=", ".join)
 def test_it_trains_and_survives_faults(play, cell):
-    """A row of a fault that reached a loss would be a wrong number, or the end of the run."""
+    """If a row of a fault reached a loss, a number would be wrong, or the run would end."""
     code, directory = play("broken", cell, deaths=(3, 8), steps=STEPS - 6)
 
     assert code == 0
@@ -195,7 +199,7 @@ def test_it_trains_and_survives_faults(play, cell):
 
 @pytest.mark.parametrize("cell", PAIRS, ids=", ".join)
 def test_it_resumes_exactly(play, cell):
-    """A part of the state that a checkpoint lacks would make another run of it."""
+    """If a checkpoint lacked a part of the state, the resumed run would differ."""
     whole, reference = play("whole", cell)
     interrupted, directory = play("cut", cell, signal_at=SIGNAL_AT)
     resumed, _ = play("cut", cell)

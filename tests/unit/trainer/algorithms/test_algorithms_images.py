@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import shutil
 import signal
 import zipfile
 
@@ -37,7 +36,7 @@ NORMALIZE = {"observations": False}
 
 @pytest.fixture
 def make_seeing(make_member):
-    """Make a member of the corridor that sees its place as a picture with channels last."""
+    """Make a member of the corridor that sees its position as a channels-last image."""
 
     def make(name, shape=(ROWS, COLUMNS, 3)):
         member = make_member(name)
@@ -60,7 +59,7 @@ def make_seeing(make_member):
 
 @pytest.fixture
 def play(make_seeing, job, tmp_path):
-    """Train into a folder; a signal comes at each of the steps `signals`, counted over one attempt."""
+    """Train into a folder; a signal comes at step `signal_at` of the attempt."""
 
     def run(folder, name, collectors=1, signal_at=0, normalize=None, cnn=None):
         algorithm = {"name": name, "hyperparameters": HYPERPARAMETERS[name], "cnn": cnn}
@@ -85,7 +84,7 @@ def play(make_seeing, job, tmp_path):
 
 
 def outcome(directory):
-    """Return all that a run came to: tensors, evaluations."""
+    """Return all results of a run: tensors and evaluations."""
     path = checkpoint.newest(directory.checkpoints).path / "model.zip"
     with zipfile.ZipFile(path) as archive:
         tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True)
@@ -99,7 +98,7 @@ def outcome(directory):
     ids=lambda it: "rewards-normalized" if it == NORMALIZE else it,
 )
 def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name, normalize):
-    """To the last bit, with the layout of its pictures the same before and after."""
+    """The results are equal to the last bit, and the layout of the images is the same before and after."""
     whole, reference = play("whole", name, collectors=2, normalize=normalize)
     interrupted, directory = play("cut", name, collectors=2, signal_at=28, normalize=normalize)
 
@@ -111,7 +110,7 @@ def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name
 
 
 def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
-    """What the environments return at a resume is compared with it."""
+    """At a resume they are compared with the values that the environments return."""
     _, directory = play("run", "PPO")
 
     with np.load(checkpoint.newest(directory.checkpoints).path / "state.npz") as arrays:
@@ -121,7 +120,7 @@ def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
 @pytest.mark.parametrize("name", sorted(HYPERPARAMETERS))
 @pytest.mark.parametrize("shape", [(ROWS, COLUMNS, 3), (3, ROWS, COLUMNS)], ids=["last", "first"])
 def test_images_get_the_policy_for_images(make_seeing, name, shape):
-    """Flattened pixels would be learned from as well, and badly."""
+    """A policy for numbers would accept flattened pixels, but learn badly."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
     model = make_model(Algorithm(name=name, hyperparameters=HYPERPARAMETERS[name]), env, seed=1)
 
@@ -135,7 +134,10 @@ def test_images_get_the_policy_for_images(make_seeing, name, shape):
     ("shape", "layers"), [((ROWS, COLUMNS, 3), 3), ((20, 48, 9), 9)], ids=["1", "3 frames"]
 )
 def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, shape, layers):
-    """In every algorithm, for one image or three, and for images that are too small for the large one."""
+    """This holds for every algorithm, and for one image or three.
+
+    The images may be too small for the large network.
+    """
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
     if name == "SAC":
         env.action_space = spaces.Box(-1.0, 1.0, (3,))
@@ -155,7 +157,7 @@ def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, s
 
 
 def test_hyperparameters_change_the_small_network(make_seeing):
-    """`policy_kwargs` are those of the policy, as everywhere."""
+    """As everywhere, `policy_kwargs` are those of the policy."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0"))], run_seed=1)
     policy_kwargs = {"net_arch": [32], "features_extractor_kwargs": {"features_dim": 64}}
     hyperparameters = {**HYPERPARAMETERS["PPO"], "policy_kwargs": policy_kwargs}
@@ -167,7 +169,7 @@ def test_hyperparameters_change_the_small_network(make_seeing):
 
 
 def test_a_run_with_the_small_network_resumes_as_others_do(play):
-    """To the last bit, although nothing of a checkpoint is unpickled."""
+    """It is exact to the last bit, although nothing in a checkpoint is unpickled."""
     _, reference = play("whole", "PPO", cnn="small")
     play("cut", "PPO", signal_at=28, cnn="small")
 
@@ -178,26 +180,13 @@ def test_a_run_with_the_small_network_resumes_as_others_do(play):
 
 
 def test_a_network_for_images_is_refused_where_there_are_none(make_member):
-    """It would have no effect, and the job says otherwise."""
+    """The setting would have no effect, although the job names it."""
     env = SimulatorsVecEnv([Restarter(make_member("collect-0"))], run_seed=1)
 
     with pytest.raises(
         ConfigurationError, match=r"algorithm\.cnn: has no effect, since the environment's obs"
     ):
         make_model(Algorithm(name="PPO", cnn="small"), env, seed=1)
-
-
-def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):
-    """That release gave it MlpPolicy; its tensors fit no other."""
-    _, directory = play("run", "PPO", signal_at=28)
-    directory.hyperparameters.unlink()
-    shutil.rmtree(directory.checkpoints)
-
-    code, _ = play("run", "PPO")
-
-    assert code == 0
-    names, _ = outcome(directory)
-    assert not any("cnn" in name for name in names)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +197,7 @@ def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):
     ],
 )
 def test_images_that_the_policy_cannot_take_are_refused(make_seeing, shape, normalize, fact):
-    """Before a simulator starts, and by name."""
+    """The error names the image and comes before a simulator starts."""
     env = SimulatorsVecEnv([Restarter(make_seeing("collect-0", shape))], run_seed=1)
 
     with pytest.raises(ConfigurationError, match=fact):

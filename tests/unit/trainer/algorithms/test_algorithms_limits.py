@@ -1,6 +1,6 @@
-"""Every number that makes an algorithm fail only when it learns is refused before a simulator starts.
+"""Numbers with which an algorithm would fail only when it learns are refused before a simulator starts.
 
-The oracle is the algorithm itself: it learns a few rows with each number that is not refused.
+The test lets the algorithm itself learn a few rows with each number that is not refused.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SMALL = {
     "episodes_per_update": 1,
     "policy_kwargs": TINY,
 }
-# A number of another type is refused by the signature; each parameter takes some of these.
+# The signature refuses numbers of another type; each parameter gets some of these.
 NUMBERS = (0, -1, 1, 0.0, -0.5)
 
 
@@ -47,7 +47,10 @@ class Valid(gymnasium.Wrapper):
 
 
 def refusal_of(algorithm, members=2):
-    """Return why the algorithm is refused before it learns; let it learn, and return "", if it is not."""
+    """Return the reason for which the algorithm is refused.
+
+    If it is not refused, let it learn and return "".
+    """
     actions = entry_of(algorithm.name).actions
     kind = "Box" if spaces.Box in actions else "Discrete"
     task = MaskedTask if algorithm.name == "MaskablePPO" else FakeTask
@@ -64,7 +67,7 @@ def refusal_of(algorithm, members=2):
 
 
 def small(name, **given):
-    """Return a small algorithm; what is given replaces a small value."""
+    """Return a small algorithm; `given` replaces some of its small values."""
     entry = entry_of(name)
     usual = {key: value for key, value in SMALL.items() if key in entry.known}
     if entry.replays:
@@ -75,7 +78,7 @@ def small(name, **given):
 
 
 def every_number():
-    """Yield each algorithm with each of the numbers for each parameter of it and of its policy."""
+    """Yield each algorithm with each of the numbers for each of its parameters and its policy's."""
     for name in ALGORITHMS:
         entry = entry_of(name)
         usual = small(name).hyperparameters["policy_kwargs"]
@@ -84,10 +87,10 @@ def every_number():
             yield from (small(name, policy_kwargs=usual | {key: value}) for value in (*NUMBERS, [0], [-1]))
 
 
-@pytest.mark.filterwarnings("ignore")  # an average of no rows, a batch that divides nothing
+@pytest.mark.filterwarnings("ignore")  # a mean of no rows, a batch size that does not divide
 @for_each("algorithm", every_number)
 def test_what_is_not_refused_learns(algorithm):
-    """A division by zero after the simulators started, or an empty loop, is found before."""
+    """Otherwise a division by zero, or an empty loop, would come after the simulators have started."""
     use_threads()
     refusal_of(algorithm)
 
@@ -110,17 +113,17 @@ def test_what_is_not_refused_learns(algorithm):
     ],
 )
 def test_a_number_out_of_its_range_is_refused_with_the_range(name, given, line):
-    """The person reads the field, the value and what to write instead."""
+    """The message has the field, the value and the allowed range."""
     assert line in refusal_of(small(name, **given))
 
 
 def test_a_frequency_in_episodes_fits_one_simulator():
-    """Stable-Baselines3 allows it there."""
+    """Stable-Baselines3 allows it for one environment."""
     assert not refusal_of(small("DQN", train_freq=[1, "episode"]), members=1)
 
 
 @pytest.mark.parametrize("name", ["sb3_contrib:MaskablePPO", "sb3_contrib:RecurrentPPO"])
 def test_a_class_by_its_name_has_the_ranges_of_the_algorithm_that_it_is(name):
-    """One row has no deviation, whatever the job calls the class."""
+    """One row has no deviation, whatever name the job uses for the class."""
     with pytest.raises(ConfigurationError, match="batch_size: 1 is refused; give a number of at least 2"):
         check(Algorithm(name=name, hyperparameters={"batch_size": 1}))

@@ -1,4 +1,4 @@
-"""MaskablePPO: rows with their masks, and no action that the environment forbids."""
+"""MaskablePPO: rows keep their masks, and no forbidden action is taken."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ MASKED = [(seen, acted) for seen in ("Box", "Dict") for acted in ("Discrete", "M
 
 
 def bits(mark):
-    """Return the mask of a row: the last bits of its mark."""
+    """Return the mask of a row, which is the last bits of its mark."""
     return np.array([int(mark) >> place & 1 for place in range(FEW.n)], bool)
 
 
 def filled(kind, valid):
-    """Return a full buffer; a row's mark is its number within its member, plus 100 a member."""
+    """Return a full buffer; the mark of a row is its number within its member, plus 100 for each member."""
     rows, members = valid.shape
     buffer = kind(rows, BUFFERS[kind], FEW, "cpu", 0.8, 0.9, n_envs=members)
     for row in range(rows):
@@ -75,7 +75,10 @@ def marks_in(batch):
 @pytest.mark.parametrize("kind", OURS)
 @given(data=st.data())
 def test_each_valid_row_is_learned_from_once_with_its_mask_and_no_other(kind, data):
-    """Another mask makes another probability; a batch of one row has no deviation, so there is none."""
+    """Another mask gives another probability.
+
+    A batch of one row has no deviation, so no such batch is made.
+    """
     rows, members = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 3))
     marks = data.draw(st.lists(st.booleans(), min_size=rows * members, max_size=rows * members))
     valid = np.array(marks).reshape(rows, members)
@@ -102,7 +105,7 @@ def test_without_faults_a_rollout_is_what_sb3_contrib_computes():
 
 
 class Asked(MaskedTask):
-    """A task that notes in which step its masks are asked for, and breaks while it finds some of them."""
+    """A task that counts the requests for its masks, and breaks at some of them."""
 
     def __init__(self, *arguments, breaks_at=(), **options):
         super().__init__(*arguments, **options)
@@ -120,7 +123,7 @@ class Asked(MaskedTask):
 
 
 def with_task(member, task):
-    """Return a member whose environment is the task; a restart revives it."""
+    """Return a member whose environment is the task; a restart revives the task."""
     revive = member.restart
     member.env = task
     member.restart = lambda: (revive(), task.restart())
@@ -135,7 +138,10 @@ def task_of(kind=MaskedTask, spaces_of=NUMBERS, **options):
 
 @pytest.fixture
 def learn(make_member):
-    """Make a model in two members, the first of which is given and restarts only if it is released."""
+    """Make a model with two members.
+
+    The first has the given task and, with `held`, restarts only when it is released.
+    """
 
     def make(first, *, held=False):
         members = [with_task(make_member("collect-0", held=held), first)]
@@ -149,7 +155,7 @@ def learn(make_member):
 
 
 def test_a_broken_simulator_is_not_asked_and_its_rows_allow_everything(learn):
-    """Another thread restarts it; a method of its environment could disturb that, or wait for it."""
+    """Another thread restarts it, and a call of the environment could disturb that or wait for it."""
     model, members, env = learn(task_of(Asked, deaths=(5,)), held=True)
     masks, rows = [], []
 
@@ -172,7 +178,7 @@ def test_a_broken_simulator_is_not_asked_and_its_rows_allow_everything(learn):
 
 
 def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(learn):
-    """As if it had broken in the step: no row across the fault reaches a loss, and the others go on."""
+    """No row across the fault reaches a loss, and the other members continue, as after a fault in a step."""
     model, _, env = learn(task_of(Asked, breaks_at=(3, 9), max_steps=50))
     rows = []
 
@@ -193,7 +199,7 @@ def test_a_simulator_that_breaks_while_masks_are_asked_for_ends_its_episode(lear
 
 
 def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member):
-    """By the same question sb3-contrib asks."""
+    """sb3-contrib makes the same check."""
     answers = []
     for kind in (MaskedTask, FakeTask):
         env = SimulatorsVecEnv([Restarter(with_task(make_member(), task_of(kind)))], 1)
@@ -204,7 +210,7 @@ def test_the_vector_offers_masks_only_of_environments_that_have_them(make_member
 
 @pytest.fixture
 def run(directory, make_member, make_configuration):
-    """Train with MaskablePPO; return the exit code and the members of each kind of simulator."""
+    """Train with MaskablePPO, and return the exit code and the members of each kind of simulator."""
 
     def play(make_task, *, collectors=2, **changes):
         algorithm = {"name": "MaskablePPO", "hyperparameters": ROLLOUTS} | changes.pop("algorithm", {})
@@ -216,7 +222,7 @@ def run(directory, make_member, make_configuration):
 
         configuration = make_configuration(
             algorithm=algorithm,
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs one that is registered
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
             collectors=collectors,
             evaluation={"everySteps": 16, "episodes": 3, "confirmEpisodes": 4},
             **({"steps": 32} | changes),
@@ -227,7 +233,7 @@ def run(directory, make_member, make_configuration):
 
 
 def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, last_word):
-    """Every action of it would be allowed, which is PPO."""
+    """Without masks every action would be allowed, which is PPO."""
     code, members, _ = run(lambda: task_of(FakeTask))
 
     assert code == 2
@@ -240,7 +246,10 @@ def test_an_environment_without_masks_is_refused_before_a_simulator_starts(run, 
 
 @pytest.mark.parametrize("given", [{}, {"normalize": {}}, {"name": "sb3_contrib:MaskablePPO"}])
 def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, directory, given):
-    """The task fails at any other action. `palaestra-eval` does as they do, and so does a class by name."""
+    """The task fails at any other action.
+
+    `palaestra-eval` uses masks too, and so does an algorithm that is named by its class.
+    """
     code, _, (configuration, make_members) = run(task_of, algorithm=given)
     again = measure(configuration, directory.model, make_members, episodes=4, stream="C")
 
@@ -252,7 +261,7 @@ def test_training_evaluations_and_confirmations_take_only_allowed_actions(run, d
 
 
 def test_an_evaluation_outside_a_run_asks_for_masks_too(learn, make_member):
-    """Whoever evaluates: the policy says that it needs them."""
+    """The policy itself has the information that it needs them."""
     model, _, env = learn(task_of())
     member = with_task(make_member(), task_of(Asked))
 
@@ -263,7 +272,7 @@ def test_an_evaluation_outside_a_run_asks_for_masks_too(learn, make_member):
 
 
 def test_palaestra_eval_refuses_an_environment_without_masks_before_a_simulator_starts(run, directory):
-    """The policy would act as it never did in training."""
+    """Without masks the policy would act as it never did in training."""
     _, members, (configuration, make_members) = run(task_of)
 
     def unmasked(given):
@@ -277,7 +286,10 @@ def test_palaestra_eval_refuses_an_environment_without_masks_before_a_simulator_
 
 
 def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
-    """A simulator that does not repeat itself may forbid what it allowed; then the next episode begins."""
+    """A simulator that does not repeat itself may forbid an action that it once allowed.
+
+    The next episode then begins.
+    """
     saved = [EpisodeState(0, np.zeros(6, np.int64)), EpisodeState(4, np.array([1]))]
     env = learn(task_of())[2]
 
@@ -302,7 +314,7 @@ def test_an_episode_that_is_played_again_ends_before_a_forbidden_action(learn):
     ],
 )
 def test_what_is_no_mask_is_refused_with_what_came(run, last_word, masks, fact):
-    """Stable-Baselines3 would fail with a shape, or take a forbidden action."""
+    """Stable-Baselines3 would fail with a shape error, or take a forbidden action."""
 
     class Wrong(MaskedTask):
         def action_masks(self):
@@ -321,7 +333,7 @@ def test_what_is_no_mask_is_refused_with_what_came(run, last_word, masks, fact):
 
 @pytest.mark.parametrize("spaces_of", MASKED, ids=", ".join)
 def test_both_files_act_as_the_policy_with_masks(run, directory, spaces_of):
-    """In episodes of the task, which fails at a forbidden action, and in what the export compares."""
+    """The task fails at a forbidden action, and the check of the export compares the actions too."""
     assert run(lambda: task_of(spaces_of=spaces_of), algorithm={"normalize": {}})[0] == 0
     differences = [exporting.export(directory.path, to).largest_difference for to in exporting.FORMATS]
     policy = load_policy(directory.path)
@@ -347,7 +359,7 @@ def test_both_files_act_as_the_policy_with_masks(run, directory, spaces_of):
 
 
 def test_a_policy_with_masks_never_acts_without_them(run, directory, play, job, tmp_path):
-    """Nor does another one take masks: it would ignore them."""
+    """Other policies accept no masks, because they would ignore them."""
     assert run(task_of)[0] == 0
     seen = OBSERVATIONS["Box"].sample()
 

@@ -1,4 +1,4 @@
-"""Buffers that a job brings: prioritized replay, own returns, and what a checkpoint keeps of them."""
+"""A job's own buffers: prioritized replay, own returns, and their state in a checkpoint."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ ON_POLICY = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}}
 
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
-    """Put a module of one's own where Python finds it; return the module."""
+    """Create a user's module where Python finds it, and return the module."""
     (tmp_path / "buffer_lab.py").write_text(LAB)
     monkeypatch.syspath_prepend(tmp_path)
     yield pytest.importorskip("buffer_lab")
@@ -145,7 +145,7 @@ def lab(tmp_path, monkeypatch):
 
 @pytest.fixture
 def make(make_member):
-    """Make a model in the corridor, of which the first of two members dies at the steps `faults`."""
+    """Make a model in the corridor; the first of two members dies at the steps `faults`."""
 
     def made(algorithm, faults=()):
         env = SimulatorsVecEnv(
@@ -157,13 +157,13 @@ def make(make_member):
 
 
 def replaying(name="DQN", buffer="buffer_lab:Prioritized", **options):
-    """Return an algorithm with a replay buffer of one's own."""
+    """Return an algorithm with a user's replay buffer."""
     chosen = {"replay_buffer_class": buffer} | ({"replay_buffer_kwargs": options} if options else {})
     return Algorithm(name=name, hyperparameters=OFF_POLICY | chosen)
 
 
 def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
-    """Each row comes to its `add` alone, whatever the number of simulators; none of a fault does."""
+    """Its `add` gets each row separately, whatever the number of simulators, and no row of a fault."""
     algorithm = replaying(alpha=0.5)
     check(algorithm)
     model, _ = make(algorithm, faults=(3, 9))
@@ -175,11 +175,11 @@ def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
     assert buffer.alpha == 0.5
     assert len(buffer.added) == model.num_timesteps == buffer.size()
     assert set(buffer.added) == {1}
-    assert buffer.weights.sum() > 0  # its own sample is asked
+    assert buffer.weights.sum() > 0  # its own sample method is used
 
 
 def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
-    """It is made to store valid rows only, as one that the job names."""
+    """The buffer stores only valid rows, like one that the job names."""
     model, _ = make(Algorithm(name="buffer_lab:PrioritizedDQN", hyperparameters=OFF_POLICY), faults=(3,))
 
     model.learn(30)
@@ -189,7 +189,7 @@ def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
 
 
 def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
-    """Rows of a fault are in no batch, and its own advantages are learned from."""
+    """No batch has rows of a fault, and the buffer's own advantages are used."""
     chosen = {"rollout_buffer_class": "buffer_lab:Greedy", "rollout_buffer_kwargs": {"scale": 2.0}}
     algorithm = Algorithm(name="PPO", hyperparameters=ON_POLICY | chosen)
     check(algorithm)
@@ -205,7 +205,7 @@ def test_a_rollout_buffer_of_ones_own_returns_what_it_computes(lab, make):
 
 @pytest.mark.parametrize("buffer", ["buffer_lab:Prioritized", "buffer_lab:Stated"])
 def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, tmp_path, buffer):
-    """Arrays, tensors and numbers; or what its `state_dict` returns."""
+    """These are arrays, tensors and numbers, or the result of its `state_dict`."""
     del lab
     algorithm = replaying(buffer=buffer)
     configuration = make_configuration(algorithm=algorithm.model_dump())
@@ -228,7 +228,7 @@ def test_a_checkpoint_keeps_what_the_buffer_adds(lab, make, make_configuration, 
 
 
 def test_a_run_with_a_buffer_of_ones_own_is_saved_and_resumed(lab, play, job):
-    """From a job to its end, and on from its last checkpoint."""
+    """The run goes from the job to its end, and continues from its last checkpoint."""
     del lab
     algorithm = replaying().model_dump(exclude_unset=True)
 
@@ -268,7 +268,7 @@ REFUSED = [
 
 @for_each("name, given, fact", REFUSED)
 def test_buffers_that_cannot_be_used_are_refused_before_a_simulator_starts(lab, name, given, fact):
-    """With field, fact and remedy."""
+    """The message has field, fact and remedy."""
     del lab
     with pytest.raises(ConfigurationError) as caught:
         check(Algorithm(name=name, hyperparameters=given))
@@ -288,7 +288,7 @@ UNFIT = [
 
 @for_each("name, given, fact", UNFIT)
 def test_buffers_that_do_not_fit_are_refused_when_the_model_is_made(lab, make, name, given, fact):
-    """What depends on the environment, or on what the class has."""
+    """This depends on the environment, or on the attributes of the class."""
     del lab
     usual = OFF_POLICY if name == "DQN" else ON_POLICY
     with pytest.raises(ConfigurationError) as caught:
@@ -298,7 +298,7 @@ def test_buffers_that_do_not_fit_are_refused_when_the_model_is_made(lab, make, n
 
 
 def test_a_checkpoint_that_lost_rows_is_refused_for_a_buffer_of_ones_own(lab, make):
-    """Only its class knows which of its numbers belong to them."""
+    """Only its class knows which of its numbers belong to the lost rows."""
     del lab
     model, _ = make(replaying())
 

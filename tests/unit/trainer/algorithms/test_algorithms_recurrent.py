@@ -1,4 +1,4 @@
-"""RecurrentPPO: sequences without invalid rows, and a memory that restarts after them."""
+"""RecurrentPPO: its sequences have no invalid rows, and its memory restarts after them."""
 
 from __future__ import annotations
 
@@ -30,14 +30,17 @@ BUFFERS = {
 
 
 class States:
-    """The states of an LSTM of one unit, all equal to a row's number."""
+    """The states of an LSTM with one unit, all equal to a row's number."""
 
     def __init__(self, row, members):
         self.pi = self.vf = (torch.full((1, members, 1), float(row)),) * 2
 
 
 def filled(kind, valid, starts):
-    """Return a full buffer whose observations are the row's number within its member, plus 100 a member."""
+    """Return a full buffer.
+
+    An observation is the row's number within its member, plus 100 for each member.
+    """
     rows, members = valid.shape
     buffer = kind(rows, BUFFERS[kind], spaces.Discrete(2), (rows, 1, members, 1), "cpu", n_envs=members)
     for row in range(rows):
@@ -70,7 +73,7 @@ def drawn(batches):
 @pytest.mark.parametrize("kind", BUFFERS)
 @given(data=st.data())
 def test_each_valid_row_is_learned_from_once_and_no_other(kind, data):
-    """Whatever the size of a batch; a batch of one row has no deviation, so there is none."""
+    """This holds for every batch size. A batch of one row has no deviation, so no such batch is made."""
     rows, members = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 3))
     marks = data.draw(st.lists(st.booleans(), min_size=rows * members, max_size=rows * members))
     valid = np.array(marks).reshape(rows, members)
@@ -85,7 +88,7 @@ def test_each_valid_row_is_learned_from_once_and_no_other(kind, data):
 
 
 def test_a_sequence_begins_anew_after_invalid_rows():
-    """The state that an LSTM had in a broken simulator means nothing."""
+    """The state of an LSTM from a broken simulator has no meaning."""
     valid = np.array([[True], [True], [False], [False], [True], [True]])
     starts = np.array([[1], [0], [0], [0], [1], [0]], np.float32)
 
@@ -114,13 +117,13 @@ def model(make_member):
 
 
 def mended(rows):
-    """Return for each first valid row of the first member after an invalid one whether an episode begins."""
+    """For each valid row of the first member after an invalid one, return whether an episode begins there."""
     pairs = pairwise(rows)
     return [starts[0] for (before, _), (valid, starts) in pairs if valid[0] and not before[0]]
 
 
 def test_the_memory_restarts_with_the_first_valid_row(model):
-    """The last row of a mended simulator ends an episode, so the next one begins one."""
+    """The last row before the restart ends an episode, so the next one begins an episode."""
     rows = []
 
     def note(locals_, _):
@@ -136,7 +139,7 @@ def test_the_memory_restarts_with_the_first_valid_row(model):
 
 
 def test_an_evaluation_keeps_the_memory_of_an_episode(model, make_member):
-    """From step to step, and not from one episode to the next."""
+    """It lasts from step to step, but not from one episode to the next."""
     first, again = (evaluate(policy_of(model), make_member(), [seed]) for seed in (5, 5))
     both = evaluate(policy_of(model), make_member(), [3, 5])
 

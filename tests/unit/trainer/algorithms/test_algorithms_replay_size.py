@@ -1,4 +1,4 @@
-"""The size of a replay buffer, before it exists."""
+"""The size of a replay buffer is computed before the buffer exists."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WIDE = {"float64": spaces.Box(-1.0, 1.0, (3,), np.float64)}
 
 
 def size_of(observation, action, rows=100, steps=10_000):
-    """Return the size of a buffer of that many rows."""
+    """Return the size of a buffer with that many rows."""
     algorithm = Algorithm(name="SAC", hyperparameters={"buffer_size": rows})
     return replay_size(algorithm, observation, action, steps)
 
@@ -25,7 +25,7 @@ def size_of(observation, action, rows=100, steps=10_000):
 @pytest.mark.parametrize("action", (ACTIONS | WIDE).values(), ids=ACTIONS | WIDE)
 @pytest.mark.parametrize("observation", (SUPPORTED | WIDE).values(), ids=SUPPORTED | WIDE)
 def test_the_size_is_that_of_the_buffer_itself(observation, action):
-    """Of every kind of space; a computation of our own could drift away from the buffer."""
+    """This is tested for every kind of space, because a separate computation could differ from the buffer."""
     cls = ValidDictReplayBuffer if isinstance(observation, spaces.Dict) else ValidReplayBuffer
     buffer: BaseBuffer = cls(100, observation, action, device="cpu")
 
@@ -35,7 +35,7 @@ def test_the_size_is_that_of_the_buffer_itself(observation, action):
 
 
 def test_images_with_stable_baselines3_s_default_need_18_gb():
-    """The case for which all this exists."""
+    """This is the case for which the computation exists."""
     image = spaces.Box(0, 255, (48, 64, 3), np.uint8)
 
     size = size_of(image, spaces.Box(-1, 1, (2,), np.float32), rows=1_000_000, steps=2_000_000)
@@ -44,7 +44,7 @@ def test_images_with_stable_baselines3_s_default_need_18_gb():
 
 
 def test_rows_that_the_run_cannot_fill_need_no_memory():
-    """NumPy allocates them when they are written."""
+    """NumPy allocates rows only when they are written."""
     assert size_of(spaces.Discrete(2), spaces.Discrete(2), rows=1_000_000, steps=50).rows == 50
 
 
@@ -57,14 +57,14 @@ def test_algorithms_without_replay_and_refused_spaces_have_no_size():
 
 @pytest.mark.parametrize(("every_steps", "bytes_"), [(10, 100 + 3 * 10), (100, 400), (5000, 400)])
 def test_checkpoints_share_rows_that_did_not_change(every_steps, bytes_):
-    """Three are kept, and a fourth exists while it is written."""
+    """Three checkpoints are kept, and a fourth exists while it is written."""
     assert ReplaySize(rows=100, row_bytes=1).disk_bytes(every_steps, keep=3) == bytes_
 
 
 @pytest.mark.parametrize("every_steps", [1, 7, 40, 1000])
 @pytest.mark.parametrize("disk", [3, 50, 100, 400])
 def test_the_largest_buffer_fits_and_one_row_more_does_not(every_steps, disk):
-    """On the disk; memory is a division."""
+    """This holds for the disk; the limit by memory is a division."""
     most = ReplaySize(rows=1, row_bytes=1).most_rows(10_000, disk, every_steps, keep=3)
 
     assert ReplaySize(rows=most, row_bytes=1).disk_bytes(every_steps, 3) <= disk

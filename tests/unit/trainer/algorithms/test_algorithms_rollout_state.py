@@ -1,4 +1,4 @@
-"""What an algorithm changes while it collects is what a checkpoint keeps."""
+"""A checkpoint keeps everything that an algorithm changes while it collects."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ HYPERPARAMETERS = {
     "RecurrentPPO": ON_POLICY | {"policy_kwargs": {"net_arch": [4], "lstm_hidden_size": 4}},
     "REINFORCE": {"episodes_per_update": 2},
 }
-# `checkpoint.state` and `checkpoint.experience` keep these of every algorithm. A rollout begins with an empty
-# rollout buffer.
+# `checkpoint.state` and `checkpoint.experience` keep these for every algorithm. A rollout begins with an
+# empty rollout buffer.
 KEPT = {
     "num_timesteps", "_episode_num", "_current_progress_remaining", "_last_obs", "_last_original_obs",
     "_last_episode_starts", "ep_info_buffer", "ep_success_buffer", "replay_buffer", "rollout_buffer",
@@ -60,7 +60,7 @@ def print_of(value):
 
 
 def parts_of(value):
-    """Return the parts of a value by name; None if it has none."""
+    """Return the parts of a value by name, or None if it has no parts."""
     if isinstance(value, nn.Module):
         return value.state_dict()
     if isinstance(value, ActionNoise):
@@ -69,7 +69,7 @@ def parts_of(value):
 
 
 class Changes(BaseCallback):
-    """Notes the attributes and the tensors of the policy that change between start and end of rollouts."""
+    """Record the attributes and the policy's tensors that change between start and end of a rollout."""
 
     def __init__(self):
         super().__init__()
@@ -116,13 +116,13 @@ class Member:
         self.env = env
 
     def due(self, episodes=1):
-        """Return nothing: it needs no recycling."""
+        """Return None, because it needs no recycling."""
         del episodes
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
-    """A release of Stable-Baselines3 that adds state fails here, and not in a resumed run."""
+    """If a release of Stable-Baselines3 adds state, this test fails, and not a resumed run."""
     model, changes = model_of(name), Changes()
 
     model.learn(80, changes)
@@ -139,7 +139,7 @@ def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_has_an_entry(name):
-    """Its own, or that of the class that it extends."""
+    """The entry is its own, or that of a class that it extends."""
     assert any(cls in BESIDE for cls in ALGORITHMS[name].original.__mro__)
 
 

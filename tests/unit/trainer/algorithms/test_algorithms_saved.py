@@ -1,7 +1,7 @@
-"""A saved model holds names and numbers, so the image's Python and a laptop's read the files of each other.
+"""A saved model holds names and numbers, so the image's Python and a laptop's can read each other's files.
 
-Byte code of another Python raises SystemError or ends the process; that of this Python runs. So these tests
-look into the file.
+Bytecode of another Python raises SystemError or ends the process, but that of this Python runs. These tests
+therefore check the content of the file.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
 SMALL = {
     "buffer_size": 40, "learning_starts": 4, "batch_size": 4, "n_steps": 8, "episodes_per_update": 1
 }  # fmt: skip
-# Without this package, plain Stable-Baselines3 finds everything that a model names in these.
+# Plain Stable-Baselines3, without this package, finds every name of a model in these modules.
 PLAIN = {
     "_codecs", "builtins", "collections", "functools", "gymnasium", "numpy", "sb3_contrib",
     "stable_baselines3", "torch",
@@ -41,7 +41,7 @@ PLAIN = {
 
 @pytest.fixture
 def save(make_member, tmp_path):
-    """Save a model that has learned for some steps; return its file."""
+    """Save a model that has learned for some steps, and return its file."""
 
     def made(name, seen="Box", options=None, **more):
         entry = ALGORITHMS[name]
@@ -62,20 +62,20 @@ def save(make_member, tmp_path):
 
 
 class Named(pickle.Unpickler):
-    """Unpickles, and keeps the module and the name of everything that a pickle names."""
+    """An unpickler that records the module and the name of everything that a pickle refers to."""
 
     def __init__(self, text):
         super().__init__(io.BytesIO(text))
         self.names = set()
 
     def find_class(self, module, name):
-        """Return what is named."""
+        """Record a name, and return its object."""
         self.names.add((module, name))
         return super().find_class(module, name)
 
 
 def named_in(model):
-    """Return what each pickled value of a model's file names, by attribute."""
+    """Return the names in each pickled value of a model's file, by attribute."""
     with zipfile.ZipFile(model) as archive:
         data = json.loads(archive.read("data"))
     found = {}
@@ -90,7 +90,7 @@ def named_in(model):
 @pytest.mark.parametrize("schedules", SCHEDULES)
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_no_value_is_byte_code_and_none_needs_this_package(save, name, schedules):
-    """With a schedule wherever the algorithm takes one, classes of PyTorch's, and noise."""
+    """The model has a schedule wherever the algorithm accepts one, classes of PyTorch, and noise."""
     named = named_in(save(name, options=SCHEDULES[schedules]))
 
     strange = {
@@ -110,7 +110,7 @@ SEEING = [
 
 @pytest.mark.parametrize("name", SEEING)
 def test_the_small_network_is_in_the_file_by_its_name(save, name):
-    """Where this package is installed, Stable-Baselines3 loads it."""
+    """If this package is installed, Stable-Baselines3 loads it."""
     named = named_in(save(name, "image", cnn="small"))
 
     assert (small_cnn.__name__, "SmallCnn") in named["policy_kwargs"]

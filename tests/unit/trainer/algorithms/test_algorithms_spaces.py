@@ -1,6 +1,6 @@
-"""Spaces that Stable-Baselines3 would take wrongly are refused before a simulator starts.
+"""Spaces that Stable-Baselines3 would mishandle are refused before a simulator starts.
 
-Its own checker of environments refuses them too, or they ended in a traceback. The grid trains in every space
+Its own checker refuses them too, or they caused a traceback. The grid of algorithms trains in every space
 that works.
 """
 
@@ -58,7 +58,7 @@ CASES = {f"observation: {name}": (seen, FEW, told) for name, (seen, told) in OBS
 
 @pytest.fixture
 def members(make_member):
-    """Make members of a task with these spaces, whose logs say whether anybody has started them."""
+    """Make members of a task with these spaces; their logs show whether they were started."""
 
     def make(names, seen, acted):
         made = [make_member(name) for name in names]
@@ -71,7 +71,7 @@ def members(make_member):
 
 @pytest.fixture
 def play(members, make_configuration, tmp_path):
-    """Play an attempt in such a task; return its end and the members."""
+    """Run an attempt in such a task, and return its end and the members."""
 
     def run(seen, acted):
         configuration = make_configuration(algorithm={"name": "PPO", "hyperparameters": {"n_steps": 16}})
@@ -93,7 +93,7 @@ def play(members, make_configuration, tmp_path):
 
 @pytest.mark.parametrize(("seen", "acted", "told"), CASES.values(), ids=CASES)
 def test_a_run_refuses_it_before_a_simulator_starts(play, seen, acted, told):
-    """With exit code 2; the message names the space and the remedy."""
+    """The exit code is 2, and the message has the space and the remedy."""
     end, members = play(seen, acted)
 
     assert end.code == 2
@@ -103,7 +103,7 @@ def test_a_run_refuses_it_before_a_simulator_starts(play, seen, acted, told):
 
 @pytest.mark.parametrize(("seen", "acted", "told"), CASES.values(), ids=CASES)
 def test_a_vector_for_a_loop_of_one_s_own_refuses_it_too(members, seen, acted, told):
-    """Stable-Baselines3 itself would send actions that are not in the space."""
+    """Stable-Baselines3 itself would send actions that are outside the space."""
     [member] = members(["collect-0"], seen, acted)
 
     with pytest.raises(ConfigurationError, match=told):

@@ -1,4 +1,4 @@
-"""The docstring of the environment is a data sheet, and the data sheet is true."""
+"""The docstring of the environment is a data sheet, and these tests compare it with the code."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Row = dict[str, str]
 
 
 def tables() -> Iterator[list[Row]]:
-    """Yield the tables of the docstring: a dictionary a row, by column."""
+    """Yield the tables of the docstring; each row is a dictionary by column."""
     lines = [line.strip() for line in SHEET.splitlines()]
     for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
         if is_table:
@@ -42,7 +42,7 @@ MOVEMENTS, TWIST, OBSERVATION, REWARD = tables()
 
 
 def bounds(part: str, column: str) -> list[float]:
-    """Return what the sheet says about one part: a bound for each of its numbers."""
+    """Return a column of the sheet for one part: a bound for each of its numbers."""
     numbers: dict[int, float] = {}
     for row in OBSERVATION:
         if row["part"] == part:
@@ -56,12 +56,12 @@ CHOICES = [choice for size in range(1, len(PARTS) + 1) for choice in itertools.p
 
 
 def test_the_sheet_knows_the_parts_in_their_order():
-    """No part is undocumented, none is documented that went away."""
+    """Every part is documented, and no removed part is left."""
     assert list(dict.fromkeys(row["part"] for row in OBSERVATION)) == list(PARTS)
 
 
 def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
-    """Length, order and bounds, for all the ways to choose and order parts."""
+    """Length, order and bounds are compared for all selections and orders of parts."""
     robot, scene = fake_arena()
     for choice in CHOICES:
         space = MoveToTargetEnv(robot, scene, MoveToTargetOptions(observe=choice)).observation_space
@@ -73,7 +73,7 @@ def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
 
 
 def test_movements_are_on_the_sheet_with_their_speeds():
-    """A row is an action by its number."""
+    """The number of a row is the number of its action."""
     on_the_sheet = [
         (int(action), name, (float(forward), float(left), float(turning)))
         for action, name, forward, left, turning in (row.values() for row in MOVEMENTS)
@@ -83,7 +83,7 @@ def test_movements_are_on_the_sheet_with_their_speeds():
 
 
 def test_the_continuous_action_is_on_the_sheet_with_its_units():
-    """1 means what the unit column says."""
+    """The unit column gives the meaning of 1."""
     space = MoveToTargetEnv(*fake_arena(), MoveToTargetOptions(actions="continuous")).action_space
 
     assert isinstance(space, spaces.Box)
@@ -93,7 +93,7 @@ def test_the_continuous_action_is_on_the_sheet_with_its_units():
 
 
 def test_rewards_are_on_the_sheet_with_their_weights():
-    """An empty cell is a term that this reward does not have."""
+    """An empty cell stands for a term that this reward lacks."""
     assert [row["term"] for row in REWARD] == list(TERMS)
     for reward, weights in WEIGHTS.items():
         assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
@@ -105,7 +105,7 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     outcome=st.sampled_from(EpisodeOutcome),
 )
 def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
-    """A weight is chosen by what a term can be; a step drives a tenth of a meter."""
+    """A weight depends on the range of its term; the robot drives a tenth of a meter per step."""
     step = Transition(before_m=1.0, after_m=1.0 - driven_m, nearest_m=nearest_m, outcome=outcome)
 
     for row in REWARD:
@@ -116,14 +116,14 @@ def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
 
 @pytest.mark.parametrize("distance", [SENSOR_RANGE_M[0], MARGIN_M])
 def test_the_range_of_proximity_is_on_the_sheet(distance):
-    """From where on it costs, and where it costs most."""
+    """The sheet has the distances at which the cost begins and at which it is greatest."""
     (row,) = (row for row in REWARD if row["term"] == "proximity")
 
     assert f"{distance:.2f}" in row["is"]
 
 
 def test_the_example_chooses_the_movements_that_the_sheet_says():
-    """The first five: a Robotino need not turn."""
+    """They are the first five, because a Robotino need not turn."""
     job = yaml.safe_load(EXAMPLE.read_text())
     chosen = job["spec"]["trainer"]["environment"]["options"]["movements"]
 
@@ -133,11 +133,11 @@ def test_the_example_chooses_the_movements_that_the_sheet_says():
 
 @pytest.mark.parametrize("constant", [f"{REACHED_M:.2f} m", f"{STANDING_M_S:.2f} m/s"])
 def test_the_task_is_on_the_sheet_with_its_numbers(constant):
-    """What counts as standing on the target is not hidden in the code."""
+    """The definition of standing on the target must not be hidden in the code."""
     assert constant in SHEET
 
 
 @pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe", "time_up"])
 def test_options_are_on_the_sheet(word):
-    """Where they act."""
+    """They are described where they take effect."""
     assert f"`{word}`" in SHEET

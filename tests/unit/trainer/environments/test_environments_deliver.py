@@ -1,4 +1,4 @@
-"""Three targets in turn, in the world of one."""
+"""Three targets in turn, in the world with one target."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def empty():
 
 
 def play(env, seed):
-    """Drive straight from target to target; return the rows of the episode."""
+    """Drive straight from target to target, and return the rows of the episode."""
     env.reset(seed=seed)
     rows = []
     while not rows or not (rows[-1][2] or rows[-1][3]):
@@ -37,19 +37,19 @@ def play(env, seed):
 
 
 def test_gymnasium_has_nothing_to_object_to():
-    """Seeds, spaces, types and determinism."""
+    """It checks seeds, spaces, types and determinism."""
     check_env(make_delivering(*fake_arena()), skip_render_check=True)
 
 
 def test_the_environment_is_made_by_name():
-    """After an import of the package."""
+    """This works after an import of the package."""
     env = gymnasium.make("Deliver-v0", simulator=fake_arena, targets=2)
 
     assert isinstance(env.unwrapped, DeliverEnv)
 
 
 def test_three_targets_are_delivered_before_the_episode_ends(empty):
-    """Each is paid; only the last is a success."""
+    """Each is rewarded, but only the last is a success."""
     env, _ = empty
 
     rows = play(env, seed=4)
@@ -61,7 +61,7 @@ def test_three_targets_are_delivered_before_the_episode_ends(empty):
 
 
 def test_the_mark_moves_to_a_target_far_from_the_last(empty):
-    """So each of them is a task."""
+    """Otherwise the next target would not be a task."""
     env, scene = empty
     env.reset(seed=4)
     marks, over = [scene.target], False
@@ -76,7 +76,7 @@ def test_the_mark_moves_to_a_target_far_from_the_last(empty):
 
 
 def test_what_is_left_is_observed(empty):
-    """The last number of an observation: 1, 2/3, 1/3."""
+    """The last number of an observation is 1, 2/3 or 1/3."""
     env, _ = empty
 
     left = [round(float(row[0][-1]), 3) for row in play(env, seed=4)]
@@ -86,7 +86,7 @@ def test_what_is_left_is_observed(empty):
 
 
 def test_the_observation_after_a_delivery_shows_the_next_target(empty):
-    """The robot stands on the old one."""
+    """The robot still stands on the old one."""
     env, _ = empty
     env.reset(seed=4)
 
@@ -99,6 +99,6 @@ def test_the_observation_after_a_delivery_shows_the_next_target(empty):
 
 
 def test_no_targets_are_refused():
-    """An episode without one could not succeed."""
+    """An episode without targets could not succeed."""
     with pytest.raises(ConfigurationError, match="targets: 0 are too few"):
         make_delivering(*fake_arena(), targets=0)

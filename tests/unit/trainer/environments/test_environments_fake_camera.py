@@ -1,4 +1,4 @@
-"""What the fake's cameras see, by hand-made geometry; and that they are those of the shipped world."""
+"""The images of the fake's cameras, checked with geometry by hand; the cameras equal those of the world."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MIDDLE = fake_camera.WIDTH // 2
 
 @pytest.fixture
 def look():
-    """`look(pose, target)`: the color and the depth image, with cylinders if wanted."""
+    """`look(pose, target)` returns the color and the depth image, with cylinders if wanted."""
     robot, scene = fake_seeing()
     robot.use_cameras(color=True, depth=True)
 
@@ -42,7 +42,7 @@ def rows(colors, color):
 
 
 def test_a_pole_straight_ahead_is_in_the_middle_at_its_distance(look):
-    """From the camera to its front; it stands out over the wall."""
+    """The distance is from the camera to its front; it is higher than the wall."""
     colors, depths = look(Pose(0.0, 0.0, 0.0), (1.0, 0.0))
 
     seen = columns(colors, POLE)
@@ -53,7 +53,7 @@ def test_a_pole_straight_ahead_is_in_the_middle_at_its_distance(look):
 
 @pytest.mark.parametrize(("left", "heading_rad"), [(0.3, 0.0), (0.0, -0.3)])
 def test_what_is_on_the_left_is_left_in_the_image(look, left, heading_rad):
-    """By its place, and by a turn to the right."""
+    """This is tested with its position and with a turn to the right."""
     colors, _ = look(Pose(0.0, 0.0, heading_rad), (1.0, left))
 
     assert len(columns(colors, POLE)) > 0
@@ -61,14 +61,14 @@ def test_what_is_on_the_left_is_left_in_the_image(look, left, heading_rad):
 
 
 def test_the_pole_fills_more_of_the_image_as_it_comes_nearer(look):
-    """A policy sees how far it is."""
+    """A policy can see the distance."""
     widths = [len(columns(look(Pose(0.0, 0.0, 0.0), (x, 0.0))[0], POLE)) for x in (1.6, 0.8, 0.5)]
 
     assert widths == sorted(set(widths))
 
 
 def test_the_pole_leaves_the_image_above_and_below_when_it_is_reached(look):
-    """At 0.45 m neither its top nor its foot is in the picture."""
+    """At 0.45 m its top and its foot are outside the picture."""
     colors, _ = look(Pose(0.0, 0.0, 0.0), (0.45, 0.0))
 
     assert len(rows(colors, POLE)) == fake_camera.HEIGHT
@@ -83,7 +83,7 @@ def test_a_pole_beside_or_behind_the_robot_is_not_seen(look):
 
 
 def test_a_cylinder_hides_what_is_behind_it(look):
-    """Except for what is above it, of the pole."""
+    """The upper part of the pole stays visible above it."""
     colors, depths = look(Pose(0.0, 0.8, 0.0), (1.6, 0.8), cylinders=True)
 
     assert tuple(colors[24, MIDDLE]) == CYLINDER
@@ -101,7 +101,7 @@ def test_walls_hide_the_floor_behind_them_and_the_sky_is_infinitely_far(look):
 
 
 def test_a_reset_takes_the_cylinders_away_again(look):
-    """As in the world, whose file has them under the floor."""
+    """The world file has them under the floor."""
     look(Pose(0.0, 0.8, 0.0), (1.6, 0.8), cylinders=True)
 
     colors, _ = look(Pose(0.0, 0.8, 0.0), (1.6, 0.8))
@@ -110,7 +110,7 @@ def test_a_reset_takes_the_cylinders_away_again(look):
 
 
 def test_the_cameras_are_those_of_the_shipped_world():
-    """A policy that learned on the fake meets the same pole from the same place."""
+    """A policy that learned on the fake then sees the same pole from the same position."""
     nodes = list(parse(builtin("seeing")).walk())
     (camera,) = [node for node in nodes if node.type_name == "Camera"]
     (depth_camera,) = [node for node in nodes if node.type_name == "RangeFinder"]

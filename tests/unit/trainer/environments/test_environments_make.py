@@ -1,4 +1,4 @@
-"""An environment of one's own: what it gets, and what it is refused for."""
+"""A user's own environment: its arguments, and the reasons to refuse it."""
 
 # ruff: noqa: ARG002 - gymnasium names the arguments of its methods
 
@@ -23,7 +23,7 @@ PAIR = spaces.Dict({"a": spaces.Discrete(2), "image": spaces.Box(0, 255, (36, 36
 
 
 class Hall(gymnasium.Env):
-    """A hall that keeps what it was given, and returns what its options say."""
+    """A hall that stores its arguments, and returns the values of its class attributes."""
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)
@@ -35,22 +35,22 @@ class Hall(gymnasium.Env):
         self.given = {"robot": robot, "scene": scene, "size": size}
 
     def observe(self):
-        """Return what is seen."""
+        """Return the observation."""
         return np.array(self.seen, self.dtype)
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         super().reset(seed=seed)
         return self.observe(), {}
 
     def step(self, action):
-        """Go on."""
+        """Take a step."""
         return self.observe(), self.reward, False, False, {}
 
 
 @pytest.fixture
 def register():
-    """Register a class under `Hall-v0`; it is forgotten at the end."""
+    """Register a class under `Hall-v0`, and remove it at the end."""
 
     def as_hall(creator, **options):
         gymnasium.register(id=NAME, entry_point=creator, **options)
@@ -61,7 +61,7 @@ def register():
 
 @pytest.fixture
 def made(register):
-    """Register a class and make it, as a run does."""
+    """Register a class, and make the environment as a run does."""
 
     def make(creator, registration=(), **task):
         register(creator, **dict(registration))
@@ -71,14 +71,14 @@ def made(register):
 
 
 def refused(made, creator, **task):
-    """Return the message of the refusal to make it."""
+    """Return the message of the refusal."""
     with pytest.raises(ConfigurationError) as refusal:
         made(creator, **task)
     return str(refusal.value)
 
 
 def test_an_environment_without_reward_works(made):
-    """The field has a default; only the arena's environments know what it means."""
+    """The field has a default; only the arena's environments give it a meaning."""
     env = made(Hall, options={"size": 6.0})
 
     assert env.unwrapped.given["size"] == 6.0
@@ -87,7 +87,7 @@ def test_an_environment_without_reward_works(made):
 
 
 def test_an_environment_gets_what_its_signature_accepts(made):
-    """Of robot, scene and reward."""
+    """The choice is among robot, scene and reward."""
 
     class OnlyRobot(Hall):
         def __init__(self, robot, reward):
@@ -97,7 +97,7 @@ def test_an_environment_gets_what_its_signature_accepts(made):
 
 
 def test_an_environment_with_any_keyword_gets_all(made):
-    """It hands them on, perhaps to a base class."""
+    """It may pass them on to a base class."""
 
     class Anything(Hall):
         def __init__(self, **given):
@@ -107,7 +107,7 @@ def test_an_environment_with_any_keyword_gets_all(made):
 
 
 def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
-    """It would train beside the simulators, on nothing."""
+    """It would train without the simulators."""
 
     class Alone(Hall):
         def __init__(self, size=1.0):
@@ -117,12 +117,12 @@ def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
 
 
 def test_a_reward_that_nothing_accepts_is_refused(made):
-    """Sparse was asked for, and would silently be something else."""
+    """Sparse was requested, and the reward would silently be another one."""
     assert "environment.reward: Hall-v0 has no argument reward" in refused(made, Hall, reward="Sparse")
 
 
 def test_all_options_that_do_not_fit_are_reported_at_once(made):
-    """With the nearest name."""
+    """Each has the nearest valid name."""
 
     class Needy(Hall):
         def __init__(self, robot, scene, width):
@@ -139,7 +139,7 @@ def test_all_options_that_do_not_fit_are_reported_at_once(made):
 
 @pytest.mark.parametrize("error", [ValueError, RuntimeError, AttributeError, OSError])
 def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configuration(made, error):
-    """Trying again would raise again, whatever the error is; its author needs the line."""
+    """A retry would raise the same error, whatever it is; the author needs the line."""
 
     class Strict(Hall):
         def __init__(self, robot, scene):
@@ -151,7 +151,7 @@ def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configurati
 
 
 def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configuration(made):
-    """A constructor may ask a robot that is connected; another simulator may answer."""
+    """A constructor may use a connected robot, and another simulator may respond."""
 
     class Asking(Hall):
         def __init__(self, robot, scene):
@@ -166,7 +166,7 @@ def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configurat
     [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
 )
 def test_an_unknown_environment_is_refused(name, fact):
-    """Whether its name or its module is wrong."""
+    """Either the name or the module is wrong."""
     with pytest.raises(ConfigurationError, match=f"environment.id: {name} {fact}"):
         make_environment(Environment(id=name), *fake_arena())
 
@@ -177,14 +177,14 @@ def test_a_registration_of_nothing_is_refused(made):
 
 
 def test_a_name_without_version_means_the_newest(register):
-    """As in gymnasium.make."""
+    """gymnasium.make does the same."""
     register(Hall)
 
     assert keywords(Environment(id="Hall", options={"size": 2.0})) == {"size": 2.0}
 
 
 def test_gymnasium_s_own_options_are_its_own(made):
-    """A time limit belongs to no signature."""
+    """A time limit is not an argument of the class."""
     env = made(Hall, options={"max_episode_steps": 2})
     env.reset(seed=1)
 
@@ -192,39 +192,39 @@ def test_gymnasium_s_own_options_are_its_own(made):
 
 
 class NoSeed(Hall):
-    """A hall of the time before seeds."""
+    """A hall with the old `reset` without a seed."""
 
     def reset(self):
-        """Begin."""
+        """Begin an episode."""
         return self.observe()
 
 
 class OldStep(Hall):
-    """A hall of the time before truncation."""
+    """A hall with the old `step` without truncation."""
 
     def step(self, action):
-        """Go on."""
+        """Take a step."""
         return self.observe(), 1.0, False, {}
 
 
 class NoInfo(Hall):
-    """A hall that returns the observation alone."""
+    """A hall whose `reset` returns only the observation."""
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         return self.observe()
 
 
 class NumberAsEnd(Hall):
-    """A hall whose episode ends by a number."""
+    """A hall whose `terminated` is a number."""
 
     def step(self, action):
-        """Go on."""
+        """Take a step."""
         return self.observe(), 1.0, 0.0, False, {}
 
 
 class NoSpace(Hall):
-    """A hall without observations."""
+    """A hall without an observation space."""
 
     observation_space = None
 
@@ -239,24 +239,24 @@ class Listed(Hall):
     """A hall whose observation is a list."""
 
     def observe(self):
-        """Return it."""
+        """Return the list."""
         return [0.0, 0.0]
 
 
 class Double(Hall):
-    """A hall that observes in double precision."""
+    """A hall with observations in double precision."""
 
     dtype = np.float64
 
 
 class Outside(Hall):
-    """A hall that observes what its space excludes."""
+    """A hall with an observation outside its space."""
 
     seen = (0.0, 1.5)
 
 
 class TextReward(Hall):
-    """A hall that pays in words."""
+    """A hall whose reward is text."""
 
     reward = "much"
 
@@ -279,7 +279,7 @@ class TextReward(Hall):
 )
 @pytest.mark.parametrize("limit", [None, 10])
 def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator, facts, limit):
-    """With what was expected and what came; a time limit of gymnasium's unpacks a step before."""
+    """The message has the expected and the actual value; gymnasium's time limit unpacks the step first."""
 
     def first_step():
         env = made(creator, registration={"max_episode_steps": limit})
@@ -313,7 +313,7 @@ LATER = [
 @pytest.mark.parametrize("limit", [None, 10])
 @pytest.mark.parametrize(("answer", "fact"), [row[1:] for row in LATER], ids=[row[0] for row in LATER])
 def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, answer, fact, limit):
-    """It was an error of a tensor, of numpy or of nothing at all, a thousand steps after the run began."""
+    """Before, the error came from a tensor, from NumPy or not at all, a thousand steps after the start."""
 
     class Later(Hall):
         steps = resets = 0
@@ -337,7 +337,7 @@ def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, 
 
 
 def test_a_later_reset_that_breaks_the_contract_is_refused(made):
-    """A reset that forgets its info in one of two branches is the commonest."""
+    """The most common case is a reset that forgets its info in one of two branches."""
 
     class Later(Hall):
         resets = 0
@@ -355,7 +355,7 @@ def test_a_later_reset_that_breaks_the_contract_is_refused(made):
 
 
 def test_a_wrapper_of_the_registration_is_checked_too(made):
-    """What it makes of a right observation may be wrong."""
+    """It may turn a valid observation into an invalid one."""
 
     class Stretched(gymnasium.ObservationWrapper):
         def observation(self, observation):
@@ -383,7 +383,7 @@ def test_numbers_that_are_not_finite_are_left_to_the_learner(made, number):
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, number):
-    """Its message names the key; gymnasium's does not."""
+    """The learner's message names the key, and gymnasium's does not."""
 
     class Divided(Hall):
         observation_space = spaces.Dict({"a": Hall.observation_space})
@@ -398,7 +398,7 @@ def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, num
 
 
 def test_a_simulator_s_fault_passes(made):
-    """It is not the environment's; the first reset is checked once it succeeds."""
+    """The environment did not cause it; the first successful reset is checked."""
 
     class Faulty(Hall):
         tries = 0
@@ -432,5 +432,5 @@ def test_a_simulator_s_fault_passes(made):
     ],
 )
 def test_a_mismatch_is_described_in_words(space, observation, fact):
-    """The result is empty if nothing differs."""
+    """The result is empty if there is no difference."""
     assert mismatch(space, observation) == fact

@@ -1,4 +1,4 @@
-"""What an episode is: how it begins, what a step brings, how it ends."""
+"""An episode: its beginning, its steps and its end."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def play(env: MoveToTargetEnv, episode, movements):
 
 
 def test_the_robot_has_to_stand_on_the_target_not_to_cross_it(make_env):
-    """Within 0.20 m, and slower than 0.05 m/s, which takes a step of STOP."""
+    """It must be within 0.20 m and slower than 0.05 m/s, which takes a step of STOP."""
     env = make_env()
 
     steps = play(env, BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP])
@@ -49,7 +49,7 @@ def test_standing_beside_the_target_is_not_enough(make_env):
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """The robot can not bump its way along a wall."""
+    """The robot must not bump its way along a wall."""
     env = make_env()
     env.reset(seed=3, options=BEFORE_A_WALL)
 
@@ -77,7 +77,7 @@ TERMINATED, TRUNCATED = (True, False), (False, True)
 def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_the_reward_says(
     make_env, options, end
 ):
-    """Sparse prices giving up: a value estimated beyond that step would be paid on top of the price."""
+    """Sparse sets a price for giving up; a value that is estimated beyond that step would be added to it."""
     steps = play(make_env(max_steps=3, **options), IN_THE_OPEN, [STOP] * 3)
 
     assert [step[2:4] for step in steps] == [(False, False), (False, False), end]
@@ -86,7 +86,7 @@ def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_t
 
 
 def test_reaching_the_target_with_the_last_step_counts(make_env):
-    """The robot had that long."""
+    """The robot had the whole time."""
     steps = play(make_env(max_steps=3), BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP])
 
     assert steps[-1][4]["is_success"]
@@ -94,13 +94,13 @@ def test_reaching_the_target_with_the_last_step_counts(make_env):
 
 
 def test_the_reward_is_the_sum_of_the_terms_it_names(make_env):
-    """What TensorBoard shows by name is what was learned from."""
+    """TensorBoard shows the terms by name, and they must add up to the reward."""
     for _, reward, _, _, info in play(make_env(), BESIDE_THE_TARGET, [FORWARD, FORWARD, STOP]):
         assert reward == pytest.approx(sum(info["reward_terms"].values()))
 
 
 def test_dense_pays_for_progress_and_sparse_does_not(make_env):
-    """The same step, two ways to learn from it."""
+    """The same step is rewarded in two ways."""
     rewards = {
         name: play(make_env(reward=name), IN_THE_OPEN, [FORWARD, FORWARD])[-1][1]
         for name in ("Dense", "Sparse")
@@ -112,7 +112,7 @@ def test_dense_pays_for_progress_and_sparse_does_not(make_env):
 
 @given(seed=st.integers(0, 2**31 - 1))
 def test_a_seed_decides_the_whole_episode(seed):
-    """A faulted evaluation can be played again; two simulators can play the same."""
+    """A faulted evaluation can be repeated, and two simulators can run the same episode."""
     one, other = MoveToTargetEnv(*fake_arena()), MoveToTargetEnv(*fake_arena())
     other.reset(seed=1)
     other.step(FORWARD)
@@ -125,7 +125,7 @@ def test_a_seed_decides_the_whole_episode(seed):
 
 
 def test_without_a_seed_the_next_episode_is_another_one(make_env):
-    """Still decided by the first seed, as gymnasium has it."""
+    """As in gymnasium, the first seed still determines it."""
     runs = []
     for _ in range(2):
         env = make_env()
@@ -137,7 +137,7 @@ def test_without_a_seed_the_next_episode_is_another_one(make_env):
 
 
 def test_start_and_target_can_be_chosen(make_env):
-    """For a demonstration, a regression, or the one case that fails."""
+    """This is for a demonstration, a regression test, or one failing case."""
     env = make_env()
 
     observation, info = env.reset(options={"start": (0.0, -1.0, math.pi / 2), "target": (0.0, 1.0)})
@@ -148,13 +148,13 @@ def test_start_and_target_can_be_chosen(make_env):
 
 
 def test_an_impossible_start_is_refused(make_env):
-    """Inside a cylinder nothing can be learned."""
+    """Nothing can be learned inside a cylinder."""
     with pytest.raises(ConfigurationError, match="start"):
         make_env().reset(options={"start": (0.8, 0.8, 0.0)})
 
 
 def test_an_episode_begins_at_rest_after_one_that_was_cut_short(make_env):
-    """No velocity is inherited, neither by the robot nor by the observation."""
+    """Neither the robot nor the observation keeps a velocity."""
     env = make_env()
     play(env, IN_THE_OPEN, [FORWARD] * 3)
 
@@ -167,7 +167,7 @@ def test_an_episode_begins_at_rest_after_one_that_was_cut_short(make_env):
 
 
 def test_movements_are_the_ones_that_were_chosen(make_env):
-    """Action 1 is the second of them, whatever its number in the enumeration."""
+    """Action 1 is the second chosen movement, whatever its number in the enumeration is."""
     env = make_env(movements=["STOP", "BACKWARD"])
 
     play(env, IN_THE_OPEN, [1, 1])
@@ -177,7 +177,7 @@ def test_movements_are_the_ones_that_were_chosen(make_env):
 
 
 def test_a_continuous_action_is_a_share_of_the_greatest_velocity(make_env):
-    """Half of 0.5 m/s to the left, and what is beyond the bounds is cut off."""
+    """The example is half of 0.5 m/s to the left; values beyond the bounds are clipped."""
     env = make_env(actions="continuous")
 
     play(env, IN_THE_OPEN, [np.array([0.0, 0.5, 0.0])] * 2)
@@ -189,7 +189,7 @@ def test_a_continuous_action_is_a_share_of_the_greatest_velocity(make_env):
 
 
 class _Late(FakeRobotino):
-    """A robot one of whose sensors is late in every step."""
+    """A robot with a sensor that is late in every step."""
 
     def advance(self) -> int:
         super().advance()
@@ -198,7 +198,7 @@ class _Late(FakeRobotino):
 
 
 def test_extra_steps_are_reported_and_not_taken_for_speed():
-    """A sensor that came late cost a period; the robot did not drive twice as fast."""
+    """A late sensor costs a period; the robot did not drive twice as fast."""
     robot = _Late()
     env = MoveToTargetEnv(robot, FakeScene(robot))
 
@@ -209,7 +209,7 @@ def test_extra_steps_are_reported_and_not_taken_for_speed():
 
 
 def test_a_fault_of_the_simulator_passes_through(make_env):
-    """What it means for learning is not the environment's to decide."""
+    """The environment does not decide what a fault means for learning."""
     env = make_env(deaths=(2,))
     env.reset(seed=0)
     env.step(STOP)
@@ -221,14 +221,14 @@ def test_a_fault_of_the_simulator_passes_through(make_env):
 
 
 def test_a_step_before_the_first_reset_is_refused(make_env):
-    """With gymnasium's own error, so that its users know it."""
+    """The error is gymnasium's own, which its users know."""
     with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
         make_env().step(STOP)
 
 
 @given(seed=st.integers(0, 2**31 - 1), actions=st.lists(st.integers(0, 6), max_size=30))
 def test_every_observation_is_in_the_space_and_every_reward_is_finite(seed, actions):
-    """Whatever is done in whatever episode."""
+    """This holds for all actions in all episodes."""
     env = MoveToTargetEnv(*fake_arena())
     observation, _ = env.reset(seed=seed)
 

@@ -1,4 +1,4 @@
-"""A task for two wheels and a scanner, and the fake that plays it."""
+"""A task for two wheels and a scanner, and its fake robot."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TO_THE_TARGET = {"start": (-0.2, 0.0, 0.0), "target": (0.4, 0.0)}
 
 @pytest.fixture
 def make_env():
-    """Make an environment on a fake robot: `deaths` for the robot, the rest are options."""
+    """Make an environment on a fake robot: `deaths` are the robot's, the rest are options."""
 
     def with_options(deaths=(), **options):
         return make_navigating(*fake_court(deaths), **options)
@@ -40,13 +40,13 @@ def make_env():
 
 @pytest.mark.parametrize(("actions", "reward"), VARIANTS)
 def test_nobody_has_anything_to_object_to(make_env, actions, reward):
-    """Gymnasium and Stable-Baselines3 check seeds, spaces, types and determinism."""
+    """The checkers of gymnasium and Stable-Baselines3 test seeds, spaces, types and determinism."""
     check_env(make_env(actions=actions, reward=reward), skip_render_check=True)
     check_env_for_sb3(make_env(actions=actions, reward=reward), skip_render_check=True)
 
 
 def test_the_environment_is_made_by_name():
-    """After an import of the package."""
+    """This works after an import of the package."""
     env = gymnasium.make(NAME, simulator=fake_court, max_steps=7)
 
     assert isinstance(env.unwrapped, NavigateEnv)
@@ -54,7 +54,7 @@ def test_the_environment_is_made_by_name():
 
 
 def test_driving_straight_on_reaches_a_target_ahead(make_env):
-    """0.45 m at 0.198 m/s, in steps of 0.192 s."""
+    """It covers 0.45 m at 0.198 m/s, in steps of 0.192 s."""
     env = make_env()
     env.reset(seed=1, options=TO_THE_TARGET)
 
@@ -68,7 +68,7 @@ def test_driving_straight_on_reaches_a_target_ahead(make_env):
 
 
 def test_a_wall_ends_the_episode_before_the_scanner_goes_blind(make_env):
-    """Nearer than 0.12 m a scanner of this kind sees nothing."""
+    """Below 0.12 m a scanner of this kind measures nothing."""
     env = make_env()
     env.reset(seed=1, options={"start": (1.0, 0.0, 0.0), "target": (-1.0, 0.0)})
 
@@ -78,7 +78,7 @@ def test_a_wall_ends_the_episode_before_the_scanner_goes_blind(make_env):
 
 
 def test_time_up_truncates(make_env):
-    """The world could go on."""
+    """The world could continue."""
     env = make_env(max_steps=2)
     env.reset(seed=1)
 
@@ -86,7 +86,7 @@ def test_time_up_truncates(make_env):
 
 
 def test_the_target_is_given_by_distance_and_bearing(make_env):
-    """On the left: a cosine of 0 and a sine of 1."""
+    """For a target on the left, the cosine is 0 and the sine is 1."""
     env = make_env()
 
     seen, _ = env.reset(seed=1, options={"start": (0.0, -0.1, 0.0), "target": (0.0, 0.9)})
@@ -95,7 +95,7 @@ def test_the_target_is_given_by_distance_and_bearing(make_env):
 
 
 def test_a_thing_on_the_left_is_in_a_sector_on_the_left(make_env):
-    """The first sectors look behind and to the right, the last to the left and behind."""
+    """The first sectors look behind and to the right, and the last ones to the left and behind."""
     env = make_env()
 
     seen, _ = env.reset(seed=1, options={"start": (0.0, 1.2, 0.0), "target": (0.0, 0.0)})
@@ -104,7 +104,7 @@ def test_a_thing_on_the_left_is_in_a_sector_on_the_left(make_env):
 
 
 def test_without_an_episode_there_is_no_step(make_env):
-    """As everywhere in gymnasium."""
+    """All environments of gymnasium have this rule."""
     with pytest.raises(ResetNeeded):
         make_env().step(0)
 
@@ -119,14 +119,14 @@ def test_a_fault_passes(make_env):
 
 
 def test_a_robot_without_a_scanner_is_refused():
-    """Before the first step, with what it has."""
+    """The error comes before the first step, and lists what the robot has."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Scanner, which NavigateEnv needs"):
         make_navigating(*fake_arena())
 
 
 @pytest.mark.parametrize("options", [{"actions": "both"}, {"max_steps": 0}, {"movements": ["STOP"]}])
 def test_wrong_options_are_refused(make_env, options):
-    """By name."""
+    """The message names them."""
     with pytest.raises(ConfigurationError, match=next(iter(options))):
         make_env(**options)
 
@@ -140,7 +140,7 @@ def test_the_data_sheet_has_the_actions():
 
 
 def test_the_fake_is_a_robot_with_a_scene():
-    """The checks for robots of others."""
+    """These are the checks for users' robots."""
     robot, scene = fake_court()
 
     check_robot(robot)
@@ -166,7 +166,7 @@ def test_a_wheel_that_would_run_too_fast_slows_both():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_the_fake_never_drives_into_a_thing(seed, moves, heading_rad):
-    """And its scan stays in range."""
+    """Its scan stays in range, too."""
     robot, scene = fake_court()
     robot.use_scanner()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (1.0, 0.0))
@@ -182,7 +182,7 @@ def test_the_fake_never_drives_into_a_thing(seed, moves, heading_rad):
 
 
 def test_what_is_too_near_is_not_seen():
-    """As with the real scanner: so an episode ends before."""
+    """The real scanner has the same limit, so an episode ends before that."""
     robot, scene = fake_court()
     robot.use_scanner()
     scene.reset(1, Pose(1.35, 0.0, 0.0), (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Frames, units and bounds of what is observed."""
+"""Frames, units and bounds of observations."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ poses = st.builds(Pose, meters, meters, angles)
 
 
 def numbers(part: str, **changes) -> list[float]:
-    """Return what one part says of a situation that differs from the usual one."""
+    """Return the numbers of one part, for a situation with some changes."""
     return observe(replace(SITUATION, **changes), [part], space([part])).tolist()
 
 
 def test_the_target_is_seen_from_the_robot():
-    """A robot that looks along y has a target at y = 1 m before it, and one at x = 0 on its left."""
+    """For a robot that looks along y, a target at y = 1 m is in front, and one at x = 0 on its left."""
     assert SITUATION.target_ahead == pytest.approx((1.0, 0.0))
     assert replace(SITUATION, target=(0.0, 0.0)).target_ahead == pytest.approx((0.0, 1.0))
 
 
 @given(pose=poses, target=st.tuples(meters, meters))
 def test_the_distance_to_the_target_does_not_depend_on_where_the_robot_looks(pose, target):
-    """Turning on the spot is no progress."""
+    """A turn on the spot is not progress."""
     seen = replace(SITUATION, pose=pose, target=target)
 
     assert seen.target_distance_m == pytest.approx(math.dist((pose.x_m, pose.y_m), target), abs=1e-9)
 
 
 def test_sensors_tell_how_near_things_are():
-    """0 is nothing in reach, 1 is as near as can be measured; the last number is the bumper."""
+    """0 means nothing in range and 1 the nearest measurable distance; the last number is the bumper."""
     distances_m = np.array([0.03, 0.215, *[0.4] * 7], np.float32)
 
     seen = numbers("sensors", distances_m=distances_m, bumped=True)
@@ -57,23 +57,23 @@ def test_sensors_tell_how_near_things_are():
 
 
 def test_velocity_is_in_units_of_the_movements():
-    """Driving FORWARD is 1, turning right at full speed -1."""
+    """FORWARD is 1, and a turn to the right at full speed is -1."""
     assert numbers("velocity", velocity=(0.5, -0.25, -1.0)) == pytest.approx([1.0, -0.5, -1.0])
 
 
 def test_position_is_in_the_worlds_frame():
-    """Half a floor is 1; the heading is on the unit circle, so it has no jump."""
+    """Half of the floor is 1; the heading is on the unit circle, so it has no jump."""
     assert numbers("position") == pytest.approx([0.5, 0.0, 0.0, 1.0], abs=1e-6)
 
 
 def test_time_left_counts_down():
-    """From 1 at the start to 0 when time is up."""
+    """It goes from 1 at the start to 0 at the time limit."""
     assert numbers("time_left") == [0.75]
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_number_beyond_its_bound_is_cut_off(part):
-    """A robot that was thrown across the world must not throw the learner too."""
+    """A robot that is thrown across the world must not disturb the learner."""
     wild = observe(
         replace(SITUATION, pose=Pose(1e6, -1e6, 3.0), velocity=(1e6, -1e6, 1e6), time_left=-1.0),
         [part],
@@ -85,7 +85,7 @@ def test_a_number_beyond_its_bound_is_cut_off(part):
 
 @pytest.mark.parametrize("parts", list(itertools.combinations(PARTS, 2)), ids="-".join)
 def test_parts_follow_each_other_in_the_order_they_are_named(parts):
-    """So that an index in the data sheet can be found in an observation."""
+    """An index in the data sheet then identifies a number in an observation."""
     seen = observe(SITUATION, parts, space(parts))
 
     assert seen.tolist() == [*numbers(parts[0]), *numbers(parts[1])]
@@ -94,7 +94,7 @@ def test_parts_follow_each_other_in_the_order_they_are_named(parts):
 
 @given(before=poses, ahead=st.tuples(meters, meters))
 def test_velocity_without_turning_is_the_way_over_the_time(before, ahead):
-    """Forward and left of where the robot looked, divided by the seconds that passed."""
+    """It is the way forward and to the left of the robot's old heading, divided by the elapsed seconds."""
     c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
     after = Pose(
         before.x_m + ahead[0] * c - ahead[1] * s,
@@ -106,7 +106,7 @@ def test_velocity_without_turning_is_the_way_over_the_time(before, ahead):
 
 
 def test_turning_is_measured_the_short_way_around():
-    """A heading that passes from pi to -pi did not turn a whole circle back."""
+    """A heading that passes from pi to -pi is not a full turn back."""
     _, _, turning = velocity(Pose(0, 0, math.pi - 0.1), Pose(0, 0, -math.pi + 0.1), 0.2)
 
     assert turning == pytest.approx(1.0)

@@ -1,4 +1,4 @@
-"""An environment that sees: its data sheet, its episodes, and its images."""
+"""An environment with camera images: its data sheet, its episodes and its images."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ VARIANTS = [
 
 @pytest.fixture
 def make_env():
-    """Make an environment on a fake robot with cameras: `deaths` for the robot, the rest are options."""
+    """Make an environment on a fake robot with cameras: `deaths` are the robot's, the rest are options."""
 
     def with_options(deaths=(), **options):
         return make_seeing(*fake_seeing(deaths), **options)
@@ -55,7 +55,7 @@ def play(env, episode, movements):
 
 
 def tables():
-    """Return the tables of the docstring: a list of rows each, a row is a dictionary by column."""
+    """Return the tables of the docstring as lists of rows; each row is a dictionary by column."""
     lines = [line.strip() for line in SHEET.splitlines()]
     for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
         if is_table:
@@ -68,7 +68,7 @@ OBSERVATION, REWARD = tables()
 
 @pytest.mark.parametrize("frames", [1, 3])
 def test_the_space_is_the_one_on_the_sheet(make_env, frames):
-    """Shape, bounds and type, by number of frames."""
+    """Shape, bounds and type depend on the number of frames."""
     space = make_env(frames=frames).observation_space
 
     assert isinstance(space, spaces.Box)
@@ -79,7 +79,7 @@ def test_the_space_is_the_one_on_the_sheet(make_env, frames):
 
 
 def test_rewards_are_on_the_sheet_with_their_weights():
-    """An empty cell is a term that this reward does not have."""
+    """An empty cell stands for a term that this reward lacks."""
     assert [row["term"] for row in REWARD] == list(TERMS)
     for reward, weights in WEIGHTS.items():
         assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
@@ -89,24 +89,24 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     "fact", [f"{REACHED_M:.2f} m", "64 x 48 pixels", f"{fake_camera.POLE_HEIGHT_M} m high"]
 )
 def test_the_task_is_on_the_sheet_with_its_numbers(fact):
-    """What counts as reached is not hidden in the code."""
+    """The definition of reaching the target must not be hidden in the code."""
     assert fact in " ".join(SHEET.split())
 
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
 def test_gymnasium_has_nothing_to_object_to(make_env, options):
-    """Seeds, spaces, types, determinism, and that no array is used twice."""
+    """It checks seeds, spaces, types and determinism, and that no array is used twice."""
     check_env(make_env(**options), skip_render_check=True)
 
 
 @pytest.mark.parametrize("options", VARIANTS[:1] + VARIANTS[2:], ids=["one frame", "three frames"])
 def test_stable_baselines3_has_nothing_to_object_to(make_env, options):
-    """Its own idea of an image."""
+    """Its checker has its own rules for images."""
     check_env_for_sb3(make_env(**options), skip_render_check=True)
 
 
 def test_the_environment_is_made_by_name():
-    """With a fake, in one line."""
+    """One line is enough with a fake."""
     env = gymnasium.make(NAME, simulator=fake_seeing, frames=3, movements=["FORWARD", "TURN_LEFT"])
 
     assert isinstance(env.unwrapped, SeeTargetEnv)
@@ -114,7 +114,7 @@ def test_the_environment_is_made_by_name():
 
 
 def test_the_pole_is_reached_at_its_distance(make_env):
-    """Crossing the line is enough: the robot need not stand."""
+    """It is enough to cross the line: the robot need not stand."""
     env = make_env()
 
     steps = play(env, BEFORE_THE_POLE, [FORWARD] * 3)
@@ -126,7 +126,7 @@ def test_the_pole_is_reached_at_its_distance(make_env):
 
 
 def test_driving_toward_the_pole_earns_what_was_gained(make_env):
-    """Turning on the spot earns nothing, and costs time."""
+    """A turn on the spot earns nothing and costs time."""
     turning, driving = (
         play(make_env(), BEFORE_THE_POLE, [TURN_LEFT, STOP])[0],
         play(make_env(), BEFORE_THE_POLE, [FORWARD])[0],
@@ -138,7 +138,7 @@ def test_driving_toward_the_pole_earns_what_was_gained(make_env):
 
 
 def test_a_collision_ends_the_episode(make_env):
-    """Walls are felt, and the pole is not."""
+    """The robot feels walls, but not the pole."""
     steps = play(make_env(), BEFORE_A_WALL, [FORWARD] * 4)
     ended = next(step for step in steps if step[2])
 
@@ -148,7 +148,7 @@ def test_a_collision_ends_the_episode(make_env):
 
 @pytest.mark.parametrize(("reward", "end"), [("Dense", (False, True)), ("Sparse", (True, False))])
 def test_time_is_up_after_max_steps(make_env, reward, end):
-    """Dense goes on in the learner's estimate, Sparse has its price for giving up."""
+    """With Dense, the learner estimates further reward; Sparse has a price for giving up."""
     steps = play(make_env(max_steps=2, reward=reward), BEFORE_THE_POLE, [STOP, STOP])
 
     assert [step[2:4] for step in steps] == [(False, False), end]
@@ -156,7 +156,7 @@ def test_time_is_up_after_max_steps(make_env, reward, end):
 
 
 def test_an_observation_is_what_the_camera_sees(make_env):
-    """In the order of colors that people expect: the pole is red."""
+    """The colors are in RGB order: the pole is red."""
     observation, _ = make_env().reset(seed=1, options=BEFORE_THE_POLE)
 
     assert observation.shape == IMAGE
@@ -164,7 +164,7 @@ def test_an_observation_is_what_the_camera_sees(make_env):
 
 
 def test_an_observation_stays_as_it_was_after_the_next_step():
-    """The array of a facade does not: the next image is written to the same place."""
+    """The array of a facade does change: the next image is written to the same memory."""
 
     class Reusing(FakeSeeingRobotino):
         buffer = np.zeros(IMAGE, np.uint8)
@@ -199,7 +199,7 @@ def test_three_frames_are_the_newest_the_oldest_first(make_env):
 
 
 def test_without_cylinders_episodes_use_the_whole_floor(make_env):
-    """Starts and poles are also where the arena's cylinders would be."""
+    """Starts and poles are also at the positions of the arena's cylinders."""
     env = make_env()
 
     places = [env.reset(seed=seed)[1]["target"] for seed in range(60)]
@@ -208,7 +208,7 @@ def test_without_cylinders_episodes_use_the_whole_floor(make_env):
 
 
 def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
-    """They are put up after each reset, which takes them away."""
+    """A reset removes the cylinders, and they are then placed again."""
     env = make_env(cylinders=True)
 
     for seed in range(30):
@@ -221,7 +221,7 @@ def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
 
 
 def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
-    """Without them the place is free."""
+    """Without cylinders the position is free."""
     episode = {"start": (0.8, 0.8, math.pi), "target": (-1.0, 0.0)}
     make_env().reset(seed=1, options=episode)
 
@@ -230,13 +230,13 @@ def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
 
 
 def test_a_robot_without_a_camera_is_refused_before_the_first_episode():
-    """By a typed error, not in the middle of a run."""
+    """The error has a type, and does not come in the middle of a run."""
     with pytest.raises(MissingCapability, match="FakeRobotino has no Cameras, which SeeTargetEnv needs"):
         make_seeing(*fake_arena())
 
 
 def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
-    """Another environment may take it."""
+    """Another environment may use it."""
     released = []
     robot, scene = fake_arena()
     taken = type("Taken", (), {"robot": robot, "scene": scene, "release": lambda: released.append(True)})
@@ -250,7 +250,7 @@ def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
 
 
 def test_an_image_of_another_size_is_refused():
-    """The message names both sizes and where the size is set."""
+    """The message has both sizes and the place where the size is set."""
 
     class Large(FakeSeeingRobotino):
         def color_image(self):
@@ -263,7 +263,7 @@ def test_an_image_of_another_size_is_refused():
 
 
 def test_without_mujoco_an_environment_of_its_own_is_refused(monkeypatch):
-    """The message names what to install; nothing is started."""
+    """The message has the package to install, and nothing is started."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
 
@@ -281,13 +281,13 @@ def test_a_fault_of_the_simulator_comes_through_unchanged(make_env):
 
 
 def test_a_step_before_the_first_reset_is_refused(make_env):
-    """There is no pole yet."""
+    """No pole has been placed yet."""
     with pytest.raises(ResetNeeded):
         make_env().step(FORWARD)
 
 
 def test_closing_releases_the_simulator_once_it_is_asked():
-    """`on_close` is what a simulator of a configuration is given back with."""
+    """`on_close` returns a simulator of a configuration."""
     closed = []
     env = SeeTargetEnv(*fake_seeing(), on_close=lambda: closed.append(True))
 

@@ -1,4 +1,4 @@
-"""The wrappers of a job, and its stacked frames."""
+"""A job's wrappers and its stacked frames."""
 
 # ruff: noqa: ARG002 - gymnasium names the arguments of its methods
 
@@ -29,7 +29,7 @@ SPACES = {
 
 
 class Count(gymnasium.Env):
-    """An environment that ends after three steps; it returns one array again and again if it `reuses` it."""
+    """An environment that ends after three steps; with `reuses` it always returns the same array."""
 
     action_space = spaces.Discrete(2)
 
@@ -39,13 +39,13 @@ class Count(gymnasium.Env):
         self._seen = np.zeros(space.shape, space.dtype)
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         super().reset(seed=seed)
         self._steps = 0
         return self._observe(), {}
 
     def step(self, action):
-        """Go on."""
+        """Take a step."""
         self._steps += 1
         return self._observe(), 10.0, self._steps == 3, False, {}
 
@@ -56,7 +56,7 @@ class Count(gymnasium.Env):
 
 @pytest.fixture
 def registered():
-    """Register the environment; it is forgotten at the end."""
+    """Register the environment, and remove it at the end."""
     gymnasium.register(id=NAME, entry_point=Count)
     yield
     gymnasium.registry.pop(NAME, None)
@@ -69,7 +69,7 @@ def made(**task):
 
 @pytest.mark.parametrize("name", SPACES)
 def test_frames_are_stacked_as_stable_baselines_does(name):
-    """Values that were tuned with its VecFrameStack are for its layout and its zeros."""
+    """Hyperparameters that were tuned with its VecFrameStack rely on its layout and its zeros."""
     space = SPACES[name]
     theirs = VecFrameStack(DummyVecEnv([lambda: Count(space=space, reuses=False)]), 3)
     ours = StackedFrames(Count(space=space), 3)
@@ -88,7 +88,10 @@ def test_frames_are_stacked_as_stable_baselines_does(name):
 
 
 def test_each_frame_has_the_bounds_of_its_numbers():
-    """Stable-Baselines3's repeat the bounds of the first number, and refuse observations that are right."""
+    """VecFrameStack of Stable-Baselines3 repeats the bounds of the first number.
+
+    It thus refuses valid observations.
+    """
     bounds = StackedFrames(Count(), 2).observation_space
 
     assert bounds.low.tolist() == [-1.0] * 6
@@ -96,7 +99,7 @@ def test_each_frame_has_the_bounds_of_its_numbers():
 
 
 def test_an_observation_that_was_returned_does_not_change_later():
-    """Else every row of a buffer would have the newest frames."""
+    """Otherwise every row of a buffer would have the newest frames."""
     env = StackedFrames(Count(), 2)
     first, _ = env.reset()
     kept = first.copy()
@@ -108,7 +111,7 @@ def test_an_observation_that_was_returned_does_not_change_later():
 
 
 def test_an_observation_of_another_kind_cannot_be_stacked():
-    """A goal that was stacked would not be what compute_reward takes."""
+    """compute_reward could not use a stacked goal."""
     env = Count()
     env.observation_space = spaces.Dict({"a": SPACES["numbers"]})
 
@@ -118,7 +121,7 @@ def test_an_observation_of_another_kind_cannot_be_stacked():
 
 @pytest.mark.usefixtures("registered")
 def test_wrappers_are_put_around_the_environment_in_their_order():
-    """The first is innermost: its reward is what the second one gets."""
+    """The first is the innermost: the second gets its reward."""
     reward = {"name": f"{HERE}:ClipReward", "options": {"min_reward": -1, "max_reward": 2}}
     limit = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": 2}}
     env = made(wrappers=[reward, limit], frameStack=2)
@@ -158,7 +161,7 @@ def layers(env):
     ],
 )
 def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrapper, fact):
-    """What does not fit is known from its class alone."""
+    """Its class alone shows what does not fit."""
     with pytest.raises(ConfigurationError, match=r"environment\.wrappers\[0\]") as refusal:
         keywords(Environment(id=NAME, wrappers=[wrapper]))
 
@@ -167,7 +170,7 @@ def test_a_wrapper_that_cannot_be_used_is_refused_before_a_simulator_starts(wrap
 
 @pytest.mark.usefixtures("registered")
 def test_a_wrapper_that_raises_is_named():
-    """It may be of the job's author."""
+    """The job's author may have written it."""
     wrapper = {"name": f"{HERE}:TimeLimit", "options": {"max_episode_steps": -1}}
 
     with pytest.raises(
@@ -179,7 +182,7 @@ def test_a_wrapper_that_raises_is_named():
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize("name", ["NormalizeObservation", "NormalizeReward"])
 def test_wrappers_with_statistics_are_refused_as_ever(name):
-    """No model keeps them, and each simulator would have others."""
+    """No model stores them, and each simulator would have its own."""
     env = made(wrappers=[{"name": f"{HERE}:{name}"}])
 
     with pytest.raises(ConfigurationError, match=f"{name} has statistics that the policy's file lacks"):
@@ -187,7 +190,7 @@ def test_wrappers_with_statistics_are_refused_as_ever(name):
 
 
 def test_without_wrappers_the_environment_stays_as_it_is():
-    """A job of an older release trains in the same one."""
+    """A job that asks for nothing gets nothing around it."""
     env = Count()
 
     assert wrapped(env, Environment(id=NAME)) is env

@@ -1,4 +1,4 @@
-"""The interface of a Stable-Baselines3 vector, beside the library's own vectors of the same environments."""
+"""The vectors for Stable-Baselines3 have the interface of the library's own, with the same environments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PICTURE = np.full((4, 6, 3), 7, np.uint8)
 
 
 class Slope(gymnasium.Env):
-    """Reports its level, which a curriculum raises."""
+    """An environment that reports its level, which a curriculum raises."""
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - as in every environment
     observation_space = spaces.Box(-1, 1, (1,), np.float32)
@@ -33,18 +33,18 @@ class Slope(gymnasium.Env):
         self.options = None
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         super().reset(seed=seed)
         self.options = options
         return np.zeros(1, np.float32), {"level": self.level}
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         del action
         return np.zeros(1, np.float32), 0.0, False, False, {"level": self.level}
 
     def render(self):
-        """Draw."""
+        """Return the picture."""
         return PICTURE
 
     def twice(self, number):
@@ -92,7 +92,7 @@ def reference(request):
     if request.param == "in this process":
         env = DummyVecEnv([wrapped] * MEMBERS)
     else:
-        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # another would import PyTorch thrice
+        env = SubprocVecEnv([wrapped] * MEMBERS, start_method="fork")  # others import PyTorch in each
     yield env
     env.close()
 

@@ -1,6 +1,6 @@
-"""What an environment lends and borrows: it may keep and write into all that it gets or returns.
+"""An environment may keep and change every object that it gets or returns.
 
-Each test plays a hostile environment, and an honest one that returns new objects. The results must be equal.
+Each test uses a hostile environment, and an honest one that returns new objects. The results must be equal.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ ACTED = spaces.Box(-1, 1, (2,), np.float32)
 
 
 class Honest(gymnasium.Env):
-    """Episodes of three steps; everything that it returns is new."""
+    """Episodes of three steps; every returned object is new."""
 
     observation_space, action_space = OBSERVED, ACTED
 
     def reset(self, *, seed=None, options=None):
-        """Begin; what happened before does not matter."""
+        """Begin an episode that does not depend on earlier ones."""
         super().reset(seed=seed)
         self.step_number, self.sum = 0, np.zeros(2, np.float32)
         return self.seen(np.full(2, -50, np.float32)), {"begun": [seed is not None, dict(options or {})]}
@@ -52,7 +52,7 @@ class Honest(gymnasium.Env):
 
 
 class Hostile(Honest):
-    """Returns the same objects for its whole life, and writes into all that it gets."""
+    """An environment that always returns the same objects, and changes those that it gets."""
 
     def __init__(self):
         self.numbers = np.zeros(4, np.float32)[::2]  # a view that is not contiguous
@@ -61,7 +61,7 @@ class Hostile(Honest):
         self.info = {}
 
     def reset(self, *, seed=None, options=None):
-        """Begin, and empty the options."""
+        """Begin an episode, and empty the options."""
         seen, info = super().reset(seed=seed, options=options)
         (options or {}).clear()
         self.info.clear()
@@ -78,22 +78,22 @@ class Hostile(Honest):
         return seen, reward, terminated, truncated, self.info
 
     def seen(self, numbers):
-        """Return the only observation."""
+        """Return the only observation object."""
         self.numbers[:] = numbers
         self.observation["place"] = self.step_number
         return self.observation
 
 
 class Frozen(Hostile):
-    """Its infos cannot be written into."""
+    """An environment whose infos are read-only."""
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         seen, info = super().reset(seed=seed, options=options)
         return seen, MappingProxyType(info)
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         *others, info = super().step(action)
         return *others, MappingProxyType(info)
 
@@ -152,17 +152,17 @@ def evaluated(restarter):
 
 
 class Fixed:
-    """A policy that returns the same array each time."""
+    """A policy that always returns the same array."""
 
     action = np.array([0.5, -0.5], np.float32)
 
     def predict(self, _observation, state=None, _episode_start=None, **_options):
-        """Return it."""
+        """Return the array."""
         return self.action, state
 
 
 def plain(value):
-    """Return a value with its arrays as lists, and without the seconds of episodes."""
+    """Return a value with its arrays as lists, and without the duration of episodes."""
     if isinstance(value, dict):
         return {key: plain(part) for key, part in value.items() if key != "t"}
     if isinstance(value, list | tuple):
@@ -189,7 +189,7 @@ def test_actions_of_the_training_loop_stay_as_they_are(restarter):
 
 
 class Judge(Honest):
-    """Computes rewards of goals in the memory of the goals."""
+    """A task that computes rewards in the memory of the goals."""
 
     def compute_reward(self, achieved, desired, _info):
         """Return the distance."""
@@ -209,12 +209,12 @@ def test_goals_whose_reward_was_computed_stay_as_they_are(restarter):
 
 
 class Rising(Honest):
-    """Raises its own level at each reset, and keeps its list."""
+    """An environment that raises its own level at each reset, and keeps its list."""
 
     level, words = 0, ()
 
     def reset(self, *, seed=None, options=None):
-        """Begin on the next level."""
+        """Begin an episode on the next level."""
         self.level += 1
         self.words = [*self.words, self.level]
         return super().reset(seed=seed, options=options)
@@ -237,10 +237,10 @@ def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(res
 
 
 class WithWords(Honest):
-    """Its infos have words of their own that mean something else here, and in Stable-Baselines3."""
+    """An environment whose infos have keys with another meaning here and in Stable-Baselines3."""
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         *others, _ = super().step(action)
         words = ("valid", "episode", "sim_fault", "recovering", "extra_steps", "terminal_observation")
         return *others, {**dict.fromkeys(words, "mine"), "palaestra": "mine"}
@@ -262,7 +262,7 @@ def test_words_of_an_environment_are_not_taken_for_ours(restarter):
 
 
 def test_a_copy_shares_nothing_that_can_be_written_into():
-    """Objects of other classes are shared: a robot in an info cannot be copied."""
+    """Objects of other classes are shared, because a robot in an info cannot be copied."""
     robot = object()
     value = {"array": np.zeros((2, 2), order="F"), "parts": [({1, 2}, bytearray(b"a"))], "robot": robot}
 

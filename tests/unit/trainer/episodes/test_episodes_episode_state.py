@@ -1,4 +1,4 @@
-"""How far each member is, kept cheaply and brought back through the environment's interface."""
+"""The episode state of each member is small, and is restored through the environment's interface."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_member):
-    """Make a VecEnv of corridors; each argument says when a member breaks."""
+    """Make a VecEnv of corridors; each argument sets when a member breaks."""
 
     def make(*faults, run_seed=1):
         members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
@@ -25,12 +25,12 @@ def make_env(make_member):
 
 
 def play(env, actions):
-    """Return what vector steps with these actions told."""
+    """Return the results of vector steps with these actions."""
     return [env.step(np.full(env.num_envs, action)) for action in actions]
 
 
 def told(rows):
-    """Return what of some rows must be the same when they are played again."""
+    """Return the parts of some rows that must be equal when they are repeated."""
     return [
         (observations.tolist(), rewards.tolist(), dones.tolist(), [told_of(info) for info in infos])
         for observations, rewards, dones, infos in rows
@@ -38,7 +38,7 @@ def told(rows):
 
 
 def told_of(info):
-    """Return an info without its wall time."""
+    """Return return and length of the episode in an info."""
     episode = info.get("episode")
     return episode and (episode["r"], episode["l"])
 
@@ -51,7 +51,7 @@ def test_before_the_first_reset_no_episode_is_under_way(make_env):
 
 
 def test_a_snapshot_has_the_episode_s_number_and_its_actions(make_env):
-    """That is all that brings it back."""
+    """These two suffice to restore it."""
     env, _ = make_env({})
     env.reset()
     play(env, [RIGHT, RIGHT, RIGHT, LEFT, RIGHT])
@@ -63,7 +63,7 @@ def test_a_snapshot_has_the_episode_s_number_and_its_actions(make_env):
 
 
 def test_a_snapshot_stays_as_it_was(make_env):
-    """It is taken every few steps and saved, if ever, when others have followed."""
+    """It is taken every few steps, and may be saved after further ones."""
     env, _ = make_env({})
     env.reset()
     play(env, [LEFT] * 2)
@@ -78,7 +78,7 @@ def test_a_snapshot_stays_as_it_was(make_env):
 
 @pytest.mark.parametrize("steps", range(12))
 def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
-    """Observations, rewards, ends, returns and lengths, from anywhere in an episode."""
+    """Observations, rewards, ends, returns and lengths are equal, from any step of an episode."""
     actions = [RIGHT, LEFT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT] * 2
     env, _ = make_env({}, {})
     env.reset()
@@ -95,7 +95,7 @@ def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
 
 
 def test_members_are_resumed_where_each_one_was(make_env):
-    """One is ahead of the other, and one has nothing under way."""
+    """One is ahead of the other, and one has no episode."""
     env, members = make_env({}, {}, {})
 
     observations = env.resume(
@@ -108,7 +108,7 @@ def test_members_are_resumed_where_each_one_was(make_env):
 
 
 def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
-    """An environment that does not repeat is still one to learn in."""
+    """Training must also work with an environment that does not repeat itself."""
     env, _ = make_env({})
 
     observations = env.resume([EpisodeState(4, np.array([RIGHT] * 5))])
@@ -119,7 +119,7 @@ def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
 
 @pytest.mark.parametrize("action", [1, np.int64(1), np.float32(0.5), np.zeros((2, 3), np.float32)])
 def test_a_log_keeps_actions_as_they_are(action):
-    """Bit for bit, also beyond the room it began with."""
+    """They are equal bit for bit, also beyond the initial capacity."""
     log = ActionLog()
     early = log.taken()
     for _ in range(40):

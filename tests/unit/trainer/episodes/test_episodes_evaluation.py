@@ -1,4 +1,4 @@
-"""Measuring a policy."""
+"""The evaluation of a policy."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class Losses(NullWatcher):
     steps = 0
 
     def fault(self, simulator, fault, steps_lost):
-        """Add them."""
+        """Add the steps."""
         del simulator, fault
         self.steps += steps_lost
 
 
 class Walker:
-    """Walks right where the seed's last digit is even, left elsewhere."""
+    """A policy that walks right if the seed's last digit is even, and left otherwise."""
 
     def predict(self, observation, state=None, episode_start=None, *, deterministic=False):
-        """Choose."""
+        """Choose an action."""
         assert deterministic
         assert episode_start.shape == (1,)
         return int(round(float(observation[1]) * 10) % 2 == 0), state
@@ -49,7 +49,7 @@ def test_every_seed_is_an_episode(make_member):
 
 
 def test_an_evaluation_measures_the_whole_task_at_any_time(make_member):
-    """A success rate of an early stage of a curriculum would stop the training."""
+    """The success rate of an early stage of a curriculum would otherwise stop the training."""
     member = make_member()
 
     evaluate(Walker(), member, [10, 20])
@@ -58,7 +58,7 @@ def test_an_evaluation_measures_the_whole_task_at_any_time(make_member):
 
 
 def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
-    """All policies are measured on the same episodes, whatever broke."""
+    """All policies are evaluated on the same episodes, even if a simulator breaks."""
     member, losses = make_member(steps=[5]), Losses()
 
     evaluation = evaluate(Walker(), Restarter(member, watcher=losses), [10, 20])
@@ -88,7 +88,7 @@ def test_several_simulators_share_the_episodes(make_member, evaluators):
 
 
 def test_an_evaluation_can_be_given_up_between_episodes(make_member):
-    """A signal must not wait for a hundred of them."""
+    """A signal must not wait for a hundred episodes."""
     calls = iter([None, KeyboardInterrupt()])
 
     def check():
@@ -101,7 +101,7 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
 
 @pytest.mark.parametrize("first", [True, False])
 def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
-    """After Ctrl-C the other half of the episodes must not be played."""
+    """After Ctrl-C the other half of the episodes must not run."""
     broken = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
     other = make_member("evaluate-1")
     restarters = [broken, Restarter(other)] if first else [Restarter(other), broken]
@@ -127,7 +127,7 @@ def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
 
 @pytest.mark.parametrize("alone", [True, False])
 def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_member, alone):
-    """Also if they have ended all of their own by then."""
+    """This holds even if they have already finished their own."""
     group = Group(2, least=1)
     restarters = [
         Restarter(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
@@ -150,7 +150,7 @@ def test_without_any_simulator_left_there_is_no_evaluation(make_member):
 
 
 def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):
-    """It may take a minute to come up, several times."""
+    """Its restart may take a minute, several times."""
     member = make_member(steps=[1], held=True)
     looks = []
 
@@ -165,7 +165,7 @@ def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):
 
 
 def test_more_success_counts_before_more_return(make_member):
-    """A policy that collects rewards beside the target is not the better one."""
+    """A policy that collects other rewards without success is not better."""
     good, bad = (evaluate(Walker(), make_member(), [seed]) for seed in (10, 21))
 
     assert good.score > bad.score
@@ -173,7 +173,7 @@ def test_more_success_counts_before_more_return(make_member):
 
 
 def test_a_recurrent_policy_keeps_its_state_over_an_episode_and_begins_the_next_without_it(make_member):
-    """An LSTM that forgets each step is another policy than the one that was trained."""
+    """An LSTM that forgets its state at each step would be another policy than the trained one."""
     seen = []
 
     class Counter:

@@ -1,4 +1,4 @@
-"""Every episode's seed is a function of what the episode is."""
+"""The seed of every episode is a function of its run, stream, simulator and number."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NUMBERS = st.integers(0, 2**31)
 
 @given(NUMBERS, st.text(), st.integers(0, 1000), NUMBERS)
 def test_a_seed_is_always_the_same_and_fits_in_31_bits(run, stream, simulator, episode):
-    """It goes through ROS and a simulator's string field; neither should have to think."""
+    """It passes through ROS and a simulator's string field, so it must be small."""
     seed = episode_seed(run, stream, simulator, episode)
 
     assert seed == episode_seed(run, stream, simulator, episode)
@@ -20,12 +20,12 @@ def test_a_seed_is_always_the_same_and_fits_in_31_bits(run, stream, simulator, e
 
 
 def test_a_known_seed_stays_what_it_is():
-    """A run that was begun with one release is continued with the next."""
+    """A run may continue with another release."""
     assert episode_seed(1, COLLECT, 0, 0) == 2036268347
 
 
 def test_streams_share_no_seed():
-    """A policy must not be measured on what it was chosen on."""
+    """A policy must not be measured on the episodes on which it was chosen."""
     many = {
         stream: {episode_seed(1, stream, 0, episode) for episode in range(2000)}
         for stream in (COLLECT, EVALUATE, "B")
@@ -43,5 +43,5 @@ def test_simulators_and_runs_play_different_episodes():
 
 
 def test_a_shared_stream_counts_its_episodes():
-    """However many simulators play them, an evaluation has the same episodes."""
+    """An evaluation has the same episodes for any number of simulators."""
     assert list(episode_seeds(3, "B", 2)) == [episode_seed(3, "B", 0, 0), episode_seed(3, "B", 0, 1)]

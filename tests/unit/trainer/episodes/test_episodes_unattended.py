@@ -1,4 +1,4 @@
-"""Whole runs in which simulators break, come back late, or never."""
+"""Complete runs in which simulators break, come back late, or never come back."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def pool(job, make_configuration):
 
 
 def summary(directory):
-    """Return how a run ended."""
+    """Return the summary of a run."""
     return json.loads(directory.summary.read_text())
 
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directory, name):
-    """It takes longer, and learns as much."""
+    """It takes longer, but learns as much."""
     code, members = play(pool(name, least=1), {"collect-0": {"steps": range(10, 1000)}})
 
     assert code == 0
@@ -51,7 +51,7 @@ def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, d
 
 
 def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, pool, directory):
-    """The simulator that measures may be the one that breaks."""
+    """The evaluating simulator may be the one that breaks."""
     faults = {"evaluate-0": {"steps": range(3, 1000)}}
 
     code, members = play(pool("DQN", least=1, collectors=1, evaluators=2), faults)
@@ -62,7 +62,7 @@ def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, po
 
 
 def test_too_few_simulators_end_the_run(play, pool, last_word):
-    """The message names the simulator, what broke it, and what can be done."""
+    """The message has the simulator, its fault and the remedy."""
     code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
 
     assert code == 80
@@ -71,7 +71,7 @@ def test_too_few_simulators_end_the_run(play, pool, last_word):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_simulator_that_is_mended_for_long_holds_up_nobody(play, pool, directory, name):
-    """The run is over before it comes back, and ends it."""
+    """The run may finish before it comes back, and then ends its restart."""
     code, members = play(pool(name, least=2), {"collect-0": {"steps": [10], "held": True}})
 
     assert code == 0

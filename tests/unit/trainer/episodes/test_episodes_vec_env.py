@@ -1,4 +1,4 @@
-"""Several simulators as one VecEnv, and what becomes of their faults."""
+"""Several simulators as one VecEnv, and the handling of their faults."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env():
-    """Make a VecEnv of members and close it in the end."""
+    """Make a VecEnv of members, and close it at the end."""
     made = []
 
     def make(*members, limit=None, run_seed=1, **options):
@@ -45,7 +45,7 @@ def walk(env, steps, action=RIGHT):
 
 
 def end_of_mending(name):
-    """Return when the thread that mends a member has ended."""
+    """Wait for the end of the thread that restarts a member."""
     for thread in threading.enumerate():
         if thread.name == f"restarter-{name}":
             thread.join(20.0)
@@ -53,7 +53,7 @@ def end_of_mending(name):
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
-    """However many there are."""
+    """This holds for any number of members."""
     env = make_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()
@@ -67,7 +67,7 @@ def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
 
 
 def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
-    """Stable-Baselines3 expects the next episode's first observation, and the last in info."""
+    """Stable-Baselines3 expects the next episode's first observation, and the last one in the info."""
     env = make_env(make_member())
     env.reset()
 
@@ -83,7 +83,7 @@ def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
 
 
 def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
-    """The value of what would have come is bootstrapped after a limit only."""
+    """The value of the rest is bootstrapped only after a limit."""
     env = make_env(make_member())
     env.reset()
 
@@ -94,7 +94,7 @@ def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
 
 
 def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
-    """So a run can be told again, and resumed."""
+    """A run can then be repeated and resumed."""
     members = [make_member("collect-0"), make_member("collect-1")]
     env = make_env(*members, run_seed=5)
 
@@ -108,7 +108,7 @@ def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
 
 
 def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(make_env, make_member):
-    """For a curriculum; an episode under way keeps what it began with."""
+    """A curriculum needs them; a running episode keeps its values."""
     member = make_member()
     env = make_env(member)
 
@@ -123,7 +123,7 @@ def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(mak
 
 
 def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_member):
-    """Or it would be another episode; the next one begins with that of now."""
+    """Otherwise it would be another episode; the next one begins with the current progress."""
     member = make_member()
     env = make_env(member)
     env.set_training_progress(0.5)
@@ -137,7 +137,7 @@ def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_
 
 
 def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member):
-    """Nobody did anything wrong: no reward, no punishment, no learning from it."""
+    """The policy did not cause it, so it gets no reward, no penalty and nothing to learn."""
     env = make_env(make_member(steps=[2]))
     env.reset()
 
@@ -157,7 +157,7 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
 
 
 def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
-    """No other simulator steps meanwhile, and the policy learns nothing from this row."""
+    """No other simulator steps meanwhile, and the policy does not learn from this row."""
     member = make_member(steps=[2], held=True)
     env = make_env(member)
     env.reset()
@@ -174,7 +174,7 @@ def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env
 
 
 def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
-    """The others step on; its own rows are invalid, and nothing of it ends or begins."""
+    """The others continue; its own rows are invalid, and none of its episodes ends or begins."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -191,7 +191,7 @@ def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
 
 
 def test_a_mended_member_begins_its_next_episode(make_env, make_member):
-    """With the next seed, and in one more invalid row that ends whatever was before."""
+    """It has the next seed; one more invalid row ends the previous episode."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -209,7 +209,7 @@ def test_a_mended_member_begins_its_next_episode(make_env, make_member):
 
 
 def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
-    """Rows that are all invalid would only burn the processor."""
+    """Rows that are all invalid would only use the processor."""
     members = [make_member(f"collect-{index}", steps=[1], held=True) for index in range(2)]
     looks = []
 
@@ -231,7 +231,7 @@ def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
 
 
 def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
-    """A simulator may take a minute to start; an eviction allows half of that."""
+    """A simulator may take a minute to start, but an eviction allows half of that."""
 
     def check():
         raise Interrupted("SIGTERM received")
@@ -245,7 +245,7 @@ def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_membe
 
 
 def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member):
-    """The episode had ended by itself; what broke is the next one, before its first step."""
+    """The first episode had ended normally; the fault is in the next one, before its first step."""
     env = make_env(make_member(resets=[2]))
     env.reset()
 
@@ -259,7 +259,7 @@ def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member
 
 
 def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, make_member):
-    """The first reset may break too, and a row must have its shape."""
+    """The first reset may fail too, and a row must have its shape."""
     env = make_env(make_member(resets=[1]))
 
     first = env.reset()
@@ -269,7 +269,7 @@ def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, m
 
 
 def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
-    """REINFORCE begins anew amid episodes, whatever state the others are in."""
+    """REINFORCE begins new episodes whatever the state of the members is."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -282,7 +282,7 @@ def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
 
 
 def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_member):
-    """What it played is lost; a resumed run begins its next episode."""
+    """Its steps are lost, and a resumed run begins its next episode."""
     members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
@@ -296,7 +296,7 @@ def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_mem
 
 
 def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_env, make_member):
-    """Its part of the run is not exact any more, but it goes on."""
+    """Its part of the run is no longer exact, but it continues."""
     env = make_env(make_member(steps=[2]))
 
     env.resume([EpisodeState(4, np.array([LEFT, LEFT, LEFT]))])
@@ -321,7 +321,7 @@ def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_mem
 
 
 def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """The robot has checked its sensors: a restart of the simulator would not help."""
+    """The robot has checked its sensors, so a restart of the simulator would not help."""
     member = make_member()
     member.env = Wrapper(member.env)
     env = make_env(member)
@@ -337,7 +337,7 @@ def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env,
 
 
 def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
-    """With the episode, so that it can be played again."""
+    """The message has the episode, so that it can be repeated."""
     member = make_member()
     member.env._observe = lambda: {"wheels": np.array([[0.0], [math.inf]])}
     env = make_env(member)
@@ -347,7 +347,7 @@ def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistak
 
 
 def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_member):
-    """The robot raises it; a restart may help."""
+    """The robot raises the error; a restart may help."""
     env = make_env(make_member(steps={1: WrongData("ir1", "nan from ir1")}))
     env.reset()
 
@@ -357,7 +357,7 @@ def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_memb
 
 
 def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):
-    """A restart would not help; the message says where to look."""
+    """A restart would not help; the message shows the place."""
     member = make_member()
     member.env.step_reward = math.inf
     env = make_env(member)
@@ -383,7 +383,7 @@ def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_membe
 
 
 def test_a_spent_budget_ends_the_run(make_env, make_member):
-    """Restarting for ever would look like progress."""
+    """Endless restarts would look like progress."""
     env = make_env(make_member(steps=range(1, 100)), limit=RestartLimit(restarts=2))
     env.reset()
 
@@ -392,7 +392,7 @@ def test_a_spent_budget_ends_the_run(make_env, make_member):
 
 
 def test_a_budget_is_spent_within_its_window_only(make_member):
-    """One fault an hour for a week is no reason to give up."""
+    """One fault an hour for a week is not a reason to give up."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
     restarter = Restarter(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
@@ -406,7 +406,7 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
 
 
 def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
-    """Three of four learn as well, only a little slower; with too few left it ends."""
+    """Three of four learn as much, only a little slower; with too few left the run ends."""
     group = Group(3, least=2)
     members = [
         make_member("collect-0", steps=range(1, 100)),
@@ -431,7 +431,7 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
 
 
 def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_member):
-    """Simulators leak; a restart in time costs less than a crash."""
+    """Simulators leak memory; a restart in time costs less than a crash."""
     member = make_member(recycle_after=2)
     env = make_env(member)
     env.reset()
@@ -457,7 +457,7 @@ def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, c
 
 
 def test_members_are_recycled_at_the_same_time(make_env, make_member):
-    """Those that began together wear out together: it must not take twice as long."""
+    """Members that start together reach their limits together, and this must not take twice the time."""
     both = threading.Barrier(2, timeout=20.0)
     members = [make_member(f"collect-{index}", recycle_after=1) for index in range(2)]
     for member in members:
@@ -471,7 +471,7 @@ def test_members_are_recycled_at_the_same_time(make_env, make_member):
 
 
 def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
-    """It is mended, and the episode begins."""
+    """The member is restarted, and the episode begins."""
     member = make_member(starts=[1], recycle_after=1)
     env = make_env(member)
     env.reset()
@@ -483,7 +483,7 @@ def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member)
 
 
 def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):
-    """Nothing is restarted when the ROS master is gone, and no member is left amid a step."""
+    """If the ROS master is gone nothing is restarted, and no member is left in the middle of a step."""
     lost = MasterLost("gone")
     env = make_env(make_member("collect-0", steps={1: lost}), make_member("collect-1"))
     env.reset()
@@ -493,7 +493,7 @@ def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, ma
 
 
 def test_members_step_at_the_same_time(make_env, make_member):
-    """Four simulators must not take four times as long: all are asked before one is awaited."""
+    """Four simulators must not take four times as long, so all requests are sent before the first wait."""
     members = [make_member(f"collect-{index}") for index in range(4)]
     told = []
     for member in members:
@@ -526,7 +526,7 @@ def test_resting_reaches_every_member(make_env, make_member, members):
 
 
 def test_a_broken_member_is_left_for_the_next_step_to_find(make_env, make_member):
-    """Resting is a kindness; failing at it is no reason to end a run."""
+    """The pause is optional, so its failure must not end a run."""
     member = make_member()
     member.pause = lambda: (_ for _ in ()).throw(SimulatorHung("collect-0", "no answer"))
     env = make_env(member)
@@ -537,7 +537,7 @@ def test_a_broken_member_is_left_for_the_next_step_to_find(make_env, make_member
 
 
 def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_member):
-    """Callbacks and wrappers of others use it."""
+    """Other projects' callbacks and wrappers use it."""
     members = [make_member("collect-0"), make_member("collect-1")]
     members[0].env = Wrapper(members[0].env)
     env = make_env(*members)

@@ -11,7 +11,7 @@ from palaestra_trainer.episodes.wilson import wilson
 
 @st.composite
 def shares(draw):
-    """Draw successes of episodes."""
+    """Draw a number of successes and of episodes."""
     episodes = draw(st.integers(1, 10_000))
     return draw(st.integers(0, episodes)), episodes
 
@@ -29,7 +29,7 @@ def test_bounds_are_those_of_the_literature(successes, episodes, low, high):
 
 @given(shares())
 def test_the_interval_is_a_part_of_all_rates_and_holds_the_share(share):
-    """A rounded share at a bound is the bound."""
+    """A rounded share at a bound equals the bound."""
     successes, episodes = share
 
     interval = wilson(successes, episodes)
@@ -40,7 +40,7 @@ def test_the_interval_is_a_part_of_all_rates_and_holds_the_share(share):
 
 @given(shares())
 def test_more_episodes_say_more(share):
-    """Four times as many with the same share."""
+    """The test compares four times as many episodes with the same share."""
     successes, episodes = share
 
     few, many = wilson(successes, episodes), wilson(4 * successes, 4 * episodes)
@@ -50,6 +50,6 @@ def test_more_episodes_say_more(share):
 
 @pytest.mark.parametrize(("successes", "episodes"), [(0, 0), (3, 2), (-1, 2)])
 def test_what_is_no_share_is_refused(successes, episodes):
-    """A caller would otherwise divide by zero, or take the root of a negative number."""
+    """Otherwise a caller would divide by zero or take the root of a negative number."""
     with pytest.raises(ValueError, match="not a share"):
         wilson(successes, episodes)

@@ -1,6 +1,6 @@
-"""Observations of whole numbers, which every algorithm trains on, evaluates and leaves its run with.
+"""Observations of integers: every algorithm trains on them, evaluates, and exports its policy.
 
-PyTorch, ONNX and NumPy each have their own rules for numbers of mixed types.
+PyTorch, ONNX and NumPy have different rules for mixed number types.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.testing.fake_task import ACTIONS
 pytestmark = pytest.mark.minutes(1)
 
 WHOLE = {
-    "uint8": spaces.Box(0, 255, (3,), np.uint8),  # no image: it has one dimension
+    "uint8": spaces.Box(0, 255, (3,), np.uint8),  # not an image: it has one dimension
     "int8": spaces.Box(-5, 5, (3,), np.int8),
     "int16": spaces.Box(-5, 5, (2, 2), np.int16),
     "int32": spaces.Box(-50, 50, (3,), np.int32),
@@ -66,12 +66,12 @@ class Counting(FakeTask):
 
 
 class CountingMasked(Counting, MaskedTask):
-    """One that forbids actions too."""
+    """A task that also forbids actions."""
 
 
 @pytest.fixture
 def train(make_member, make_configuration, tmp_path):
-    """Train for some steps with an evaluation; return the run directory."""
+    """Train for some steps with an evaluation, and return the run directory."""
 
     def run(name, space):
         entry = ALGORITHMS[name]
@@ -87,7 +87,7 @@ def train(make_member, make_configuration, tmp_path):
         hyperparameters = {"policy_kwargs": SMALL} | HYPERPARAMETERS.get(name, OFF_POLICY)
         configuration = make_configuration(
             algorithm={"name": name, "hyperparameters": hyperparameters, "normalize": {"rewards": False}},
-            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs one that is registered
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs a registered one
             steps=16,
             evaluation={"everySteps": 8, "episodes": 1, "confirmEpisodes": 0},
         )
@@ -100,7 +100,7 @@ def train(make_member, make_configuration, tmp_path):
 
 @pytest.mark.parametrize(("name", "kind"), CASES)
 def test_they_are_trained_on_and_evaluated_and_both_files_act_as_the_policy(train, name, kind):
-    """On observations of the task too, not only on those that the export draws."""
+    """This holds on observations of the task, too, not only on those that the export draws."""
     space = TOGETHER if kind == "together" else WHOLE[kind]
     directory = train(name, space)
 

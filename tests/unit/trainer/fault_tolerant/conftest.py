@@ -1,4 +1,4 @@
-"""Players of fake members."""
+"""Environment groups of fake members."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from palaestra_trainer.simulators.restarter import Restarter, settle
 
 @pytest.fixture
 def make_players():
-    """Make players of members; the rows of their steps are in `rows`, and `released` counts releases."""
+    """Make groups of members. `rows` holds the rows of their steps, and `released` counts releases."""
     made = []
 
     def make(*members, restarts=10, **options):

@@ -1,4 +1,4 @@
-"""One simulator for a loop that knows nothing of faults."""
+"""One simulator for a training loop that does not handle faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_players, make_member):
-    """Make an environment whose member breaks as the keywords say; it is returned too."""
+    """Make an environment whose member breaks as the keywords say, and return both."""
 
     def make(*, restarts=10, deadline_s=20.0, mend_at_once=False, **faults):
         member = make_member(**faults)
@@ -33,7 +33,7 @@ def make_env(make_players, make_member):
 
 
 def test_a_healthy_episode_is_that_of_the_environment(make_env):
-    """Nothing is added and nothing is lost, and the numbers are the environment's own."""
+    """Nothing is added or lost, and the numbers are the environment's own."""
     env, member = make_env()
 
     first, info = env.reset(seed=7)
@@ -48,7 +48,7 @@ def test_a_healthy_episode_is_that_of_the_environment(make_env):
 
 
 def test_a_fault_returns_the_last_observation_as_truncated(make_env):
-    """No loop learns from a number that no simulator has sent."""
+    """A loop must not learn from a number that no simulator has sent."""
     env, _ = make_env(steps=[2])
     env.reset(seed=7)
     before = env.step(RIGHT)[0]
@@ -65,7 +65,7 @@ def test_a_fault_returns_the_last_observation_as_truncated(make_env):
 
 
 def test_an_observation_that_the_environment_reuses_is_not_that_of_the_broken_step(make_env):
-    """Images may be views of a buffer, which a step that breaks off has begun to fill."""
+    """Images may be views of a buffer that an interrupted step has begun to fill."""
     env, member = make_env(steps=[2])
     seen = np.zeros(2, np.float32)
     member.env._observe = lambda: seen
@@ -91,7 +91,7 @@ def test_the_reset_after_a_fault_waits_until_the_simulator_is_mended(make_env):
 
 
 def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
-    """An episode is what its seed says, however often the simulator breaks."""
+    """Its seed determines the episode, however often the simulator breaks."""
     env, member = make_env(resets=[1, 2])
 
     observation, _ = env.reset(seed=5)
@@ -102,7 +102,7 @@ def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
 
 
 def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
-    """As in gymnasium; a standby's environment has a random generator of its own."""
+    """Gymnasium does the same; a standby's environment has its own random generator."""
     env, member = make_env()
     for seed in (3, None, None, 3, None, None):
         env.reset(seed=seed)
@@ -113,7 +113,7 @@ def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
 
 
 def test_a_step_without_an_episode_is_a_mistake(make_env):
-    """After the end of an episode too, also one that a fault has ended."""
+    """The error also comes after the end of an episode, even one that a fault ended."""
     env, _ = make_env(steps=[1])
     with pytest.raises(ResetNeeded, match="call reset"):
         env.step(RIGHT)
@@ -125,7 +125,7 @@ def test_a_step_without_an_episode_is_a_mistake(make_env):
 
 
 def test_a_step_that_is_interrupted_ends_the_episode(make_env):
-    """Ctrl-C in a notebook leaves an answer unread: the next step would take it for its own."""
+    """After Ctrl-C in a notebook a response is unread, and the next step would take it for its own."""
     env, member = make_env()
     env.reset()
 
@@ -144,7 +144,7 @@ def test_a_step_that_is_interrupted_ends_the_episode(make_env):
 
 
 def test_a_simulator_that_breaks_too_often_ends_with_a_typed_error(make_env):
-    """Again at each further reset, instead of a restart without end."""
+    """The error comes at each further reset, too, instead of endless restarts."""
     env, _ = make_env(restarts=1, resets=range(1, 10))
 
     for _ in range(2):
@@ -153,7 +153,7 @@ def test_a_simulator_that_breaks_too_often_ends_with_a_typed_error(make_env):
 
 
 def test_a_simulator_that_is_not_mended_in_time_ends_with_a_typed_error(make_env):
-    """Its budget counts restarts, and one that never ends is none."""
+    """The budget counts restarts, and one that never ends does not count."""
     env, _ = make_env(deadline_s=0.0, resets=[1], held=True)
 
     with pytest.raises(SimulatorHung, match="not mended within 0 s"):
@@ -161,7 +161,7 @@ def test_a_simulator_that_is_not_mended_in_time_ends_with_a_typed_error(make_env
 
 
 def test_a_number_that_is_not_finite_is_no_fault(make_env):
-    """It is a mistake of the environment; a restart would hide it."""
+    """The environment caused it, and a restart would hide that."""
     env, member = make_env()
     env.reset()
     member.env.step_reward = float("nan")
@@ -171,7 +171,7 @@ def test_a_number_that_is_not_finite_is_no_fault(make_env):
 
 
 def test_a_step_can_wait_for_the_mending_itself(make_env):
-    """A program that pauses its simulator after each step must not do so amid a restart."""
+    """A program that pauses its simulator after each step must not do so during a restart."""
     env, member = make_env(mend_at_once=True, steps={1: WrongData("collect-0", "nonsense")})
     env.reset()
 
@@ -180,7 +180,7 @@ def test_a_step_can_wait_for_the_mending_itself(make_env):
 
 
 def test_a_simulator_is_recycled_in_a_reset(make_env):
-    """As in the built-in loop: between episodes, without a fault."""
+    """As in the built-in loop, this happens between episodes and without a fault."""
     env, member = make_env(recycle_after=2)
 
     for seed in range(3):
@@ -191,7 +191,7 @@ def test_a_simulator_is_recycled_in_a_reset(make_env):
 
 
 def test_an_environment_is_closed_once(make_players, make_member):
-    """By `close`, by the end of the process, or by both."""
+    """`close`, the end of the process, or both may do it."""
     players = make_players(make_member())
     env = FaultTolerantEnv(players)
 
@@ -211,20 +211,20 @@ class Seated:
         self.env = make_environment(Environment(id=environment), self.robot, self.scene)
 
     def due(self, episodes=1):
-        """It does not wear out."""
+        """Return None, because it needs no recycling."""
 
     def restart(self):
-        """Live again."""
+        """Restart the fake robot."""
         self.robot.restart()
 
     def stop(self):
-        """Nothing is left to stop."""
+        """Do nothing, because no process runs."""
 
     abandon = pause = unpause = start = stop
 
 
 class Painted(gymnasium.Env):
-    """An environment of a user's own, with attributes and a method of its own."""
+    """A user's environment with its own attributes and a method."""
 
     observation_space = gymnasium.spaces.Discrete(2)
     action_space = gymnasium.spaces.Discrete(2)
@@ -234,7 +234,7 @@ class Painted(gymnasium.Env):
         self.robot, self.scene = robot, scene
 
     def reset(self, *, seed=None, options=None):
-        """Return nothing new."""
+        """Return an observation."""
         del options
         super().reset(seed=seed)
         return 0, {}
@@ -254,7 +254,7 @@ gymnasium.register("Painted-v0", Painted)
 
 
 def seen_from_outside(env):
-    """Return what a program sees of an environment's own attributes, and what it can do with them."""
+    """Return the results of a program's reads, writes and calls of an environment's own attributes."""
     env.reset(seed=4)
     painted = env.get_wrapper_attr("paint")("blue")
     after_painting = env.step(0)[4]
@@ -274,7 +274,7 @@ def seen_from_outside(env):
 
 
 def test_attributes_and_methods_of_an_environment_are_reached_as_through_gymnasium_s_wrappers(make_players):
-    """A program that was written for `gymnasium.make` works with `make_env`."""
+    """A program for `gymnasium.make` must work with `make_env`."""
     member = Seated(environment="Painted-v0")
     plain = gymnasium.make("Painted-v0", robot=member.robot, scene=member.scene)
 
@@ -302,12 +302,12 @@ def test_a_standby_that_takes_over_has_the_attributes_that_were_set(make_players
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_of_other_projects_have_nothing_to_object_to(make_players, check):
-    """Seeds, spaces, types and determinism; every warning is an error in these tests."""
+    """They test seeds, spaces, types and determinism; every warning is an error in these tests."""
     check(FaultTolerantEnv(make_players(Seated())), skip_render_check=True)
 
 
 def test_common_wrappers_can_be_put_around_it(make_players):
-    """They read spaces and metadata, and pass a fault on."""
+    """They read spaces and metadata, and pass on a fault."""
     env = gymnasium.wrappers.RecordEpisodeStatistics(
         gymnasium.wrappers.TimeLimit(FaultTolerantEnv(make_players(Seated(deaths=[4]))), 10)
     )

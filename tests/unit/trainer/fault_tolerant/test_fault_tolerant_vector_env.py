@@ -1,4 +1,4 @@
-"""Several simulators as gymnasium's and Stable-Baselines3's vector environments, without invalid rows."""
+"""Several simulators as vector environments of gymnasium and Stable-Baselines3, without invalid rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_players, make_member):
-    """Make a vector of members, each of which breaks as its dictionary says."""
+    """Make a vector of members; each breaks as its dictionary says."""
 
     def make(*faults, kind=FaultTolerantVectorEnv, restarts=10):
         members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
@@ -39,7 +39,7 @@ def walk(env, steps, action=RIGHT):
 
 
 def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_member):
-    """Values, types, shapes and masks; gymnasium's vector resets in the same step too."""
+    """Values, types, shapes and masks are equal; gymnasium's vector also resets in the same step."""
     ours, *_ = make_env({}, {})
     theirs = SyncVectorEnv(
         [lambda: make_member("a").env, lambda: make_member("b").env], autoreset_mode=AutoresetMode.SAME_STEP
@@ -62,7 +62,7 @@ def test_a_vector_is_gymnasium_s_own_in_everything_but_faults(make_env, make_mem
 
 
 def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
-    """The row is the next episode's first one, and the last observation stands where loops look for it."""
+    """The row is the next episode's first; the last observation is where loops look for it."""
     env, members, _ = make_env({"steps": [2], "held": True}, {})
     env.reset(seed=[1, 2])
     walk(env, 1)
@@ -80,7 +80,7 @@ def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
 
 
 def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
-    """Each in a thread of its own."""
+    """Each has a thread of its own."""
     env, members, _ = make_env({"steps": [2]}, {"steps": [2], "resets": [2]}, {})
     env.reset(seed=1)
 
@@ -92,7 +92,7 @@ def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
 
 
 def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
-    """What loops learn from lies within the observation space, and was sent by a simulator."""
+    """Loops learn only from values that a simulator sent and that are in the observation space."""
     env, members, _ = make_env(
         {"steps": range(5, 100, 7), "resets": [3]}, {"steps": range(3, 100, 11)}, restarts=40
     )
@@ -109,7 +109,7 @@ def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
 
 
 def test_episodes_have_the_seeds_of_their_member(make_env):
-    """One number for all, or one for each, which may be numpy's."""
+    """The seed is one number for all, or one for each, which may be NumPy's."""
     env, members, _ = make_env({}, {})
 
     env.reset(seed=np.int64(5))
@@ -125,7 +125,7 @@ def test_episodes_have_the_seeds_of_their_member(make_env):
 
 
 def test_options_reach_every_environment(make_env):
-    """As `start` and `target` do."""
+    """Examples are `start` and `target`."""
     env, members, _ = make_env({}, {})
 
     env.reset(options={"easy": True})
@@ -134,7 +134,7 @@ def test_options_reach_every_environment(make_env):
 
 
 def test_a_member_that_breaks_too_often_ends_the_loop_with_a_typed_error(make_env):
-    """The lock-step cannot go on with one simulator less."""
+    """Lock-step cannot continue without one of the simulators."""
     env, *_ = make_env({"resets": range(1, 20)}, {}, restarts=1)
 
     with pytest.raises(FaultBudgetSpent, match="collect-0"):
@@ -142,7 +142,7 @@ def test_a_member_that_breaks_too_often_ends_the_loop_with_a_typed_error(make_en
 
 
 def test_gymnasium_s_wrappers_for_vectors_can_be_put_around_it(make_env):
-    """Those that CleanRL's scripts use."""
+    """CleanRL's scripts use these wrappers."""
     env, *_ = make_env({"steps": [2]}, {})
     wrapped = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
     wrapped.reset(seed=1)
@@ -154,7 +154,7 @@ def test_gymnasium_s_wrappers_for_vectors_can_be_put_around_it(make_env):
 
 
 def test_closing_a_vector_releases_its_simulators(make_env):
-    """Once."""
+    """Each is released once."""
     env, _, players = make_env({}, {})
 
     env.close()
@@ -164,7 +164,7 @@ def test_closing_a_vector_releases_its_simulators(make_env):
 
 
 def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
-    """Reset in the same step, and everything else in the info."""
+    """It resets in the same step, and puts everything else into the info."""
     env, *_ = make_env({}, {}, kind=FaultTolerantVecEnv)
     env.seed(3)
     first = env.reset()
@@ -195,7 +195,7 @@ def test_stable_baselines3_counts_no_episode_that_a_fault_cut(make_env):
 
 
 def test_stable_baselines3_learns_in_it(make_env):
-    """With its own wrappers, seeds and attributes."""
+    """The test uses its own wrappers, seeds and attributes."""
     env, members, _ = make_env({"steps": [7]}, {"steps": [11]}, kind=FaultTolerantVecEnv)
 
     model = PPO("MlpPolicy", VecMonitor(env), n_steps=16, batch_size=8, seed=1).learn(64)
@@ -221,7 +221,7 @@ def make_masked(make_players, make_member):
 
 
 def test_sb3_contrib_asks_for_masks_by_its_own_names(make_masked):
-    """The task fails at a forbidden action, so MaskablePPO got the masks, before and after a fault."""
+    """The task fails at a forbidden action, so MaskablePPO must get the masks before and after a fault."""
     model = MaskablePPO("MlpPolicy", make_masked(FaultTolerantVecEnv), n_steps=16, batch_size=8, device="cpu")
 
     model.learn(64)
@@ -230,7 +230,7 @@ def test_sb3_contrib_asks_for_masks_by_its_own_names(make_masked):
 
 
 def test_a_loop_of_gymnasium_asks_for_masks_of_all(make_masked):
-    """By `call`, as of gymnasium's own vectors."""
+    """It uses `call`, as with gymnasium's own vectors."""
     env = make_masked(FaultTolerantVectorEnv)
     env.reset(seed=[1, 2])
 

@@ -1,4 +1,4 @@
-"""Which policy of a run is the best, and whether it is good enough: which episodes say so."""
+"""The best policy of a run and its success rate are decided on separate episodes."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}
 
 
 def lucky(seed, _reached):
-    """Succeed in the episodes by which policies are chosen, and in no other."""
+    """Report success in the episodes by which policies are chosen, and in no other."""
     return {"is_success": seed in EVALUATED}
 
 
 def summary(directory):
-    """Return summary.json."""
+    """Return the content of summary.json."""
     return json.loads(directory.summary.read_text())
 
 
 def test_a_goal_that_was_reached_by_luck_does_not_end_training(play, job, directory):
-    """Of many evaluations of a few episodes each, one reaches the goal by chance."""
+    """Of many short evaluations, one reaches the goal by chance."""
     code, _ = play(job(evaluation=GOAL), report=lucky)
 
     result = summary(directory)
@@ -41,7 +41,7 @@ def test_a_goal_that_was_reached_by_luck_does_not_end_training(play, job, direct
 
 
 def test_each_confirmation_plays_episodes_of_its_own(play, job, directory):
-    """If all played the same ones, policies would be chosen by them in the end."""
+    """Otherwise the policies would in the end be chosen on these episodes."""
     _, members = play(job(evaluation=GOAL | {"confirmEpisodes": 10}), report=lucky)
 
     confirmed = list(read_lines(directory.confirmations))
@@ -53,7 +53,7 @@ def test_each_confirmation_plays_episodes_of_its_own(play, job, directory):
 
 
 def test_a_goal_that_is_confirmed_ends_training_with_the_policy_that_reached_it(play, job, directory):
-    """An earlier one with a better evaluation was not confirmed."""
+    """An earlier policy with a better evaluation was not confirmed."""
     configuration = job(steps=400, evaluation=GOAL | {"stopAtSuccessRate": 0.5, "confirmEpisodes": 10})
     confirming = [*episode_seeds(1, CONFIRM, 20)]
     good = {*EVALUATED, *confirming[10:]}  # the second confirmation
@@ -67,7 +67,7 @@ def test_a_goal_that_is_confirmed_ends_training_with_the_policy_that_reached_it(
 
 
 def test_without_confirmations_an_evaluation_alone_ends_training(play, job, directory):
-    """confirmEpisodes: 0."""
+    """With confirmEpisodes 0 there is no confirmation."""
     play(job(evaluation=GOAL | {"confirmEpisodes": 0}), report=lucky)
 
     result = summary(directory)
@@ -77,7 +77,7 @@ def test_without_confirmations_an_evaluation_alone_ends_training(play, job, dire
 
 
 def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, job, directory):
-    """model.zip is measured, and the checkpoint goes on with what was learned last."""
+    """model.zip is confirmed, and the checkpoint continues with the newest policy."""
     play(job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4, "confirmEpisodes": 7}))
 
     [line] = read_lines(directory.confirmations)
@@ -105,7 +105,7 @@ def test_an_evaluation_keeps_its_episodes(play, job, directory):
 
 
 def test_success_that_is_never_reported_is_absent_and_not_zero(play, job, directory, last_word):
-    """An environment of one's own need not know what success is; the best policy has the best return."""
+    """A user's environment may not report success; the best policy then has the best return."""
     code, _ = play(job(), report=lambda *_: {})
 
     result = summary(directory)
@@ -117,7 +117,7 @@ def test_success_that_is_never_reported_is_absent_and_not_zero(play, job, direct
 
 
 def test_a_goal_without_reported_success_ends_the_run_at_its_first_evaluation(play, job, last_word):
-    """It could never be reached; trying again cannot help."""
+    """The goal could never be reached, and a retry cannot help."""
     code, _ = play(job(evaluation=GOAL), report=lambda *_: {})
 
     assert code == 2
@@ -126,7 +126,7 @@ def test_a_goal_without_reported_success_ends_the_run_at_its_first_evaluation(pl
 
 
 def test_success_that_is_reported_and_failure_that_is_not_is_a_rate(play, job, directory):
-    """Some environments set is_success only where it is true."""
+    """Some environments set is_success only if it is true."""
     play(job(), report=lambda seed, _: {"is_success": True} if seed == min(EVALUATED) else {})
 
     assert next(read_lines(directory.evaluations))["success_rate"] == 0.25
@@ -152,12 +152,12 @@ def test_a_confirmation_that_was_cut_is_made_up_for(play, job, directory):
 
 
 def test_the_summary_is_that_of_model_zip_also_after_a_resume(play, job, directory):
-    """The evaluation that it is from was after the checkpoint that the run went on from."""
+    """Its evaluation came after the checkpoint from which the run resumed."""
     configuration = job(evaluation={"everySteps": 40, "episodes": 4, "confirmEpisodes": 0})
     play(configuration, report=lambda *_: {"is_success": True})
     before = best_of(directory)
     directory.summary.unlink()
-    drop_lines(directory.evaluations, lambda _: True)  # as a resume before its step does
+    drop_lines(directory.evaluations, lambda _: True)  # a resume before its step does so
 
     play(configuration, report=lambda *_: {"is_success": False})
 

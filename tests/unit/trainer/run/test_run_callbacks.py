@@ -1,4 +1,4 @@
-"""Callbacks of a job's author, beside the training loop's own."""
+"""The callbacks of a job's author run together with the training loop's own."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ MODULE = """
 
 @pytest.fixture
 def module(tmp_path, monkeypatch):
-    """Return the name of a module with callbacks, which no other test has imported."""
+    """Return the name of a new module with callbacks."""
     name = f"callbacks_{tmp_path.name}".replace("-", "_")
     (tmp_path / f"{name}.py").write_text(textwrap.dedent(MODULE))
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -75,7 +75,7 @@ def module(tmp_path, monkeypatch):
 
 @pytest.fixture
 def seen(module):
-    """Return what the callbacks of the module have noted."""
+    """Return the notes of the module's callbacks."""
     return __import__(module).SEEN
 
 
@@ -98,7 +98,7 @@ def events(seen, word, event):
 
 
 def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, seen):
-    """At the start of an attempt, at each step, and after the last evaluation and checkpoint."""
+    """They run at the start of an attempt, at each step, and after the last evaluation and checkpoint."""
     code, _ = play(with_callbacks({"word": "first"}, {"word": "second"}))
 
     assert code == 0
@@ -110,7 +110,7 @@ def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, 
 
 
 def test_a_callback_sees_which_rows_a_fault_spoiled(play, with_callbacks, seen):
-    """They are among the infos and, until the step is over, among its steps."""
+    """The infos have these rows; until the end of the step they also count as its steps."""
     play(with_callbacks({}, name="PPO"), {"collect-0": {"steps": [5]}})
 
     valid = [entry[3] for entry in seen if entry[1] == "step"]
@@ -119,7 +119,7 @@ def test_a_callback_sees_which_rows_a_fault_spoiled(play, with_callbacks, seen):
 
 
 def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directory, tmp_path):
-    """They look on."""
+    """Callbacks only observe."""
     without = RunDirectory(tmp_path / "without")
     play(with_callbacks({}))
     play(job(), into=without)
@@ -131,7 +131,7 @@ def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directo
 def test_a_callback_that_returns_false_ends_training_ordinarily(
     play, with_callbacks, directory, seen, name, kept
 ):
-    """At the boundary of the rollout that it cut: evaluated, confirmed, saved and finished."""
+    """It ends at the rollout boundary before the cut: evaluated, confirmed, saved and finished."""
     code, _ = play(with_callbacks({"stop_at": 55}, name=name))
 
     assert code == 0
@@ -142,7 +142,7 @@ def test_a_callback_that_returns_false_ends_training_ordinarily(
 
 
 def test_a_run_that_a_callback_ended_does_not_say_that_all_steps_are_done(play, with_callbacks, last_word):
-    """Its result and its status are read by people who did not read the log."""
+    """Many people read its result and its status, but not the log."""
     play(with_callbacks({"stop_at": 55}))
 
     assert last_word().reason == "Completed: the training is complete"
@@ -151,7 +151,7 @@ def test_a_run_that_a_callback_ended_does_not_say_that_all_steps_are_done(play, 
 def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
     play, job, with_callbacks, directory, tmp_path
 ):
-    """Nothing of the rollout that was cut is left, so the way on is the same."""
+    """The cut rollout leaves nothing behind, so the rest of the run is the same."""
     without, longer = RunDirectory(tmp_path / "without"), RunDirectory(tmp_path / "longer")
     play(job("DQN", evaluation={"everySteps": 0}), into=without)
     play(with_callbacks({"stop_at": 55}, evaluation={"everySteps": 0}))
@@ -168,7 +168,7 @@ def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
 def test_an_error_of_a_callback_ends_the_run_with_its_name_its_line_and_a_checkpoint(
     play, with_callbacks, directory, last_word, module, seen
 ):
-    """A retry may help, for example if a server was down; the line says where the author looks."""
+    """A retry may help, for example if a server was down; the line shows the author the place."""
     code, members = play(with_callbacks({"fail_at": 55}))
 
     assert code == 1
@@ -181,7 +181,7 @@ def test_an_error_of_a_callback_ends_the_run_with_its_name_its_line_and_a_checkp
 
 
 def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, seen):
-    """After the other callbacks have ended."""
+    """It is reported after the other callbacks have ended."""
     code, _ = play(with_callbacks({"fail_at_end": True}, {"word": "second"}))
 
     assert code == 1
@@ -192,7 +192,7 @@ def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, se
 def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the_first_error(
     play, with_callbacks, last_word, seen
 ):
-    """A callback that still uses a simulator at its end may meet a fault; the first error is the cause."""
+    """A callback that uses a simulator at its end may meet a fault. The first error is the cause."""
     ends = ({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}, {"word": "third"})
 
     play(with_callbacks(*ends))
@@ -206,14 +206,14 @@ def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the
 
 
 def test_every_error_at_the_end_is_in_the_log(play, with_callbacks, capsys):
-    """The reason of the run names only the first one."""
+    """The reason of the run has only the first error."""
     play(with_callbacks({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}))
 
     assert "raised RuntimeError: no such file" in capsys.readouterr().out
 
 
 def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_word, seen):
-    """It also learns of the end of the interrupted attempt, whose reason stays the signal."""
+    """The callback also gets the end of the interrupted attempt, whose reason stays the signal."""
     configuration = with_callbacks({"fail_at_end": True})
     steps = iter(range(1, 1000))
 
@@ -227,7 +227,7 @@ def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_wo
 
 
 def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
-    """They are no part of the model."""
+    """They are not part of the model."""
     steps = iter(range(1, 1000))
     play(with_callbacks({}), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
 
@@ -263,7 +263,7 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
     ],
 )
 def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, options, fact):
-    """All that can be known without a simulator is known before one starts."""
+    """All that can be known without a simulator is checked before one starts."""
     wanted = Callback(name=name.format(module=module), options=options)
 
     with pytest.raises(ConfigurationError) as caught:
@@ -276,7 +276,7 @@ def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, op
 def test_all_wrong_callbacks_are_reported_at_once_before_a_simulator_starts(
     play, with_callbacks, last_word, directory
 ):
-    """With exit code 2; no attempt is recorded."""
+    """The exit code is 2, and no attempt is recorded."""
     code, members = play(with_callbacks({"stopat": 1}, {}, {"wrd": ""}))
 
     assert code == 2

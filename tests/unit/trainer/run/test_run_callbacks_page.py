@@ -1,4 +1,4 @@
-"""docs/howto/callbacks.md, carried out as it stands."""
+"""The code in docs/howto/callbacks.md is run unchanged."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PAGE = (Path(__file__).parents[4] / "docs/howto/callbacks.md").read_text()
 
 @pytest.fixture
 def job_of_the_page():
-    """Return the algorithm of a job on the page, as its trainer reads it."""
+    """Return the algorithm of a job on the page as the trainer reads it."""
 
     def read(kind):
         job = identified(load(blocks(PAGE, f"yaml {kind}")[0]), "uid")

@@ -27,7 +27,7 @@ KEPT = Checkpoint(every_steps=5000, keep=3)
 
 @pytest.fixture
 def machine(tmp_path):
-    """Return a function that writes the kernel's files, and returns the folders of `capacity_now`."""
+    """Return a function that writes the kernel's files, and returns the folders for `capacity_now`."""
 
     def write(files, cgroup="0::/pod/container"):
         (tmp_path / "proc" / "self").mkdir(parents=True)
@@ -50,7 +50,7 @@ def begun(directory):
 
 
 def test_the_limit_of_a_container_counts_without_the_cache_of_files(machine, begun):
-    """The kernel frees that cache first; a checkpoint of some GB would look like used memory otherwise."""
+    """The kernel frees this cache first; otherwise a checkpoint of some GB would look like used memory."""
     files = {
         "pod/container/memory.max": "2000000000",
         "pod/container/memory.current": "900000000",
@@ -76,12 +76,15 @@ def test_the_limit_of_a_container_counts_without_the_cache_of_files(machine, beg
     ids=["of a parent", "of version 1", "in a namespace"],
 )  # fmt: skip
 def test_every_kind_of_limit_counts(machine, begun, cgroup, files):
-    """A pod may have a limit, some nodes have version 1, and a container sees its own group as the root."""
+    """A pod may have a limit, and some nodes have cgroup version 1.
+
+    A container sees its own group as the root.
+    """
     assert capacity_now(begun, **machine(files, cgroup)).memory_bytes == 1_500_000_000 - RESERVE_BYTES
 
 
 def test_without_a_limit_the_available_memory_of_the_machine_counts(machine, begun):
-    """On a laptop, or in a pod without `limits`."""
+    """This is so on a laptop, or in a pod without `limits`."""
     found = capacity_now(begun, **machine({}))
 
     assert found.memory_bytes == 8_000_000 * 1024 - RESERVE_BYTES
@@ -89,7 +92,7 @@ def test_without_a_limit_the_available_memory_of_the_machine_counts(machine, beg
 
 
 def test_where_the_kernel_reports_nothing_nothing_is_refused_for_memory(tmp_path, begun):
-    """No number is better than a wrong one."""
+    """An unknown number is better than a wrong one."""
     found = capacity_now(begun, groups=tmp_path / "none", processes=tmp_path / "none")
 
     assert found.memory_bytes is None
@@ -97,7 +100,7 @@ def test_where_the_kernel_reports_nothing_nothing_is_refused_for_memory(tmp_path
 
 
 def test_checkpoints_that_are_there_are_room_for_those_to_come(begun, monkeypatch):
-    """They are replaced one by one; chunks that several share count once."""
+    """Checkpoints are replaced one by one, and chunks that several share count once."""
     chunk = begun.checkpoints / "100" / "experience" / "00000.npy"
     chunk.parent.mkdir(parents=True)
     chunk.write_bytes(bytes(1 << 20))
@@ -127,7 +130,7 @@ def test_checkpoints_that_are_there_are_room_for_those_to_come(begun, monkeypatc
     ],
 )  # fmt: skip
 def test_a_buffer_that_does_not_fit_is_refused_with_the_largest_that_does(memory, limit, disk, lines):
-    """Both numbers, so that the reader can decide which of them to change."""
+    """With both numbers the reader can decide which to change."""
     room = Capacity(memory_bytes=memory, memory_limit=limit, disk_bytes=disk)
     refused = ""
 

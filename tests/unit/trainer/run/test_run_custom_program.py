@@ -1,4 +1,4 @@
-"""Programs of one's own report how far they are: each here is a process that reports and waits."""
+"""Users' own programs report their progress; each test runs one in a process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ for line in sys.stdin:
 
 @pytest.fixture
 def address():
-    """An address that is free now."""
+    """A free address."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return f"127.0.0.1:{listener.getsockname()[1]}"
@@ -41,7 +41,7 @@ def address():
 
 @pytest.fixture
 def program(tmp_path, address):
-    """Start a program with a configuration of 1000 steps; each call returns when it has reported."""
+    """Start a program with a target of 1000 steps; each call returns when it has reported."""
     job = {
         "job": "own",
         "environment": {"id": "Task-v0"},
@@ -73,13 +73,13 @@ def program(tmp_path, address):
 
 
 def answer(address, path):
-    """Return what the program answers."""
+    """Return the program's response."""
     with urlopen(f"http://{address}{path}", timeout=LONG_S) as response:
         return response.read().decode()
 
 
 def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, address):
-    """The operator reads /status, and Prometheus /metrics, of every trainer."""
+    """The operator reads /status of every trainer, and Prometheus reads /metrics."""
     program(step=10, success_rate=0.5)
     program(step=20)
 
@@ -92,7 +92,7 @@ def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, addre
 
 
 def test_what_a_program_spends_its_time_on_is_not_known(program, address):
-    """A second that is counted under the wrong cause is worse than none."""
+    """A second with a wrong cause is worse than an unknown one."""
     program(step=10)
 
     assert json.loads(answer(address, "/status"))["goodput"] == {}
@@ -100,7 +100,7 @@ def test_what_a_program_spends_its_time_on_is_not_known(program, address):
 
 
 def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_path):
-    """It may end before it is asked once more."""
+    """The program may end before the next poll."""
     program(step=999)
     before = (tmp_path / "word").exists()
 
@@ -119,20 +119,20 @@ def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_pa
     ],
 )
 def test_a_report_of_what_cannot_be_is_refused(arguments, mistake):
-    """Percent would pass for a very good policy."""
+    """A value in percent would pass for a very good policy."""
     with pytest.raises(ValueError, match=mistake):
         report(**arguments)
 
 
 def test_a_report_outside_of_a_job_does_nothing(monkeypatch):
-    """The same program runs in a notebook."""
+    """The same program must run in a notebook."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
     report(step=1)
 
 
 def test_steps_of_tolerant_environments_count_until_the_program_reports():
-    """Only the program knows what it has learned before this attempt."""
+    """After its report only the program's number counts, because it includes earlier attempts."""
     progress = ProgramReport(100, [])
 
     progress.played(Role.COLLECT, [{}, {"episode": {"r": 1.0, "l": 5}}, {"palaestra": {"sim_fault": {}}}])
@@ -145,7 +145,7 @@ def test_steps_of_tolerant_environments_count_until_the_program_reports():
 
 
 def test_steps_of_an_evaluating_environment_are_none_of_training(clock):
-    """The operator must not take an evaluation for training that stands still, either."""
+    """The operator must not take an evaluation for a stalled training, either."""
     progress = ProgramReport(100, [], clock)
     progress.played(Role.COLLECT, [{}])
 
@@ -153,13 +153,13 @@ def test_steps_of_an_evaluating_environment_are_none_of_training(clock):
 
     assert (progress.status().step, progress.phase) == (1, "evaluating")
     clock.now += 61.0
-    assert progress.phase == "training"  # one that hangs is found as any other
+    assert progress.phase == "training"  # so that one that hangs is found too
     progress.played(Role.COLLECT, [{}])
     assert (progress.status().step, progress.phase) == (2, "training")
 
 
 def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, monkeypatch):
-    """The address belongs to the program; many workers would all want it."""
+    """Only the program may use the address; its workers would conflict."""
     monkeypatch.setattr(multiprocessing, "parent_process", multiprocessing.current_process)
     configuration = make_configuration()
 
@@ -168,7 +168,7 @@ def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, 
 
 
 def test_faults_and_restarts_of_a_program_s_simulators_are_in_its_status():
-    """As those of the built-in loop."""
+    """The built-in loop has them there, too."""
     progress = ProgramReport(100, [])
     progress.add("collect-0", Role.COLLECT)
     progress.add("collect-0", Role.COLLECT)

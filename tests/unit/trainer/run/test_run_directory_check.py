@@ -1,4 +1,4 @@
-"""A damaged run directory ends a run with one sentence before anything starts or is deleted."""
+"""A damaged run directory ends a run with one message before anything starts or is deleted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.unit.trainer.run.test_run_resume import signal_after
 
 @pytest.fixture(scope="module")
 def begun_once(tmp_path_factory):
-    """Where the run of `begun` is kept: once for all tests."""
+    """The run directory of `begun`, which is made once for all tests."""
     return RunDirectory(tmp_path_factory.mktemp("begun") / "run")
 
 
@@ -31,12 +31,12 @@ def begun(begun_once, play, job, directory):
 
 
 def written(name, content):
-    """Return a damage: other content."""
+    """Return a function that overwrites a file."""
     return lambda run: (run.path / name).write_bytes(content)
 
 
 def appended(name, content):
-    """Return a damage: something at the end."""
+    """Return a function that appends to a file."""
 
     def damage(run):
         with (run.path / name).open("ab") as file:
@@ -46,12 +46,12 @@ def appended(name, content):
 
 
 def halved(name):
-    """Return a damage: the second half is lost."""
+    """Return a function that cuts off the end of a file."""
     return lambda run: (run.path / name).write_bytes((run.path / name).read_bytes()[:-1000])
 
 
 def another_kind(name):
-    """Return a damage: a folder in place of a file, or a file in place of a folder."""
+    """Return a function that replaces a file by a folder, or a folder by a file."""
 
     def damage(run):
         path = run.path / name
@@ -66,7 +66,7 @@ def another_kind(name):
 
 
 def with_member(run):
-    """Damage what model.zip says of its evaluation."""
+    """Damage the evaluation in model.zip."""
     members = {}
     with zipfile.ZipFile(run.model) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
@@ -76,7 +76,7 @@ def with_member(run):
 
 
 def in_each_checkpoint(name, content):
-    """Return a damage of a file in each checkpoint; None: it is removed."""
+    """Return a function that overwrites a file in each checkpoint, or removes it if the content is None."""
 
     def damage(run):
         for folder in run.checkpoints.iterdir():
@@ -131,7 +131,7 @@ def content_of(folder: Path):
 def test_a_damage_ends_the_attempt_before_anything_starts_or_is_deleted(
     begun, play, job, last_word, name, damage
 ):
-    """It was a traceback, a run that began anew over what was left, or an end hours later."""
+    """Before, there was a traceback, a new run over the old files, or an end hours later."""
     damage(begun)
     before = content_of(begun.path)
 
@@ -158,7 +158,7 @@ HARMLESS = {
 
 @pytest.mark.parametrize("damage", HARMLESS.values(), ids=HARMLESS)
 def test_what_a_crash_may_leave_is_no_damage(begun, play, job, damage):
-    """The run goes on from its checkpoint."""
+    """The run resumes from its checkpoint."""
     damage(begun)
 
     code, _ = play(job("PPO"), must_resume=True)
@@ -167,7 +167,7 @@ def test_what_a_crash_may_leave_is_no_damage(begun, play, job, damage):
 
 
 def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
-    """A run without one begins; over damaged ones it would begin anew, and replace them."""
+    """Without checkpoints a run begins; over damaged ones it would begin again and replace them."""
     in_each_checkpoint("model.zip", b"PK")(begun)
 
     assert checkpoint.newest(begun.path / "none") is None
@@ -176,7 +176,7 @@ def test_no_checkpoint_and_none_that_can_be_read_are_two_answers(begun):
 
 
 def test_appending_a_line_reads_no_more_of_a_longer_file(tmp_path, monkeypatch):
-    """Two thousand evaluations read 11 GiB."""
+    """Two thousand evaluations read 11 GiB before."""
     path = tmp_path / "evaluations.jsonl"
     monkeypatch.setattr(Path, "read_bytes", None)
     monkeypatch.setattr(Path, "read_text", None)

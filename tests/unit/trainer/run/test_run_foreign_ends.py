@@ -1,4 +1,4 @@
-"""What code of a job's author does at the end of a run, or to end it: the first cause decides."""
+"""At the end of a run, and when the code of a job's author ends it, the first cause decides."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AT_STEP = 5
 
 
 class Task(gymnasium.Env):
-    """A task that does something of its own at a step, and something when it is closed."""
+    """A task that calls a function at one step, and another when it is closed."""
 
     observation_space = spaces.Box(-1, 1, (1,), np.float32)
     action_space = spaces.Discrete(2)
@@ -33,12 +33,12 @@ class Task(gymnasium.Env):
         self.amid, self.at_close, self.closed, self.taken = amid, at_close, False, 0
 
     def reset(self, *, seed=None, options=None):
-        """Begin."""
+        """Begin an episode."""
         super().reset(seed=seed, options=options)
         return np.zeros(1, np.float32), {}
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         del action
         self.taken += 1
         numbers = np.zeros(1, np.float32)
@@ -47,13 +47,13 @@ class Task(gymnasium.Env):
         return numbers, 0.0, self.taken % 4 == 0, False, {}
 
     def close(self):
-        """Close."""
+        """Close the task."""
         self.closed = True
         self.at_close()
 
 
 class Leaves(BaseCallback):
-    """Ends the program."""
+    """A callback that ends the program."""
 
     def _on_step(self):
         sys.exit(0)
@@ -70,7 +70,7 @@ def leaves():
 
 
 def diverges():
-    """Return what is not finite."""
+    """Return a number that is not finite."""
     return np.full(1, np.nan, np.float32)
 
 
@@ -80,13 +80,13 @@ def breaks():
 
 
 def is_asked_to_end():
-    """Get a signal."""
+    """Send a signal to this process."""
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path, monkeypatch):
-    """Train in two simulators of such a task; return exit code, last word and the tasks."""
+    """Train in two simulators of such a task, and return exit code, last word and the tasks."""
     word = tmp_path / "word"
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(word))
 
@@ -127,7 +127,7 @@ def play(make_member, make_configuration, tmp_path, monkeypatch):
     ],
 )
 def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close, code, reason):
-    """The others are closed too."""
+    """The other environments are closed, too."""
     found, word, tasks = play(amid, at_close)
 
     assert found == code
@@ -136,7 +136,7 @@ def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close,
 
 
 def test_an_environment_cannot_end_the_program_as_if_the_run_were_complete(play):
-    """The exit code 0 of a library would be that of a run without a model."""
+    """Otherwise a library's exit code 0 would mark a run without a model as complete."""
     code, word, _ = play(leaves)
 
     assert code == 1
@@ -145,7 +145,7 @@ def test_an_environment_cannot_end_the_program_as_if_the_run_were_complete(play)
 
 
 def test_a_callback_cannot_end_the_program_as_if_the_run_were_complete(play):
-    """It returns False to stop training, or raises an error."""
+    """A callback must return False to stop training, or raise an error."""
     code, word, _ = play(callbacks=[Leaves])
 
     assert code == 1
@@ -154,7 +154,7 @@ def test_a_callback_cannot_end_the_program_as_if_the_run_were_complete(play):
 
 
 def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
-    """What was decided before is the end."""
+    """The end that was already decided stays."""
     left = []
 
     leave_after(0.05, 75, lambda: left.append("word"), left.append).join(20)
@@ -163,12 +163,12 @@ def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
 
 
 def test_nobody_watches_for_steps_while_everything_is_stopped(play):
-    """A `close` that took longer than `stallDeadlineSeconds` made a stall of a complete run."""
+    """Before, a `close` that took longer than `stallDeadlineSeconds` turned a complete run into a stall."""
     watching = []
 
     def close():
         for thread in [each for each in threading.enumerate() if each.name == "watchdog"]:
-            thread.join(20)  # it ends at once if it was asked to
+            thread.join(20)  # it ends at once if it was stopped
             watching.append(thread.is_alive())
 
     code, _, _ = play(at_close=close)
@@ -194,7 +194,10 @@ sys.exit(code)
 
 @pytest.mark.parametrize("name", ["train", "evaluate", "export"])
 def test_a_thread_that_lives_on_does_not_keep_the_program(name):
-    """It ends soon with its code, the trainer whatever signals come; the thread is named."""
+    """The program ends soon, with its code and the name of the thread.
+
+    The trainer does so despite signals.
+    """
     with subprocess.Popen(
         [sys.executable, "-c", LIVES_ON, name], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:

@@ -1,4 +1,4 @@
-"""Runs that are interrupted, go on, or are over: what an attempt finds of the one before."""
+"""A new attempt finds an interrupted or finished run, and resumes or reports it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from palaestra_trainer.run_directory import RunDirectory, read_lines
 
 
 def signal_after(steps, number=signal.SIGTERM):
-    """Return a function that sends a signal to this process at its `steps`-th call."""
+    """Return a function that sends a signal to this process in its `steps`-th call."""
     calls = iter(range(1, 10_000))
 
     def step():
@@ -27,7 +27,7 @@ def signal_after(steps, number=signal.SIGTERM):
 @pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last_word, name, number):
-    """At a rollout boundary: what was amid a rollout is played again."""
+    """The checkpoint is that of a rollout boundary, and an incomplete rollout is repeated."""
     code, members = play(job(name), on_step=signal_after(42, number))
 
     saved = checkpoint.newest(directory.checkpoints).manifest
@@ -40,7 +40,7 @@ def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, job, directory, name):
-    """It is dropped: at most one rollout is played again."""
+    """The rollout is dropped, so at most one is repeated."""
     long = {"DQN": {"train_freq": 3000, "buffer_size": 50}, "PPO": {"n_steps": 4000, "batch_size": 50}}
     configuration = job(
         name,
@@ -63,7 +63,7 @@ def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, j
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
-    """It ends at the same total, plays again what was under way, and counts what was before."""
+    """It ends at the same total, repeats the incomplete rollout, and keeps the earlier counts."""
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
     saved = checkpoint.newest(directory.checkpoints).manifest
@@ -81,7 +81,7 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
 
 
 def test_a_run_is_prolonged_by_another_job(play, job, directory, tmp_path):
-    """It goes on from the other's last checkpoint to a total of its own, and leaves what it found."""
+    """It starts from the other's last checkpoint, runs to its own total, and leaves those files unchanged."""
     play(job())
     found = files_of(directory.path)
     longer = RunDirectory(tmp_path / "longer")
@@ -98,7 +98,7 @@ def test_a_run_is_prolonged_by_another_job(play, job, directory, tmp_path):
 def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has_one(
     play, job, directory, tmp_path
 ):
-    """The way from the other's is not gone twice."""
+    """The steps since the other's checkpoint are not repeated."""
     play(job())
     longer = RunDirectory(tmp_path / "longer")
     prolonging = job(steps=250, resume_from=str(directory.path))
@@ -114,7 +114,7 @@ def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has
 
 
 def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_path, last_word):
-    """It would begin anew, which would be found out late; nothing was started."""
+    """Otherwise it would begin at step 0, which nobody would notice for a long time; nothing was started."""
     code, members = play(job(resume_from=str(tmp_path / "empty")))
 
     assert code == 2
@@ -130,7 +130,10 @@ def files_of(folder):
 
 
 def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job, last_word):
-    """By the run directory's record, which outlives every pod; restarts are those of this attempt."""
+    """The number is from the run directory, which outlives every pod.
+
+    The restarts are those of this attempt.
+    """
     play(job("DQN"), {"collect-0": {"steps": [5]}}, signal_after(42))
     first = last_word()
 
@@ -141,7 +144,7 @@ def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job,
 
 
 def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directory, last_word):
-    """It was a pod, and the next one is the second."""
+    """It was a pod, so the next attempt is the second."""
     code, _ = play(job("DQN"), {"collect-0": {"starts": range(1, 20)}})
 
     assert code == 80
@@ -149,7 +152,7 @@ def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directo
 
 
 def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
-    """A pod that is started once more must not cost anything."""
+    """A pod that is started again must cost nothing."""
     play(job())
 
     code, members = play(job())
@@ -159,14 +162,17 @@ def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_
     assert len(list(read_lines(directory.attempts))) == 1
 
 
-CONSTANT = {"exploration_initial_eps": 0.1, "exploration_final_eps": 0.1}  # nothing follows `steps`
+CONSTANT = {"exploration_initial_eps": 0.1, "exploration_final_eps": 0.1}  # `steps` has no effect
 
 
 @pytest.mark.parametrize(("name", "constant"), [("DQN", CONSTANT), ("PPO", {})])
 def test_a_finished_run_that_is_prolonged_is_the_run_that_was_that_long(
     play, job, directory, tmp_path, name, constant
 ):
-    """Steps 96 and 192 are boundaries of both algorithms, so it resumes from a state of the long run."""
+    """Steps 96 and 192 are rollout boundaries of both algorithms.
+
+    It therefore resumes from a state of the long run.
+    """
     algorithm = {"name": name, "hyperparameters": job(name).algorithm.hyperparameters | constant}
     at_once = RunDirectory(tmp_path / "at-once")
     play(job(algorithm=algorithm, steps=192), into=at_once)
@@ -189,7 +195,7 @@ def parameters(directory):
 
 
 def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
-    """The summary of its first end would be reported as the result of the second."""
+    """Otherwise the summary of its first end would be reported as the result of the second."""
     play(job())
 
     code, _ = play(job(steps=150), on_step=signal_after(20))
@@ -199,7 +205,7 @@ def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
 
 
 def test_a_directory_of_another_run_is_refused(play, job, last_word):
-    """Before anything of it is overwritten."""
+    """The error comes before anything is overwritten."""
     play(job("DQN"))
 
     code, _ = play(job("PPO", steps=200))
@@ -209,7 +215,7 @@ def test_a_directory_of_another_run_is_refused(play, job, last_word):
 
 
 def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
-    """A person who types --resume expects something to be there."""
+    """A person who types --resume expects a run to be there."""
     code, _ = play(job(), must_resume=True)
 
     assert code == 2
@@ -217,7 +223,7 @@ def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
 
 @pytest.mark.parametrize(("every", "steps"), [(40, [40, 80, 100]), (1000, [100])], ids=["amid", "final"])
 def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, steps):
-    """The best policy may be the one that was being measured."""
+    """The best policy may be the one whose evaluation was interrupted."""
     configuration = job(evaluation={"everySteps": every, "episodes": 4})
     code, _ = play(configuration, on_step=signal_after(1), of="evaluate-0")
     cut = list(read_lines(directory.evaluations))
@@ -229,7 +235,7 @@ def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, 
 
 
 def test_no_evaluation_is_made_twice(play, job, directory):
-    """Those of the attempt before are on record."""
+    """The evaluations of the previous attempt are recorded."""
     play(job(), on_step=signal_after(70))
 
     play(job())
@@ -238,7 +244,7 @@ def test_no_evaluation_is_made_twice(play, job, directory):
 
 
 def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
-    """Up to its last checkpoint, as its steps are; else a run would look faster the more it is killed."""
+    """Like its steps, its time counts up to the last checkpoint; otherwise a killed run would look faster."""
     play(job(), {"collect-0": {"steps": {70: ZeroDivisionError("as good as a kill")}}})
     saved = checkpoint.newest(directory.checkpoints).manifest
 
@@ -253,7 +259,7 @@ def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
 def test_a_new_run_begins_with_the_policy_of_another_and_resumes_from_its_own(
     play, job, directory, tmp_path, capsys
 ):
-    """Its steps are counted from 0; an interrupted one has learned since."""
+    """Its steps count from 0, and a resumed run has learned since."""
     play(job())
     tuned = RunDirectory(tmp_path / "tuned")
     tuning = job(initial_policy=str(directory.model))
@@ -272,7 +278,7 @@ def test_a_new_run_begins_with_the_policy_of_another_and_resumes_from_its_own(
 
 
 def test_an_initial_policy_that_does_not_fit_starts_nothing(play, job, directory, tmp_path, last_word):
-    """The message names the file and a tensor; the exit code says that a retry cannot help."""
+    """The message has the file and a tensor, and the exit code forbids a retry."""
     play(job("PPO"))
     tuned = RunDirectory(tmp_path / "tuned")
 

@@ -1,4 +1,4 @@
-"""Simulators are brought back to where a checkpoint was made."""
+"""Simulators are restored to their state at a checkpoint."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def make_env(make_member):
 
 @pytest.fixture
 def saved(make_env, make_configuration):
-    """Return the state of a model that has begun, amid episodes of two members."""
+    """Return the state of a model in training, with incomplete episodes of two members."""
     env = make_env()
     model = make_model(make_configuration(algorithm=TINY).algorithm, env, seed=1)
     model.learn(10)
@@ -43,14 +43,14 @@ def saved(make_env, make_configuration):
 
 
 def rejoined(env, saved):
-    """Return the state, and the warnings that a simulator does not repeat itself."""
+    """Return the state, and the warnings about simulators that do not repeat themselves."""
     with structlog.testing.capture_logs() as logs:
         state = rejoin(env, saved)
     return state, [line["event"] for line in logs if "do not repeat" in line["event"]]
 
 
 def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
-    """Then the resumed run is exact, and nothing is to be told."""
+    """The resumed run is then exact, and there is no warning."""
     state, warnings = rejoined(make_env(), saved)
 
     assert state is saved
@@ -58,7 +58,7 @@ def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
 
 
 def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(make_env, saved):
-    """Physics engines seldom do; the policy must see what is, not what was."""
+    """Most physics engines do not; the policy must get the current state, not the old one."""
     env = make_env()
     env.seed(2)
 
@@ -70,7 +70,7 @@ def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(m
 
 
 def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, saved):
-    """Its rewards so far belong to no episode, and nothing is bootstrapped across; the other goes on."""
+    """The rewards of its episode are dropped, and nothing is bootstrapped; the other member continues."""
     state, warnings = rejoined(make_env(faults={0: {"steps": [1]}}), saved)
 
     assert warnings == []
@@ -81,7 +81,7 @@ def test_a_simulator_that_breaks_meanwhile_begins_its_next_episode(make_env, sav
 
 
 def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env, saved):
-    """Nothing of it was played."""
+    """That episode had no step yet."""
     broken = [EpisodeState(saved.members[0].episode + 1, None), saved.members[1]]
 
     state, warnings = rejoined(make_env(), checkpoint.TrainingState(**fields(saved) | {"members": broken}))
@@ -93,7 +93,7 @@ def test_a_simulator_that_was_broken_begins_the_episode_it_was_about_to(make_env
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, members):
-    """A new one begins its first episode; those that are gone leave theirs."""
+    """A new simulator begins its first episode, and the episodes of removed ones are dropped."""
     state, _ = rejoined(make_env(members), saved)
 
     assert len(state.members) == len(state.episode_starts) == len(state.observation) == members
@@ -103,7 +103,7 @@ def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, memb
 @pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
 @pytest.mark.parametrize("collectors", [(1, 3), (3, 1)])
 def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name, collectors):
-    """With a replay buffer too, which keeps a row for each of them in mind."""
+    """This also holds with a replay buffer, which keeps a row for each of them."""
     before, after = collectors
     play(job(name, collectors=before))
 
@@ -114,12 +114,12 @@ def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name
 
 
 def fields(state):
-    """Return what a state was made of."""
+    """Return the fields of a state."""
     return {name: getattr(state, name) for name in state.__slots__}
 
 
 def test_an_episode_that_begins_anew_owes_no_reward_to_the_one_before(make_env, make_configuration):
-    """Rewards are normalized by the discounted return of an episode so far."""
+    """Rewards are normalized by the discounted return of the episode so far."""
     env = make_env()
     model = make_model(make_configuration(algorithm=TINY | {"normalize": {}}).algorithm, env, seed=1)
     model.learn(10)

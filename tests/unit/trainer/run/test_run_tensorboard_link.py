@@ -1,4 +1,4 @@
-"""A run on a claim has a link under the name of its job, and trains on where it cannot have one."""
+"""A run on a claim gets a link under the name of its job, and trains on where links are not possible."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def volume(tmp_path):
 
 @pytest.fixture
 def start(volume, make_configuration):
-    """Let a replica start on the claim; return what it logs."""
+    """Return a function that starts a replica on the claim and returns its log lines."""
 
     def begin(uid=UID, replica=0):
         directory = RunDirectory(volume / uid / str(replica))
@@ -39,13 +39,13 @@ def start(volume, make_configuration):
 
 
 def shown(volume):
-    """Return every link that TensorBoard finds, and the folder that it leads to."""
+    """Return every link that TensorBoard finds, with its target folder."""
     links = (path for path in (volume / "tensorboard").rglob("*") if path.is_symlink())
     return {str(link.relative_to(volume / "tensorboard")): link.resolve() for link in links}
 
 
 def test_a_run_on_a_claim_is_linked_under_the_name_of_its_job(play, job, volume):
-    """The claim has it under a UID, which tells a reader nothing."""
+    """On the claim the folder is named by a UID, which means nothing to a reader."""
     directory = RunDirectory(volume / UID / "0")
 
     assert play(job(uid=UID), into=directory)[0] == 0
@@ -55,7 +55,7 @@ def test_a_run_on_a_claim_is_linked_under_the_name_of_its_job(play, job, volume)
 
 
 def test_the_link_holds_wherever_the_claim_is_mounted(start, volume):
-    """TensorBoard has it at /runs, the trainer at /var/lib/palaestra."""
+    """TensorBoard mounts it at /runs, the trainer at /var/lib/palaestra."""
     start()
     elsewhere = volume.rename(volume.with_name("runs"))
 
@@ -63,7 +63,7 @@ def test_the_link_holds_wherever_the_claim_is_mounted(start, volume):
 
 
 def test_jobs_of_one_name_and_their_replicas_are_distinguished(start, volume):
-    """A job that was deleted and made again has a new UID."""
+    """A job that was deleted and created again has a new UID."""
     for uid, replica in ((UID, 0), (UID, 1), (OTHER, 0)):
         assert start(uid, replica) == []
 
@@ -79,7 +79,7 @@ def test_replicas_that_start_at_once_are_all_linked(start, volume):
 
 
 def test_a_restart_leaves_the_link_as_it_is(start, volume):
-    """It is made at each start, so a run that an older release began gets it too."""
+    """It is made at each start, in case that it was deleted."""
     start()
     made = os.lstat(volume / "tensorboard/corridor-0d1f3e5a/0")
 
@@ -88,7 +88,7 @@ def test_a_restart_leaves_the_link_as_it_is(start, volume):
 
 
 def test_a_link_that_leads_elsewhere_is_replaced(start, volume):
-    """The job's name and UID say which run belongs there."""
+    """The job's name and UID determine the target."""
     (volume / "tensorboard/corridor-0d1f3e5a").mkdir(parents=True)
     (volume / "tensorboard/corridor-0d1f3e5a/0").symlink_to("../../gone")
 
@@ -110,7 +110,7 @@ def test_what_is_no_link_stays(start, volume, make):
 
 @pytest.mark.parametrize("replaced", ["tensorboard", "tensorboard/corridor-0d1f3e5a"])
 def test_a_folder_that_another_job_replaced_by_a_link_is_not_followed(start, volume, tmp_path, replaced):
-    """Else it would choose where this trainer writes."""
+    """Otherwise that job would choose where this trainer writes."""
     outside = tmp_path / "outside"
     outside.mkdir()
     (volume / replaced).parent.mkdir(exist_ok=True)
@@ -122,7 +122,7 @@ def test_a_folder_that_another_job_replaced_by_a_link_is_not_followed(start, vol
 
 @pytest.mark.parametrize("number", [errno.EPERM, errno.ENOSYS, errno.EROFS, errno.EOPNOTSUPP])
 def test_a_file_system_without_links_costs_one_warning(play, job, volume, monkeypatch, number):
-    """SMB has none, unless it is mounted with mfsymlinks."""
+    """SMB has no links, unless it is mounted with mfsymlinks."""
 
     def refuse(*_, **__):
         raise OSError(number, os.strerror(number))
@@ -139,7 +139,7 @@ def test_a_file_system_without_links_costs_one_warning(play, job, volume, monkey
 
 
 def test_a_local_run_has_no_link(tmp_path, make_configuration):
-    """It lies at <dir>/<job>/<replica>, under the job's name already."""
+    """It is at <dir>/<job>/<replica>, so the job's name is already in the path."""
     for uid in (UID, ""):
         directory = RunDirectory(tmp_path / "corridor" / "0")
         link_curves(directory, make_configuration(uid=uid))

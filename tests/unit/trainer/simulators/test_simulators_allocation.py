@@ -1,4 +1,4 @@
-"""Each simulator has one environment, in one process: who gets which of PALAESTRA_CONFIG."""
+"""Each simulator has one environment in one process, which PALAESTRA_CONFIG assigns."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def make_configuration(*roles):
 
 @pytest.fixture(autouse=True)
 def scratch(tmp_path, monkeypatch):
-    """The container's scratch folder is the test's own."""
+    """Set the container's scratch folder to the test's folder."""
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     return tmp_path
 
 
 @pytest.fixture
 def take():
-    """Allocate a simulator and return its name; all are released when the test ends."""
+    """Allocate simulators and return their names; all are released at the end of the test."""
     allocated = []
 
     def next_name(configuration, role="Collect"):
@@ -51,14 +51,14 @@ def take():
 
 
 def test_each_environment_has_a_simulator_of_its_own(take):
-    """Two environments in one simulator would drive each other's robot, with plausible numbers."""
+    """Two environments in one simulator would drive the same robot, with plausible numbers."""
     configuration = make_configuration("Collect", "Collect")
 
     assert [take(configuration), take(configuration)] == ["s-0", "s-1"]
 
 
 def test_a_collecting_environment_never_takes_an_evaluating_simulator(take):
-    """What an evaluation measures must not depend on training that goes on in its simulator."""
+    """An evaluation must not depend on training in its simulator."""
     configuration = make_configuration("Evaluate", "Collect")
 
     assert take(configuration) == "s-1"
@@ -81,7 +81,7 @@ def test_a_released_simulator_can_be_allocated_again():
 
 
 def _allocate_and_name(configuration, folder=None):
-    if folder is not None:  # a server that starts workers has the variables of the test that started it
+    if folder is not None:  # a server that starts workers has the variables of an earlier test
         os.environ["ROS_LOG_DIR"] = str(folder)
     try:
         return allocate(configuration, "Collect").simulator.name
@@ -97,7 +97,7 @@ def _allocate_and_die(configuration):
 @pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
-    """Each method by which libraries start their workers; a forked one must not share its parent's claim."""
+    """This is tested for each start method of libraries; a forked worker must not share its parent's lock."""
     configuration = make_configuration("Collect", "Collect")
     mine = take(configuration)
 
@@ -110,7 +110,7 @@ def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_a_forked_worker_does_not_release_its_parents_simulator():
-    """It inherits the parent's environment objects, and may close them as it ends."""
+    """It inherits the parent's environment objects, and may close them when it ends."""
     configuration = make_configuration("Collect")
     mine = allocate(configuration, "Collect")
 
@@ -123,7 +123,7 @@ def test_a_forked_worker_does_not_release_its_parents_simulator():
 
 
 def test_a_killed_process_leaves_no_lock(take):
-    """The kernel frees the lock, so an attempt that follows finds every simulator."""
+    """The kernel releases the lock, so a later attempt finds every simulator."""
     configuration = make_configuration("Collect")
     killed = multiprocessing.get_context("spawn").Process(target=_allocate_and_die, args=(configuration,))
     killed.start()
@@ -135,7 +135,10 @@ def test_a_killed_process_leaves_no_lock(take):
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
 def test_a_scratch_folder_without_locks_is_named(monkeypatch, scratch, number):
-    """NFS without its lock service, and Lustre without the option `flock`; two environments could meet."""
+    """Two environments could otherwise share a simulator.
+
+    NFS without its lock service and Lustre without `flock` have no locks.
+    """
     monkeypatch.setattr("fcntl.lockf", failing(number))
 
     with pytest.raises(ConfigurationError) as refused:

@@ -1,4 +1,4 @@
-"""How many faults are borne, and what a step may take."""
+"""The number of tolerated faults, and the time that a step may take."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("
 
 
 def test_the_message_tells_flapping_from_an_accident():
-    """Kinds, window and remedy: a person reads it hours later, and nothing else."""
+    """It has kinds, window and remedy, because a person reads it hours later."""
     budget = RestartBudget("collect-0", RestartLimit(restarts=10), clock=lambda: 0.0)
     for fault in [DEAD] * 9 + [HUNG]:
         budget.spend(fault)
@@ -41,7 +41,7 @@ def test_a_budget_of_nothing_bears_nothing():
 
 
 def test_three_restarts_in_a_short_time_are_flapping():
-    """Two may be chance; what is long ago does not count."""
+    """Two may be chance, and old ones do not count."""
     times = iter([0.0, 50.0, 99.0, 100.0, 199.0])
     budget = RestartBudget("collect-0", RestartLimit(within_s=100.0), clock=lambda: next(times))
     flapping = []
@@ -54,7 +54,7 @@ def test_three_restarts_in_a_short_time_are_flapping():
 
 @pytest.mark.parametrize(("left", "least", "losses"), [(4, 2, 2), (4, None, 0), (1, 1, 0), (2, 5, 0)])
 def test_a_group_loses_as_many_as_it_can_do_without(left, least, losses):
-    """By default it can do without none."""
+    """By default every simulator is needed."""
     group = Group(left, least)
 
     assert [group.lose_one() for _ in range(left)] == [True] * losses + [False] * (left - losses)
@@ -65,7 +65,7 @@ def test_a_group_loses_as_many_as_it_can_do_without(left, least, losses):
     [(0.004, 0.051, True), (0.004, 0.049, False), (0.010, 0.099, False), (0.010, 0.101, True)],
 )
 def test_slow_is_a_step_of_ten_times_the_median_and_fifty_milliseconds(usual, seconds, slow):
-    """The one leaves out ordinary jitter, the other what nobody would notice."""
+    """The first limit ignores normal jitter, and the second ignores delays that nobody would notice."""
     pace = Pace()
     assert not any(pace.slow(usual) for _ in range(10))
 
@@ -73,14 +73,14 @@ def test_slow_is_a_step_of_ten_times_the_median_and_fifty_milliseconds(usual, se
 
 
 def test_the_first_steps_are_never_slow():
-    """There is nothing to compare them with, and connecting takes its time."""
+    """They have no earlier steps for comparison, and connecting takes time."""
     pace = Pace()
 
     assert not any(pace.slow(1.0 + number) for number in range(10))
 
 
 def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
-    """After fifty steps the new pace counts as normal."""
+    """After fifty steps the new speed counts as normal."""
     pace = Pace()
     for _ in range(200):
         pace.slow(0.004)
@@ -89,7 +89,7 @@ def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
 
 
 def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
-    """Steps are taken in turns of one thread; each is measured by its own part of the time."""
+    """One thread takes turns between steps; each is measured by its own part of the time."""
     told = []
     watcher = NullWatcher()
     watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
@@ -106,7 +106,7 @@ def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
 
 
 def compute_for_a_while():
-    """Take a tenth of a second."""
+    """Compute for a tenth of a second."""
     until = time.perf_counter() + 0.1
     while time.perf_counter() < until:
         pass

@@ -1,4 +1,4 @@
-"""All simulators of a run together."""
+"""The fleet of all simulators of a run."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ class Told(NullWatcher):
         self.told = []
 
     def restarted(self, simulator, *, recycled):
-        """Keep it."""
+        """Record the call."""
         assert not recycled
         self.told.append(f"restarted {simulator}")
 
     def flapping(self, simulator):
-        """Keep it."""
+        """Record the call."""
         self.told.append(f"flapping {simulator}")
 
     def given_up(self, simulator):
-        """Keep it."""
+        """Record the call."""
         self.told.append(f"given up {simulator}")
 
 
 @pytest.fixture
 def make_fleet(make_configuration, make_member):
-    """Make a fleet of two members; what is given is the first one's."""
+    """Make a fleet of two members; the arguments are for the first one."""
 
     def make(first=None, **faults):
         members = [first or make_member("collect-0", **faults), make_member("evaluate-0")]
@@ -63,7 +63,7 @@ def make_fleet(make_configuration, make_member):
 
 
 def test_all_are_started_and_stopped(make_fleet):
-    """Those that collect and those that evaluate."""
+    """This includes collecting and evaluating simulators."""
     fleet, members = make_fleet()
 
     fleet.start()
@@ -73,7 +73,7 @@ def test_all_are_started_and_stopped(make_fleet):
 
 
 def test_one_that_does_not_come_up_ends_the_start(make_fleet):
-    """After as many tries as its budget has."""
+    """Its budget limits the number of attempts."""
     fleet, members = make_fleet(starts=range(1, 100))
 
     with pytest.raises(FaultBudgetSpent, match="collect-0: flapping: 10 restarts"):
@@ -83,12 +83,12 @@ def test_one_that_does_not_come_up_ends_the_start(make_fleet):
 
 
 def misfit_starts(*numbers):
-    """Starts at which the world lacks what is needed."""
+    """Return starts at which the world lacks a required node."""
     return {number: WorldMisfit("collect-0", "the world has no node DEF TARGET") for number in numbers}
 
 
 def test_two_processes_in_a_row_that_lack_what_is_needed_are_a_wrong_configuration(make_fleet):
-    """Retrying cannot help: the world is the same each time."""
+    """A retry cannot help, because the world is the same each time."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2))
 
     with pytest.raises(ConfigurationError, match="collect-0: collect-0: the world has no node DEF TARGET"):
@@ -103,7 +103,7 @@ def test_two_processes_in_a_row_that_lack_what_is_needed_are_a_wrong_configurati
     ids=["one", "two with another fault between"],
 )
 def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, starts):
-    """One process may answer before its world is whole."""
+    """A process may respond before its world is loaded completely."""
     fleet, members = make_fleet(starts=starts)
 
     fleet.start()
@@ -112,7 +112,7 @@ def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, st
 
 
 def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_fleet):
-    """Its worlds were right."""
+    """Its worlds have been valid before."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2, 3))
 
     fleet.start(stepped=True)
@@ -121,13 +121,13 @@ def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_flee
 
 
 def refusals(*numbers, fact="refused a step of 50 ms; use a multiple of the world's basicTimeStep"):
-    """Starts, resets or steps at which the simulator refuses what it is asked for."""
+    """Return starts, resets or steps at which the simulator refuses a request."""
     return {number: WrongData("collect-0", fact) for number in numbers}
 
 
 @pytest.mark.parametrize("what", ["starts", "resets", "steps"])
 def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_configuration, last_word, what):
-    """A period that is no multiple of the basic step ended as a simulator that broke ten times."""
+    """A period that is not a multiple of the basic step once looked like a simulator that broke ten times."""
     code, members = play(make_configuration(), faults={"collect-0": {what: refusals(1, 2, 3)}})
 
     assert code == ExitCode.CONFIGURATION
@@ -136,7 +136,7 @@ def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_con
 
 
 def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_configuration, last_word):
-    """It ends with exit code 2 each time; ten restarts would not mend PALAESTRA_STUB_FAULTS."""
+    """It ends with exit code 2 each time, and ten restarts would not correct PALAESTRA_STUB_FAULTS."""
     said = "the simulator ended with code 2; it said last: there is no fault 'exit@step=45'"
     starts = {number: SimulatorRefused("collect-0", said) for number in (1, 2, 3)}
 
@@ -157,14 +157,14 @@ def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_co
     ids=["after a step", "in other words", "then something else"],
 )
 def test_what_one_process_refuses_is_mended(play, make_configuration, faults):
-    """A simulator that has worked before is broken, not the configuration."""
+    """A simulator that worked before is broken, but the configuration is right."""
     code, _ = play(make_configuration(), faults={"collect-0": faults})
 
     assert code == ExitCode.DONE
 
 
 def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):
-    """The log names the late simulator before its deadline makes a fault of it."""
+    """The log names the late simulator before its deadline turns it into a fault."""
     monkeypatch.setattr("palaestra_trainer.simulators.fleet.LONG_S", 0.0)
     released = threading.Event()
     member = make_member("collect-0")
@@ -181,7 +181,7 @@ def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member,
 
 
 def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_member):
-    """Eleven tries of a minute each are long for somebody who pressed Ctrl-C."""
+    """Eleven attempts of a minute each are long after Ctrl-C."""
     released = threading.Event()
     member = make_member("collect-0")
 
@@ -213,7 +213,7 @@ def with_fewer(configuration, least):
 
 
 def test_training_begins_when_enough_of_each_group_are_up(make_configuration, make_member):
-    """The one that does not come up is mended while the others learn."""
+    """The missing one is restarted while the others learn."""
     members = [make_member("collect-0", starts=[1], held=True), make_member("collect-1")]
     watcher = Told()
     fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
@@ -229,7 +229,7 @@ def test_training_begins_when_enough_of_each_group_are_up(make_configuration, ma
 
 
 def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configuration, make_member):
-    """From then on it is mended in the background, like any other."""
+    """From then on it is restarted in the background, like any other."""
     up = threading.Event()
     late = make_member("collect-0", held=True)
 
@@ -249,7 +249,7 @@ def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configura
 
 
 def test_training_does_not_begin_before_every_one_was_tried(make_configuration, make_member):
-    """Most often all come up; the first steps should be everybody's."""
+    """Usually all start, and the first steps should include all of them."""
     released = threading.Event()
     slow = make_member("collect-0")
     slow.start = lambda: released.wait(DEADLINE_S)
@@ -287,7 +287,7 @@ def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_con
 
 
 def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
-    """No thread may touch a simulator that its owner has stopped."""
+    """No thread may use a simulator that its owner has stopped."""
     fleet, members = make_fleet(held=True)
     fleet.start()
     (restarter,) = fleet.collecting
@@ -300,7 +300,7 @@ def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
 
 
 def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
-    """It is its thread's alone."""
+    """Only the restarting thread may use it."""
     fleet, members = make_fleet(held=True)
     fleet.start()
     fleet.collecting[0].begin_mending(SimulatorHung("collect-0", "slow"))
@@ -313,7 +313,7 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
 
 
 def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
-    """The others collect meanwhile; a member that runs before it rests again would step while paused."""
+    """The others collect meanwhile; a member that is paused in between would step while paused."""
     member = make_member(recycle_after=1, held=True)
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -327,7 +327,7 @@ def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_ru
 
 
 def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
-    """Its next evaluation is over before it is worn."""
+    """Its next evaluation ends before its limit is reached."""
     member = make_member(recycle_after=24)
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -339,7 +339,7 @@ def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
 
 
 def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make_member):
-    """In the background again: another simulator may play its episodes."""
+    """It is again restarted in the background, because another simulator may take its episodes."""
     member = make_member(recycle_after=1, starts=[1])
     restarter = Restarter(member)
     restarter.reset(seed=1)
@@ -353,7 +353,7 @@ def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make
 
 
 def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make_member):
-    """A signal may come while the simulators are healthy, and its end is no fault of theirs."""
+    """A signal may come while the simulators are healthy, and their end is then not a fault."""
     member = make_member("collect-0", recycle_after=1, held=True)
     fleet, _ = make_fleet(member)
     fleet.start()

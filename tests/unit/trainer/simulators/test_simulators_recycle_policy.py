@@ -1,4 +1,4 @@
-"""When a healthy simulator is due to be restarted: by resets, by age, by memory."""
+"""A healthy simulator is restarted after some resets, at an age, or at a memory size."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ MIB = 2**20
 
 
 class Clock:
-    """A clock that the test moves."""
+    """A clock that a test moves."""
 
     def __init__(self):
         self.now_s = 100.0
 
     def __call__(self):
-        """Return the seconds."""
+        """Return the time in seconds."""
         return self.now_s
 
 
 class Memory:
-    """A sidecar's answer about memory, and how often it was asked for."""
+    """A sidecar's report of its memory, and the number of requests for it."""
 
     def __init__(self, used=None):
         self.used = used
@@ -36,12 +36,12 @@ class Memory:
 
 @pytest.fixture
 def clock():
-    """Return a clock that stands."""
+    """Return a clock that does not move by itself."""
     return Clock()
 
 
 def test_without_limits_nothing_is_ever_due(clock):
-    """`recycle: {afterResets: 0}` in a job."""
+    """A job sets this with `recycle: {afterResets: 0}`."""
     wear = RecyclePolicy(None, Memory(10**12), clock)
     clock.now_s += 1e9
 
@@ -50,7 +50,10 @@ def test_without_limits_nothing_is_ever_due(clock):
 
 @pytest.mark.parametrize(("resets", "due"), [(23, None), (24, "24 resets"), (25, "25 resets")])
 def test_due_by_resets(clock, resets, due):
-    """After 24 of them, so that the 25th, at which the paper's simulator died, is the next one's first."""
+    """The paper's simulator died at the 25th reset.
+
+    After 24 resets, the next one is the new simulator's first.
+    """
     wear = RecyclePolicy(Recycle(after_resets=24), Memory(), clock)
 
     assert wear.due(resets) == due
@@ -69,14 +72,14 @@ def test_due_by_resets(clock, resets, due):
     ],
 )
 def test_due_before_several_episodes_where_that_saves_a_restart_amid_them(clock, resets, episodes, due):
-    """Fifty episodes have two restarts amid them, also in a simulator that was restarted before."""
+    """Fifty episodes contain two restarts in any case, also in a simulator that was restarted before."""
     wear = RecyclePolicy(Recycle(after_resets=24), Memory(), clock)
 
     assert wear.due(resets, episodes) == due
 
 
 def test_due_by_age_since_it_came_into_use(clock):
-    """What stood by for an hour has not worked for an hour: it would be recycled as soon as it took over."""
+    """An hour as a standby is not an hour of work; it would otherwise be recycled when it takes over."""
     wear = RecyclePolicy(Recycle(after_minutes=1.5), Memory(), clock)
     clock.now_s += 89.0
     before = wear.due(0)
@@ -89,7 +92,7 @@ def test_due_by_age_since_it_came_into_use(clock):
 
 @pytest.mark.parametrize(("used", "due"), [(400 * MIB, None), (401 * MIB, "401 MiB of memory"), (None, None)])
 def test_due_by_memory(clock, used, due):
-    """Above the limit, not at it; and not when nobody knows."""
+    """It is due above the limit, not at it, and not if the memory is unknown."""
     wear = RecyclePolicy(Recycle(above_memory_bytes=400 * MIB), Memory(used), clock)
     clock.now_s += ASK_MEMORY_EVERY_S
 
@@ -97,7 +100,7 @@ def test_due_by_memory(clock, used, due):
 
 
 def test_memory_is_asked_for_once_a_second_at_most(clock):
-    """Episodes may be short, and a sidecar looks at every process for the answer."""
+    """Episodes may be short, and a sidecar reads every process for the response."""
     memory = Memory(0)
     wear = RecyclePolicy(Recycle(above_memory_bytes=MIB), memory, clock)
 
@@ -109,7 +112,7 @@ def test_memory_is_asked_for_once_a_second_at_most(clock):
 
 
 def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
-    """A question that nobody wants the answer of."""
+    """No program needs the response."""
     memory = Memory(0)
     wear = RecyclePolicy(Recycle(after_resets=1), memory, clock)
     clock.now_s += 60.0
@@ -120,7 +123,7 @@ def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
 
 
 def test_the_first_limit_that_is_reached_is_the_reason(clock):
-    """The log names it, so that a user can raise the right limit."""
+    """The log has it, so that a user can raise the right limit."""
     limits = Recycle(after_resets=24, after_minutes=1, above_memory_bytes=MIB)
     wear = RecyclePolicy(limits, Memory(2 * MIB), clock)
     clock.now_s += 60.0

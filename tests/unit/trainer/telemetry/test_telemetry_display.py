@@ -1,4 +1,4 @@
-"""What a person sees of a run."""
+"""The display of a run's progress."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ STATUS = TrainerStatus(
 
 
 class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
+    """A stream that claims to be a terminal."""
 
     def isatty(self):
-        """Say so."""
+        """Return True."""
         return True
 
 
 def test_a_terminal_gets_a_bar_with_the_figures():
-    """Steps, success, return, speed and faults."""
+    """These are steps, success, return, speed and faults."""
     terminal = Terminal()
     with for_stream(terminal) as display:
         display.show(STATUS)
@@ -63,7 +63,7 @@ def test_anything_else_gets_lines():
 
 @pytest.mark.parametrize("display", [Lines(every_s=60.0), Bar(Terminal())], ids=["lines", "bar"])
 def test_it_is_shown_at_once_and_then_now_and_then(display):
-    """Every step asks; most must be told no."""
+    """Every step checks whether it is due, and most of them must get False."""
     first = display.due
     display.show(STATUS)
 
@@ -71,7 +71,7 @@ def test_it_is_shown_at_once_and_then_now_and_then(display):
 
 
 def test_what_is_unknown_is_not_shown():
-    """A return of None means nothing to anybody."""
+    """A return of None has no meaning for a reader."""
     terminal = Terminal()
     with Bar(terminal) as display:
         display.show(TrainerStatus(step=0, target=100, episodes=0, phase="starting"))

@@ -1,4 +1,4 @@
-"""What a trainer's /metrics tell, and where each number comes from."""
+"""The metrics of a trainer and the sources of their values."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def progress(clock):
 
 
 def scrape(progress, known=None):
-    """Return the families that Prometheus reads, by name."""
+    """Return the families that Prometheus parses, by name."""
     text = generate_latest(metrics.registry(progress, known or {})).decode()
     return {family.name: family for family in text_string_to_metric_families(text)}
 
 
 def values(progress, name, *labels):
-    """Return the values of a metric by its labels, the given ones in that order; empty: not known."""
+    """Return the values of a metric by some labels, in the given order; an unknown metric has no values."""
     return {
         tuple(sample.labels[label] for label in labels): sample.value
         for family in scrape(progress).values()
@@ -54,7 +54,7 @@ def episode(number, *, success=None):
 
 
 def test_every_family_is_there_before_anything_happened(progress):
-    """A dashboard is made before the run, and unknown is not zero."""
+    """A dashboard is made before the run, and an unknown value is not zero."""
     found = scrape(progress)
 
     assert {name for name in found if name.startswith("palaestra_")} == {
@@ -65,7 +65,7 @@ def test_every_family_is_there_before_anything_happened(progress):
 
 
 def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
-    """Of which the quantiles of the last hundred are exact."""
+    """The quantiles of the last hundred are exact."""
     progress.collected(7, [episode(number) for number in range(1, 6)])
 
     returns = values(progress, "palaestra_trainer_episode_return_bucket", "le")
@@ -79,7 +79,7 @@ def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
 
 
 def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
-    """Where the environment says so; one that does not has no ratio."""
+    """An environment that does not report success has no such metric."""
     progress.collected(1, [episode(1)])
     silent = values(progress, "palaestra_trainer_episode_success_ratio")
     progress.collected(2, [episode(1, success=False)] * 100)
@@ -90,7 +90,7 @@ def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
 
 
 def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
-    """With the number of evaluations."""
+    """The number of evaluations is also exported."""
     for success in (True, False):
         played = Episode(seed=1, total_reward=2.0, length=3, success=success)
         progress.evaluated(EvaluationResult(episodes=(played,), faults=0, seconds=0.1))
@@ -107,7 +107,7 @@ def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
 
 
 def test_figures_for_tensorboard_are_metrics_too(progress):
-    """Losses, exploration and learning rate are; a name that is not declared is not."""
+    """Losses, exploration and learning rate are exported, but undeclared names are not."""
     logged = Logged(progress.figures)
     logged.write({"train/loss": 0.5, "train/n_updates": 4, "rollout/exploration_rate": 0.3}, {}, 7)
     logged.write({"train/learning_rate": 0.001, "train/my_own_loss": 1.0, "train/loss": 0.25}, {}, 8)
@@ -118,7 +118,7 @@ def test_figures_for_tensorboard_are_metrics_too(progress):
 
 
 def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
-    """A restart has the cause of the fault that it mended; wear is none."""
+    """A restart has the cause of the fault before it; recycling is not a fault."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.fault("collect-0", SimulatorHung("collect-0", "silent"), steps_lost=0)
     progress.restarted("collect-0", recycled=False)
@@ -137,7 +137,7 @@ def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
 
 
 def test_simulators_are_counted_by_how_they_stand(progress):
-    """One that was given up is not one that is being mended."""
+    """A simulator that was given up differs from one that is restarting."""
     progress.started("evaluate-0")
     progress.given_up("collect-0")
 
@@ -177,7 +177,7 @@ def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
 
 
 def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
-    """The rate of it is the real-time factor."""
+    """The rate of the simulated time is the real-time factor."""
     member = make_member()
     member.simulated_s = 1.92
     progress.figures.meters = {"collect-0": Restarter(member).meter}
@@ -189,7 +189,7 @@ def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
 
 @pytest.fixture
 def train(job, directory, make_member):
-    """Train a short run of DQN to its end; return its progress."""
+    """Train a short run of DQN to its end, and return its progress."""
 
     def run():
         configuration = job("DQN")
@@ -207,7 +207,7 @@ def train(job, directory, make_member):
 
 
 def test_a_run_tells_of_its_checkpoints_and_losses(train):
-    """Of a whole run, once it has ended: when, how long and how large; by what it learned."""
+    """After the run, the metrics have time, duration and size of its checkpoints, and its losses."""
     progress = train()
 
     size = values(progress, "palaestra_trainer_checkpoint_size_bytes")[()]
@@ -222,7 +222,7 @@ def test_a_run_tells_of_its_checkpoints_and_losses(train):
 
 
 def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, train):
-    """Prometheus takes a jump from 0 for growth. Here the port is in use, and nothing is served at all."""
+    """Prometheus takes a jump from 0 for growth. Here the port is in use, so nothing is served."""
     saved = train().step
     with socket.create_server(("127.0.0.1", 0)) as taken:
         configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
@@ -236,7 +236,7 @@ def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, 
 
 
 def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
-    """The run goes on without, and somebody ought to know."""
+    """The run continues without the checkpoint, but somebody should notice."""
 
     def no_space(*_args, **_options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -250,7 +250,7 @@ def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
 
 
 def test_the_limits_of_a_run_are_metrics_too(progress, job):
-    """An alert compares with it: no checkpoint for three intervals, idle for most of the deadline."""
+    """Alerts compare with them: no checkpoint for three intervals, or idle for most of the deadline."""
     configuration = job(checkpoint={"everySteps": 50}, stallDeadlineSeconds=90)
 
     found = scrape(progress, metrics.constants(configuration))
@@ -260,7 +260,7 @@ def test_the_limits_of_a_run_are_metrics_too(progress, job):
 
 
 def test_a_member_with_a_spare_has_simulated_what_both_have():
-    """A restart changes their roles, and a counter must not fall."""
+    """A restart swaps their roles, but a counter must not decrease."""
     first, second = (SimpleNamespace(name="collect-0", simulated_s=seconds) for seconds in (1.5, 0.25))
 
     assert Standby(first, second).simulated_s == 1.75

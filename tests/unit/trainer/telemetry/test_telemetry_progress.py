@@ -1,4 +1,4 @@
-"""The progress of a run, and its reports."""
+"""The progress of a run and its status."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def progress(clock):
 
 
 def get(server, path):
-    """Return what the server answers."""
+    """Return the server's response."""
     with urllib.request.urlopen(f"http://{server.address}{path}", timeout=5) as answer:
         return answer.read().decode()
 
@@ -36,7 +36,7 @@ def evaluation(*, success):
 
 
 def test_at_the_start_nothing_is_known(progress):
-    """Absent is not zero."""
+    """An absent value differs from zero."""
     status = progress.status()
 
     assert (status.step, status.target, status.phase) == (0, 100, "starting")
@@ -48,7 +48,7 @@ def test_at_the_start_nothing_is_known(progress):
 
 
 def test_steps_and_episodes_are_counted(progress):
-    """An invalid row has no episode."""
+    """An invalid row belongs to no episode."""
     progress.collected(
         7, [{"episode": {"r": 2.0, "l": 3}, "palaestra": {"extra_steps": 1}}, {"palaestra": {"valid": False}}]
     )
@@ -60,7 +60,7 @@ def test_steps_and_episodes_are_counted(progress):
 
 
 def test_speed_is_that_of_the_last_half_minute(progress, clock):
-    """A slow hour yesterday says nothing about now."""
+    """A slow hour yesterday does not affect the current speed."""
     for second in range(100):
         clock.now = float(second)
         progress.collected(second * (1 if second < 50 else 10), [])
@@ -69,7 +69,7 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
 
 
 def test_what_simulators_leave_out_is_reported_once_for_their_group():
-    """All simulators of a group have the same world, but lines of its copies may have other numbers."""
+    """All simulators of a group have the same world, but their reports may have different line numbers."""
     names = ["big-hall-0", "big-hall-1", "evaluate-0"]
     progress = Progress(100, [(name, "Collect") for name in names])
     for number, name in enumerate(names[:2]):
@@ -87,7 +87,7 @@ def test_what_simulators_leave_out_is_reported_once_for_their_group():
 
 
 def test_a_fault_is_reported_for_its_simulator(progress):
-    """Which one, in which state, and why."""
+    """The status has the simulator, its state and the fault."""
     progress.started("collect-0")
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     broken = progress.status().simulators[0]
@@ -100,7 +100,7 @@ def test_a_fault_is_reported_for_its_simulator(progress):
 
 
 def test_recycling_is_no_restart(progress):
-    """Nothing was broken."""
+    """No fault occurred."""
     progress.restarted("collect-0", recycled=True)
 
     assert progress.status().simulators[0].restarts == 0
@@ -116,7 +116,7 @@ def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
 
 
 def test_a_run_that_goes_on_never_says_step_0(progress):
-    """From the moment that its checkpoint is found, before any simulator is up."""
+    """This holds from the time when its checkpoint is found, before any simulator has started."""
     progress.resumed(40, Counters(episodes=3))
 
     status = progress.status()
@@ -124,7 +124,7 @@ def test_a_run_that_goes_on_never_says_step_0(progress):
 
 
 def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
-    """Recycling is none; the counters have those of former attempts too."""
+    """Recycling does not count; the counters also include earlier attempts."""
     progress.counters.restarts = 7
     progress.restarted("collect-0", recycled=False)
     progress.restarted("evaluate-0", recycled=False)
@@ -134,7 +134,7 @@ def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
 
 
 def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
-    """An evaluation is no stall."""
+    """An evaluation is not a stall."""
     clock.now = 50.0
     before = progress.idle_s()
     progress.stepped(1)
@@ -143,7 +143,7 @@ def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
 
 
 def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, monkeypatch):
-    """A node's time of day may jump by an hour; how long no step was taken does not change by that."""
+    """A node's time of day may jump by an hour, but the time since the last step must not."""
     clock.now = 50.0
     progress.stepped(1)
     monkeypatch.setattr("time.time", lambda: 0.0)
@@ -163,7 +163,7 @@ def test_a_step_ends_the_age_of_progress(progress, clock):
 
 
 def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
-    """A run's faults are those of all its attempts."""
+    """The faults of a run are those of all its attempts."""
     progress.fault("collect-0", SimulatorHung("collect-0", "slow"), steps_lost=0)
     clock.now = 1.5
 
@@ -175,12 +175,12 @@ def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
 
 
 def test_a_checkpoint_of_an_older_release_has_fewer_counters():
-    """What it did not count is not known, and counted from now on."""
+    """A value that it lacks is unknown, and counts from now on."""
     assert Counters.from_json({"episodes": 7, "seconds": 3.0}) == Counters(episodes=7)
 
 
 def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
-    """By cause, and each second once, however often it is asked for."""
+    """It continues by cause, and each second counts once, however often it is read."""
     with progress.spending(Cause.LEARNING):
         clock.now = 5.0
     before = progress.counted()
@@ -194,8 +194,8 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
     assert {cause: it for cause, it in counted.goodput.items() if it} == {"learning": 5.0, "starting": 2.0}
 
 
-def test_time_of_a_checkpoint_that_does_not_know_recycling_stays_where_it_was(progress, clock):
-    """An older release counted recycling as recovering, and nobody can tell the two apart any more."""
+def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, clock):
+    """A release may add a cause; nobody can tell any more what the one before counted it as."""
     saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
     progress.resumed(40, saved)
     with progress.spending(Cause.RECYCLING):
@@ -207,7 +207,7 @@ def test_time_of_a_checkpoint_that_does_not_know_recycling_stays_where_it_was(pr
 
 
 def test_a_phase_is_what_time_is_spent_on(progress):
-    """One word, by which a person sees what the run does."""
+    """The phase is one word that shows a person what the run does."""
     phases = [progress.phase]
     for cause in Cause:
         with progress.spending(cause):
@@ -220,7 +220,7 @@ def test_a_phase_is_what_time_is_spent_on(progress):
 
 
 def test_slowness_is_counted_and_breaks_nothing(progress):
-    """A simulator that needs its time is not restarted for it."""
+    """A simulator that needs more time is not restarted."""
     progress.started("collect-0")
     progress.slow("collect-0", 0.4)
     progress.fault("evaluate-0", SimulatorDead("evaluate-0", "gone"), steps_lost=0)
@@ -232,7 +232,7 @@ def test_slowness_is_counted_and_breaks_nothing(progress):
 
 
 def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(progress, clock):
-    """One crash in a night is an accident, three in ten minutes are none."""
+    """One crash in a night is an accident, but three in ten minutes are not."""
     progress.restarted("collect-0", recycled=False)
     once = progress.status().simulators[0].flapping
     progress.flapping("collect-0")
@@ -244,7 +244,7 @@ def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(
 
 
 def test_a_simulator_that_was_given_up_is_reported_and_no_longer_missed(progress):
-    """The run goes on without it."""
+    """The run continues without it."""
     progress.started("evaluate-0")
     progress.given_up("collect-0")
 
@@ -266,7 +266,7 @@ def test_the_status_has_the_current_state_of_a_spare(progress):
 
 
 def test_the_last_ten_faults_are_remembered(progress):
-    """With what is needed to find the cause: when, who, what and how far the run was."""
+    """Each has what is needed to find the cause: time, simulator, fault and step."""
     for number in range(12):
         progress.collected(number, [])
         progress.fault("collect-0", SimulatorDead("collect-0", f"gone {number}"), steps_lost=0)
@@ -280,14 +280,14 @@ def test_the_last_ten_faults_are_remembered(progress):
 
 
 def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
-    """Those of training were learned from, and led nowhere; those of an evaluation took as long."""
+    """Training steps were learned from for nothing; evaluation steps took as long."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=5)
 
     assert progress.status().steps_lost == 5
 
 
 def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progress):
-    """As the checkpoint tells the next attempt; a run that goes on itself has lost none."""
+    """The checkpoint stores this for the next attempt; a run that continues has lost no steps."""
     progress.collected(47, [])
 
     assert progress.counted(40).steps_lost == 7
@@ -296,7 +296,7 @@ def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progres
 
 
 def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
-    """By cause and by kind, as TensorBoard names them."""
+    """TensorBoard shows them by cause and by kind."""
     clock.now = 2.0
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.slow("collect-0", 0.4)
@@ -309,14 +309,14 @@ def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
 
 
 def test_what_the_docstring_promises_is_there(progress):
-    """And all that is there for others to read."""
+    """Everything else that is public is described too."""
     promised = set(re.findall(r"^ {4}(\w+): ", inspect.getdoc(Progress), re.MULTILINE))
 
     assert promised == {name for name in vars(progress) if not name.startswith("_")}
 
 
 def test_the_success_rate_is_that_of_the_last_evaluation(progress):
-    """A policy can get worse, and then one wants to see it."""
+    """A policy may get worse, and the user must see that."""
     progress.evaluated(evaluation(success=True))
     progress.evaluated(evaluation(success=False))
 
@@ -324,7 +324,7 @@ def test_the_success_rate_is_that_of_the_last_evaluation(progress):
 
 
 def test_status_is_the_protocol_s(progress):
-    """The operator reads it with the same code."""
+    """The operator parses it with the same code."""
     progress.saved(50)
     with status_server("127.0.0.1:0", progress) as server:
         answer = json.loads(get(server, "/status"))
@@ -350,7 +350,7 @@ def test_metrics_are_the_same_numbers(progress):
 
 
 def test_probes_are_answered(progress):
-    """Kubernetes asks every few seconds."""
+    """Kubernetes sends them every few seconds."""
     with status_server("127.0.0.1:0", progress) as server:
         assert get(server, "/healthz") == "ok\n"
         with pytest.raises(urllib.error.HTTPError, match="404"):
@@ -358,7 +358,7 @@ def test_probes_are_answered(progress):
 
 
 def test_a_port_in_use_is_reported_as_such(progress):
-    """Two trainers on one laptop."""
+    """Two trainers may run on one laptop."""
     with (
         status_server("127.0.0.1:0", progress) as server,
         pytest.raises(ConfigurationError, match=r"statusAddress: 127.0.0.1:\d+ is in use"),
@@ -368,6 +368,6 @@ def test_a_port_in_use_is_reported_as_such(progress):
 
 @pytest.mark.parametrize("address", ["203.0.113.1:9090", "127.0.0.1:99999", "no.such.host.invalid:1"])
 def test_an_address_that_is_not_ours_is_reported_as_such(progress, address):
-    """The message carries the system's own."""
+    """The message has the operating system's error."""
     with pytest.raises(ConfigurationError, match="cannot be listened on"):
         status_server(address, progress)

@@ -1,4 +1,4 @@
-"""The part that all trackers share, tried with one that keeps everything in memory."""
+"""The common part of all trackers, tested with one that keeps everything in memory."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run,
 
 
 class Memory(Tracker):
-    """Keeps what it gets, for all attempts together."""
+    """A tracker that keeps its data for all attempts together."""
 
     begun: ClassVar[list[Any]] = []
     points: ClassVar[list[Any]] = []
     ended: ClassVar[list[int]] = []
 
     def begin(self, directory, configuration):
-        """Continue the run that is known, or begin the first."""
+        """Continue the known run, or begin the first."""
         run = known_run(directory, "memory")
         if run is None:
             remember_run(directory, "memory", "the-run")
         self.begun.append((run, configuration))
 
     def log_scalars(self, step, scalars):
-        """Keep them."""
+        """Keep the scalars."""
         self.points.append((step, scalars))
 
     def end(self):
-        """Note it."""
+        """Record the end."""
         self.ended.append(len(self.points))
 
 
 @pytest.fixture
 def memory(monkeypatch):
-    """Return the tracker, empty, as the class of every callback."""
+    """Return the empty tracker, as the class of every callback."""
     for name in ("begun", "points", "ended"):
         monkeypatch.setattr(Memory, name, [])
     monkeypatch.setattr(callbacks, "_class", lambda *_: Memory)
@@ -66,7 +66,7 @@ def tracked(job):
 
 
 def test_a_tracker_gets_every_scalar_of_tensorboard_at_the_same_step(play, tracked, memory, directory):
-    """Also those of the last evaluation and of the confirmation, after the end of learning."""
+    """This includes the last evaluation and the confirmation, after the end of learning."""
     play(tracked("PPO"))
 
     points = {(name, step): value for step, scalars in memory.points for name, value in scalars.items()}
@@ -81,7 +81,7 @@ def test_a_tracker_gets_every_scalar_of_tensorboard_at_the_same_step(play, track
 
 
 def test_a_tracker_gets_the_configuration_with_every_hyperparameter(play, tracked, memory):
-    """Defaults too, because a later release may have others."""
+    """Defaults are included, because a later release may have others."""
     play(tracked())
 
     run, configuration = memory.begun[0]
@@ -92,7 +92,7 @@ def test_a_tracker_gets_the_configuration_with_every_hyperparameter(play, tracke
 
 
 def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memory):
-    """Its id is in the run directory, which outlives an attempt."""
+    """The tracker's run id is in the run directory, which outlives an attempt."""
     steps = iter(range(1, 1000))
     play(tracked(), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
     play(tracked())
@@ -104,7 +104,7 @@ def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memo
 
 @pytest.mark.parametrize("tracker", ["wandb:Wandb", "mlflow:MLflow"])
 def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
-    """Before a simulator starts."""
+    """The error comes before a simulator starts."""
     library, _, _ = tracker.partition(":")
     if importlib.util.find_spec(library):
         pytest.skip(f"{library} is installed")
@@ -114,7 +114,7 @@ def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
 
 
 class UnreachableService(types.ModuleType):
-    """Stands in for the library of W&B, which is not installed; its service is away at the end."""
+    """The library of W&B, which is not installed, with a service that is unreachable at the end."""
 
     Settings = staticmethod(dict)
 
@@ -127,7 +127,7 @@ class UnreachableService(types.ModuleType):
         """Do nothing."""
 
     def finish(self):
-        """Wait in vain, as the library does with a deadline; without one it would not return."""
+        """Raise a timeout, as the library does with a deadline; without one it would not return."""
         assert self.settings["finish_timeout"] > 0
         assert self.settings["finish_timeout_raises"]
         raise TimeoutError("Timed out finishing run.")
@@ -135,7 +135,7 @@ class UnreachableService(types.ModuleType):
 
 @pytest.fixture
 def wandb_away(monkeypatch):
-    """Return the tracker's class with that library; neither module outlives the test."""
+    """Return the tracker's class with that library; both modules are removed after the test."""
     name = "palaestra_trainer.trackers.wandb"
     monkeypatch.setitem(sys.modules, "wandb", UnreachableService("wandb"))
     monkeypatch.setitem(sys.modules, name, None)
@@ -144,7 +144,7 @@ def wandb_away(monkeypatch):
 
 
 def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory):
-    """The grace period is shorter than the library's patience; its files are in the run directory."""
+    """The grace period of a pod is shorter than the library's timeout; its files are in the run directory."""
     tracker = wandb_away(mode="online")
     directory.path.mkdir(exist_ok=True)
     tracker.begin(directory, {"job": "corridor", "replica": 0})

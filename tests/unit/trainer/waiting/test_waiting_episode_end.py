@@ -1,4 +1,4 @@
-"""An episode that does not end, and those who wait for its end."""
+"""An episode that does not end, and the code that waits for its end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Endless(FakeTask):
     """A task without an end."""
 
     def step(self, action):
-        """Step."""
+        """Take a step."""
         observation, reward, _, _, info = super().step(action)
         return observation, reward, False, False, info
 
@@ -29,7 +29,7 @@ class First:
     """A policy that takes the first action."""
 
     def predict(self, _observation, state=None, _episode_start=None, **_options):
-        """Return it."""
+        """Return the action."""
         return 0, state
 
 
@@ -43,7 +43,7 @@ def restarter(make_member):
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    """Wait for a few steps only."""
+    """Lower the limit of steps."""
     monkeypatch.setattr(episode_end, "MOST_STEPS", 50)
 
 
@@ -62,7 +62,7 @@ def test_reinforce_gives_an_endless_episode_up(restarter):
 
 
 def test_a_long_episode_is_a_line_in_the_log_every_minute(clock):
-    """Else nothing is heard of a run that goes on."""
+    """Otherwise nothing would show that the run continues."""
     end = EpisodeEnd("an evaluation", clock)
     with structlog.testing.capture_logs() as logged:
         for steps in range(40):

@@ -1,4 +1,4 @@
-"""Which facade an environment uses that is made after it."""
+"""The facade that a new environment uses."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from palaestra_trainer.webots.facade import open_facades
 
 
 class Facade:
-    """Anything that a program may create."""
+    """Any object that a program may create."""
 
 
 @pytest.fixture
 def make():
-    """Make facades, which are offered, and withdrawn with the test."""
+    """Make facades that are offered, and withdraw them at the end of the test."""
     made = []
 
     def one():
@@ -30,7 +30,7 @@ def make():
 
 
 def test_the_newest_facade_is_offered(make):
-    """In a notebook, the cell above made it."""
+    """In a notebook, the cell above created it."""
     make()
     newest = make()
 
@@ -38,7 +38,7 @@ def test_the_newest_facade_is_offered(make):
 
 
 def test_a_facade_has_one_environment_at_a_time(make):
-    """Two would move each other's robot."""
+    """Two environments would move the same robot."""
     older, newest = make(), make()
     open_facades.take(newest)
 
@@ -48,7 +48,7 @@ def test_a_facade_has_one_environment_at_a_time(make):
 
 
 def test_a_facade_that_was_closed_is_offered_no_more(make):
-    """Also if its environment gives it back later."""
+    """This holds even if its environment gives it back later."""
     facade = make()
     open_facades.take(facade)
     open_facades.withdraw(facade)
@@ -69,7 +69,7 @@ def test_a_facade_that_nobody_has_is_forgotten():
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_a_forked_process_is_offered_none_of_its_parent(make):
-    """Both would read from the same connections."""
+    """Both processes would read from the same connections."""
     facade = make()
 
     child = os.fork()

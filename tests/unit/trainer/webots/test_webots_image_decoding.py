@@ -1,4 +1,4 @@
-"""The arrays that are read from messages of cameras and lidars, and the messages that are refused."""
+"""Arrays from the messages of cameras and lidars, and refused messages."""
 
 import math
 import struct
@@ -15,7 +15,7 @@ POINTS = np.array([[1.0, 2.0, 3.0], [math.inf, math.inf, math.inf]], np.float32)
 
 
 def image(data, kind, pixel_bytes, frame_id="robotino/camera", **changes):
-    """Return the bytes of a sensor_msgs/Image of an array in an encoding; `changes` replace its fields."""
+    """Return an array as the bytes of a sensor_msgs/Image; `changes` replace its fields."""
     height, width = data.shape[:2]
     fields = {
         "header": {"seq": 3, "frame_id": frame_id},
@@ -65,13 +65,13 @@ KINDS = {
 
 @pytest.fixture(params=KINDS)
 def kind(request):
-    """Return what reads the messages of a device, what makes one, and the array in it."""
+    """Return a reader for a device's messages, a function that makes one, and its array."""
     make_reading, make_message, array = KINDS[request.param]
     return make_reading(), make_message, array
 
 
 def test_the_array_has_shape_and_type_of_the_sensor(kind):
-    """The same for the first message and for later ones, whose head is known."""
+    """The result is the same for the first message and for later ones, whose head is known."""
     read, make_message, array = kind
 
     for _ in range(2):
@@ -82,7 +82,7 @@ def test_the_array_has_shape_and_type_of_the_sensor(kind):
 
 
 def test_no_pixel_is_copied(kind):
-    """The array lies in the message and is read-only."""
+    """The array uses the memory of the message and is read-only."""
     read, make_message, _ = kind
     message = make_message()
 
@@ -93,7 +93,7 @@ def test_no_pixel_is_copied(kind):
 
 
 def test_a_camera_may_change_its_size():
-    """Its world was loaded anew."""
+    """Its world was loaded again."""
     read = ImageReading("camera")
     read(color())
 
@@ -104,7 +104,7 @@ def test_a_camera_may_change_its_size():
 
 @pytest.mark.parametrize("known", [False, True], ids=["first", "later"])
 def test_a_message_cut_short_anywhere_is_refused(kind, known):
-    """Pixels of the image before would be read as its own."""
+    """Otherwise pixels of the previous image would be read."""
     read, make_message, _ = kind
     sound = make_message()
     if known:
@@ -116,7 +116,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind):
-    """It is of another type than the topic says."""
+    """It is of another type than the topic's."""
     read, make_message, _ = kind
     sound = make_message()
 

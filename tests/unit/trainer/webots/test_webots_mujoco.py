@@ -1,4 +1,4 @@
-"""Facades of sensors and actuators of MuJoCo for which Webots has no device."""
+"""Facades of MuJoCo's sensors and actuators for which Webots has no device."""
 
 import math
 
@@ -18,7 +18,7 @@ def message(*numbers):
 
 
 def test_numbers_are_an_array_of_all():
-    """In the order of MuJoCo."""
+    """The order is that of MuJoCo."""
     numbers = read_numbers(message(1.0, -2.5, 0.0))
 
     assert numbers.dtype == np.float64
@@ -33,7 +33,7 @@ def test_a_number_that_is_not_finite_is_refused(number):
 
 
 def test_a_message_cut_short_anywhere_is_refused():
-    """A length would be read as a number."""
+    """Otherwise a length would be read as a number."""
     sound = message(1.0, 2.0)
 
     for length in range(len(sound)):
@@ -42,7 +42,7 @@ def test_a_message_cut_short_anywhere_is_refused():
 
 
 def test_devices_have_their_names_below_mujoco():
-    """A robot's list of devices has them there."""
+    """A robot's list of devices has these names."""
     assert MujocoSensor("walker", "hip force").device == "mujoco/hip force"
     actuator = MujocoActuator("walker", "left biceps")
     assert actuator.device == "mujoco/left biceps"

@@ -51,9 +51,9 @@ class Positions(NamedTuple):
 
     @classmethod
     def from_json(cls, content: Sequence[Any]) -> Positions:
-        """Return the positions that were written as JSON; older releases wrote no columns."""
-        row, full, newest, *columns = content
-        return cls(row, full, tuple(newest), tuple((at, filled) for at, filled in (columns or [()])[0]))
+        """Return the positions that were written as JSON."""
+        row, full, newest, columns = content
+        return cls(row, full, tuple(newest), tuple((at, filled) for at, filled in columns))
 
 
 class ValidReplayBuffer(ReplayBuffer):

@@ -100,17 +100,14 @@ def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
     """Return a new model of the algorithm for `env` on a device; `seed` decides its initial weights.
 
-    If the algorithm normalizes, the model's own environment does that, see `normalization`. Only runs of old
-    releases, which used MlpPolicy for every observation, have the hyperparameter `policy`.
+    If the algorithm normalizes, the model's own environment does that, see `normalization`.
 
     Raises:
         ConfigurationError: the algorithm does not fit the environment, or a hyperparameter has a wrong value.
     """
     entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters
-    policy = given.pop("policy", None) or policy_of_spaces(
-        algorithm, entry, env.observation_space, env.action_space
-    )
+    policy = policy_of_spaces(algorithm, entry, env.observation_space, env.action_space)
     added = noise.action_noise(given, env) if entry.takes_noise else None
     chosen = hyperparameters.arguments(
         entry.original,

@@ -1,15 +1,13 @@
 """The hyperparameters that a run began with; the run keeps them even if the defaults change later.
 
-All of them are in a file of the run directory. Releases up to a5276f3 did not write it. Their runs continue
-with the values that these releases used for every environment: the arena's, and MlpPolicy even for images.
+All of them are in a file of the run directory.
 """
 
 from __future__ import annotations
 
 import json
 
-from palaestra_trainer.algorithms.make_model import resolve, with_defaults
-from palaestra_trainer.algorithms.registry import entry_of
+from palaestra_trainer.algorithms.make_model import resolve
 from palaestra_trainer.configuration import Algorithm, Configuration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory, replace_file
@@ -28,22 +26,16 @@ def begin_with(
     Raises:
         ConfigurationError: the file in the run directory cannot be read.
     """
-    if directory.hyperparameters.exists() or not (before or directory.attempts.exists()):
-        return _kept(configuration, directory) or resolve(
-            configuration.algorithm, configuration.environment.id
-        )
-    return begun_with(configuration, before or directory)
+    return _kept(configuration, directory) or begun_with(configuration, before or directory)
 
 
 def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorithm:
-    """Return the algorithm of a run that has begun.
+    """Return the algorithm of the run in `directory` with all its hyperparameters.
 
     Raises:
         ConfigurationError: the file in the run directory cannot be read.
     """
-    algorithm = configuration.algorithm
-    before = {**entry_of(algorithm.name).arena, "policy": "MlpPolicy"}
-    return _kept(configuration, directory) or with_defaults(algorithm, before)
+    return _kept(configuration, directory) or resolve(configuration.algorithm, configuration.environment.id)
 
 
 def keep(algorithm: Algorithm, directory: RunDirectory) -> None:

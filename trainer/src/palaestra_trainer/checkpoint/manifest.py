@@ -16,9 +16,7 @@ from palaestra_trainer.errors import ConfigurationError
 
 MANIFEST = "manifest.json"
 EXPERIENCE = "experience"
-# Format 1 lacked random generators and running episodes, so a run could not be resumed from it exactly.
-FORMAT = 2
-_OLD_FORMATS = (1,)  # without a digest of the manifest itself
+FORMAT = 1
 _NOT_COMPARED = {"callbacks"}  # a run may continue with other callbacks, because they are not part of a model
 
 
@@ -137,7 +135,7 @@ def _read_manifest(folder: Path) -> Manifest:
     digest = content.pop("digest", None)
     whole = digest == _digest_of(content)
     number = content.get("format")
-    if number in _OLD_FORMATS or (whole and number != FORMAT):
+    if whole and number != FORMAT:
         raise ConfigurationError(
             f"{folder}: is of format {number}, of another release than this one, which reads {FORMAT}; "
             "go on with the release that wrote it, or use another run directory"

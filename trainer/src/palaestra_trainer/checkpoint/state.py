@@ -166,8 +166,6 @@ class TrainingState:
         with np.load(folder / ARRAYS, allow_pickle=False) as file:
             arrays = dict(file)
         positions = content["positions"]
-        members = content["members"]
-        progress = content.get("training_progress", [0.0] * len(members))  # added after a5276f3
         return cls(
             numbers=content["numbers"],
             generators=Generators.from_json(content["generators"]),
@@ -177,8 +175,10 @@ class TrainingState:
             successes=content["successes"],
             positions=positions and Positions.from_json(positions),
             members=[
-                EpisodeState(episode, arrays.get(f"actions-{index}"), progress[index])
-                for index, episode in enumerate(members)
+                EpisodeState(episode, arrays.get(f"actions-{index}"), progress)
+                for index, (episode, progress) in enumerate(
+                    zip(content["members"], content["training_progress"], strict=True)
+                )
             ],
             rollout=content["rollout"],
             noise={name: torch.from_numpy(arrays[name]) for name in _NOISE if name in arrays},

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import ceil
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -57,16 +57,6 @@ class Best:
     def score(self) -> tuple[float, float]:
         """The rank, as in `EvaluationResult.score`; the best evaluation has the highest."""
         return (self.success_rate or 0.0, self.mean_return)
-
-    @classmethod
-    def of_line(cls, line: dict[str, Any]) -> Self:
-        """Return a line of evaluations.jsonl as the best one."""
-        rate = line["success_rate"]
-        return cls(
-            step=int(line["step"]),
-            success_rate=None if rate is None else float(rate),
-            mean_return=float(line["mean_return"]),
-        )
 
 
 class Selection:
@@ -210,17 +200,11 @@ class Selection:
 
 
 def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation of the policy in model.zip; None: model.zip is missing, or was not evaluated.
-
-    A model.zip of a release up to a5276f3 does not hold it; then it is the best line of evaluations.jsonl.
-    """
+    """Return the evaluation of the policy in model.zip; None: model.zip is missing, or was not evaluated."""
     if not directory.model.exists():
         return None
     with zipfile.ZipFile(directory.model) as archive:
-        if BEST in archive.namelist():
-            return Best(**json.loads(archive.read(BEST)))
-    lines = map(Best.of_line, read_lines(directory.evaluations))
-    return max(lines, key=lambda line: line.score, default=None)
+        return Best(**json.loads(archive.read(BEST))) if BEST in archive.namelist() else None
 
 
 def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None:

@@ -2,8 +2,8 @@
 
 Stable-Baselines3 pickles each value that JSON cannot write. A function or class that cannot be imported by
 name is stored as byte code. If another Python executes it, it raises SystemError or ends the process.
-This release stores only names and numbers. Earlier ones stored schedules and the small network as byte code,
-and a class of a job's author may still be one that cannot be imported by name.
+The trainer's own values are names and numbers, but a class of a job's author may be one that cannot be
+imported by name.
 """
 
 from __future__ import annotations
@@ -14,38 +14,28 @@ import pickletools
 import re
 import sys
 import zipfile
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from palaestra_trainer.errors import ConfigurationError
 
-# These attributes of models are schedules. An update needs them, an action does not.
-SCHEDULES = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf", "exploration_schedule")
 _SERIALIZED = ":serialized:"
 _PICKLER = "cloudpickle"  # a pickle names functions of cloudpickle only if it creates functions or classes
 
 
-def replacements(model: Path, hyperparameters: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
-    """Return replacements, by name, for values in a model.zip that this Python cannot run.
-
-    Args:
-        model: the file.
-        hyperparameters: returns the arguments that the run gave the class; they contain the schedules.
+def refuse_another_python(model: Path) -> None:
+    """Return if this Python can run all values of a model.zip.
 
     Raises:
-        ConfigurationError: another Python wrote byte code that is not a schedule.
+        ConfigurationError: another Python wrote byte code into it.
     """
     with zipfile.ZipFile(model) as archive:
         written_by = _python(archive)
         coded = [] if written_by in {"", _this_python()} else _with_code(archive)
-    if others := [name for name in coded if name not in SCHEDULES]:
+    if coded:
         raise ConfigurationError(
-            f"{model}: {' and '.join(others)} has byte code of Python {written_by}, and this is Python "
+            f"{model}: {' and '.join(coded)} has byte code of Python {written_by}, and this is Python "
             f"{_this_python()}; use Python {written_by}, or export the policy there"
         )
-    given = hyperparameters() if coded else {}
-    return {name: given.get(name) for name in coded}  # the model derives the others from its arguments
 
 
 def _this_python() -> str:

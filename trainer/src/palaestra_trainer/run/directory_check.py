@@ -57,7 +57,7 @@ class _Summary(_Content):
     target: _Count
     steps: _Count
     success_rate: _Rate
-    success_interval: _Interval | None = None
+    success_interval: _Interval | None
 
 
 def inspect(directory: RunDirectory) -> None:

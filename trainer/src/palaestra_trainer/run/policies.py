@@ -14,15 +14,13 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
-from palaestra_trainer.algorithms.hyperparameters import arguments
-from palaestra_trainer.algorithms.saved_hyperparameters import begun_with
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.configuration import Configuration, Environment, load
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
-from palaestra_trainer.run import byte_code
+from palaestra_trainer.run.byte_code import refuse_another_python
 from palaestra_trainer.run_directory import RunDirectory
 
 
@@ -138,13 +136,8 @@ def load_policy(run_or_zip: str | Path) -> TrainedPolicy:
 
 
 def _load(model: Path, configuration: Configuration) -> BaseAlgorithm:
-    original = entry_of(configuration.algorithm.name).original
-
-    def given() -> dict[str, Any]:
-        known = begun_with(configuration, RunDirectory(model.parent)).hyperparameters
-        return arguments(original, {name: known[name] for name in byte_code.SCHEDULES if name in known})
-
-    return original.load(model, device="cpu", custom_objects=byte_code.replacements(model, given))
+    refuse_another_python(model)
+    return entry_of(configuration.algorithm.name).original.load(model, device="cpu")
 
 
 def _scales(model: Path) -> dict[str, Scale]:

@@ -14,6 +14,8 @@ from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_fi
 from palaestra_trainer.telemetry.goodput import trained_share
 from palaestra_trainer.telemetry.progress import Progress
 
+_NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # of a finished run
+
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     """Return the summary of a run that has ended.
@@ -63,7 +65,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         content = json.loads(directory.summary.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
         return None
-    if not isinstance(content, dict) or not content.keys() >= {"target", "steps", "success_rate"}:
+    if not isinstance(content, dict) or not content.keys() >= _NEEDED:
         return None
     if content["target"] < configuration.steps:
         return None
@@ -72,7 +74,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
 
 def last_word_of(summary: dict[str, Any]) -> Termination:
     """Return the termination message of an attempt that finds its run finished."""
-    interval = summary.get("success_interval")  # a summary of a release up to a5276f3 does not have it
+    interval = summary["success_interval"]
     return Termination(
         step=summary["steps"],
         reason="Completed: before",
