@@ -1,4 +1,4 @@
-"""Read files that a person names, up to a size: one may be a disk image, or a device without end."""
+"""Read files that a person names, up to a size: a file may be a disk image, or an endless device."""
 
 import os
 import stat
@@ -6,19 +6,19 @@ from pathlib import Path
 
 from palaestra.errors import PalaestraError
 
-MOST_JOB_BYTES = 2**23  # eight times what an API server takes; YAML may escape each letter
+MOST_JOB_BYTES = 2**23  # eight times the limit of an API server, because YAML may escape each letter
 MOST_WORLD_BYTES = 2**26
 
 
 class TooLarge(PalaestraError):
-    """A file is larger than what it should be can be."""
+    """A file is larger than a file of its kind can be."""
 
 
 def read_bounded(file: Path, most_bytes: int) -> bytes:
     """Return the content of a file.
 
     Raises:
-        TooLarge: it has more than `most_bytes`; of a regular file, nothing is read then.
+        TooLarge: the file has more than `most_bytes`; then a regular file is not read at all.
         OSError: it cannot be read.
     """
     with file.open("rb") as content:

@@ -1,15 +1,15 @@
 """Every error that palaestra raises.
 
     PalaestraError
-    ├── TrainingJobError             a TrainingJob cannot be used as it stands
+    ├── TrainingJobError             a TrainingJob cannot be used in its current form
     │   ├── SpecErrors               its spec is wrong: never retried
     │   ├── JobRefused               the operator cannot run it (decide.validation)
-    │   └── PlanError                no plan can be made of it
-    │       ├── WorldCheckTooCostly  the check of a world takes more than its budget
+    │   └── PlanError                the job cannot be planned
+    │       ├── WorldCheckTooCostly  the check of a world exceeds its budget
     │       ├── WorldRefused         a world is wrong
     │       └── WorldUnchecked       a world is not checked yet: retried once it is
-    ├── LocalError                   the local runner cannot go on (local.errors)
-    │   ├── RunRefused               the run cannot be started as asked
+    ├── LocalError                   the local runner cannot continue (local.errors)
+    │   ├── RunRefused               the run cannot be started as requested
     │   ├── StartFailed              a container that others wait for did not start
     │   ├── StillRunning             a run in the background has not ended by a deadline
     │   └── StorageFailed            a file of the run could not be written
@@ -24,13 +24,13 @@
     │   │   └── NoSuchKind           no such kind: its definition is not installed
     │   ├── ServerError              the API server or its store failed (5xx)
     │   ├── TooManyRequests          the API server is busy
-    │   └── Unreachable              no readable answer in time
-    │       ├── ConnectionBroke      it ended before the answer did; repeat a read (cluster.transport)
-    │       └── Untrusted            the server's certificate is refused
-    ├── NotConfigured                no API server is named (cluster.errors)
+    │   └── Unreachable              no readable response in time
+    │       ├── ConnectionBroke      the connection broke; a read may be repeated (cluster.transport)
+    │       └── Untrusted            the server's certificate is not trusted
+    ├── NotConfigured                no API server is configured (cluster.errors)
     ├── CommandFailed                a command in a container failed (cluster.errors)
-    ├── ClientError                  a command about a cluster's jobs cannot be carried out (client.errors)
-    │   ├── EndedOtherwise           the job ended in another way than awaited
+    ├── ClientError                  a command about a cluster's jobs failed (client.errors)
+    │   ├── EndedOtherwise           the job ended in another phase than expected
     │   ├── HasEnded                 the job has ended, so it is neither suspended nor resumed
     │   ├── NoPod                    a replica has no pod or container to read
     │   ├── NoSuchJob                no such TrainingJob
@@ -38,15 +38,15 @@
     │   ├── NotFetched               a run could not be copied
     │   ├── NothingLost              no replica has lost its run, so none is restarted
     │   ├── NotInstalled             the cluster has no TrainingJobs
-    │   ├── NotOfThisSweep           a job has the name of a sweep's trial (sweeps.there)
-    │   ├── QueueDecides             Kueue alone suspends and resumes this job
+    │   ├── NotOfThisSweep           another job has the name of a sweep's trial (sweeps.cluster_backend)
+    │   ├── QueueDecides             only Kueue suspends and resumes this job
     │   └── TookTooLong              a deadline passed
-    ├── NoSuccess                    a sweep compares success rates, and there are none (sweeps.carrying_out)
-    ├── NotLeading                   this operator may have lost its lease (operator.writing)
-    ├── Outdated                     the cluster has changed since the decision (operator.confirming)
-    ├── TooLarge                     a file is larger than what it should be can be (reading)
-    ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.reading)
-    └── TrialFailed                  the trial's job did not succeed in time (trial)
+    ├── NoSuccess                    a sweep has no success rates to compare (sweeps.runner)
+    ├── NotLeading                   this operator may have lost its Lease (operator.fenced_client)
+    ├── Outdated                     the cluster has changed since the decision (operator.preconditions)
+    ├── TooLarge                     a file is larger than a file of its kind can be (bounded_read)
+    ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.hyperparameter_file)
+    └── TrialFailed                  the trial's job did not succeed in time (smoke_test)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
 """
@@ -57,15 +57,15 @@ class PalaestraError(Exception):
 
 
 class TrainingJobError(PalaestraError):
-    """A TrainingJob cannot be used as it stands."""
+    """A TrainingJob cannot be used in its current form."""
 
 
 class SpecErrors(TrainingJobError, ValueError):
-    """All the mistakes in one TrainingJob; retrying cannot help.
+    """All problems of one TrainingJob; retrying cannot help.
 
     Attributes:
         name: the path of the file that was read.
-        problems: one line for each mistake, "<path>: <fact>; <remedy>"; never empty.
+        problems: one line for each problem, "<path>: <fact>; <remedy>"; never empty.
     """
 
     def __init__(self, name: str, problems: tuple[str, ...]) -> None:
@@ -83,8 +83,8 @@ class WorldCheckTooCostly(PlanError):
 
 
 class WorldRefused(PlanError):
-    """A check that was done before the plan refused a world; the message is that of the check."""
+    """A check before the plan refused a world; the message is that of the check."""
 
 
 class WorldUnchecked(PlanError):
-    """A world has no verdict yet; the message is its field, and the plan succeeds or fails later."""
+    """A world has no verdict yet, so the plan succeeds or fails later; the message is the world's field."""

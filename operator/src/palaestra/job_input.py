@@ -1,7 +1,7 @@
-"""A job as a program gives it: the path of a file, YAML text, plain data or the model.
+"""A job from a program: the path of a file, YAML text, plain data or the model.
 
-`changed` returns a job with other values in some fields, checked like a file. It changes no object in place,
-and starts nothing.
+`changed` returns a job with other values in some fields, checked like a file. It does not change its
+arguments, and does not start a run.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ def job_of(job: Given) -> TrainingJob:
     """Return the job; a text of one line is the path of a file.
 
     Raises:
-        SpecErrors: the job is wrong; lists every mistake.
+        SpecErrors: the job is wrong; the error lists every problem.
         OSError: the file cannot be read.
         TooLarge: the file is too large for a job.
     """
@@ -31,7 +31,7 @@ def job_of(job: Given) -> TrainingJob:
 
 
 def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
-    """Return the job with other values in some fields; the given job stays as it is.
+    """Return the job with other values in some fields; the given job does not change.
 
     Args:
         job: the path of a file, YAML text, plain data or the model.
@@ -39,7 +39,7 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
             leave out `spec.`: `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
 
     Raises:
-        SpecErrors: a path or a value is wrong; lists every mistake.
+        SpecErrors: a path or a value is wrong; the error lists every problem.
         OSError: the file cannot be read.
         TooLarge: the file is too large for a job.
     """
@@ -87,7 +87,7 @@ def full_path(text: str) -> tuple[str | int, ...]:
 def _put(data: Any, text: str, value: Any) -> str | None:
     """Set a field in plain data; return the problem if its path cannot be followed.
 
-    Where the path needs a mapping and there is another value, the mapping replaces it, so that the check of
+    If the path needs a mapping but finds another value, a mapping replaces the value, so that the check of
     the whole job reports the field.
     """
     path = full_path(text)

@@ -1,4 +1,4 @@
-"""Objects of Kubernetes as JSON data, and their keys: the types that all layers share."""
+"""Kubernetes objects as JSON data, and their keys: the types that all layers share."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,7 @@
-"""Test an installation: run a TrainingJob, and delete it, whether it succeeds or not.
+"""Test an installation: run a TrainingJob, and delete it in any case.
 
-`helm test` runs this in a pod that may only create, read and delete TrainingJobs, so it polls instead of
-watching.
+`helm test` runs this in a pod that may only create, read and delete TrainingJobs, so it polls and needs no
+watch permission.
 """
 
 import math
@@ -21,7 +21,7 @@ from palaestra.objects import Object
 
 PERIOD_S = 2.0
 
-# If a trial is killed, the cluster ends and deletes its job by these limits, long after people have looked.
+# If a trial is killed, these limits end and delete its job, long after people have read the result.
 SLACK_S = 60
 TTL_S = 3600
 
@@ -29,22 +29,23 @@ Report = Callable[[str], None]
 
 
 class TrialFailed(PalaestraError):
-    """The job did not succeed in time; the message is the newest in its status."""
+    """The job did not succeed in time; the message is the newest one in its status."""
 
 
 def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
-    """Create a job under a name of its own, wait until it has succeeded, and delete it.
+    """Create a job with a unique name, wait until it has succeeded, and delete it.
 
     Args:
         api: the cluster.
-        job: the TrainingJob; the API server adds five characters to its name, so that two trials never meet.
-        within_s: seconds in which it has to succeed.
-        report: is called with a line for each phase that the job comes to, and for each reason why a
-            replica waits.
+        job: the TrainingJob; the API server adds five characters to its name, so that two trials never share
+            a name.
+        within_s: seconds in which the job must succeed.
+        report: called with a line for each new phase of the job, and for each new waiting reason of a
+            replica.
 
     Raises:
-        TrialFailed: it failed, or had not ended in time.
-        ApiError: the API server refused something.
+        TrialFailed: the job failed, or did not end in time.
+        ApiError: the API server refused a request.
     """
     made = api.create(TRAINING_JOBS, _passing(job, within_s))["metadata"]
     succeeded = False
@@ -56,7 +57,7 @@ def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
 
 
 def _passing(job: Object, within_s: float) -> Object:
-    """Return the job without a name; its author's ends and `retain` stay, what is not set is made to pass."""
+    """Return the job without a name, with a trial's limits and storage where the author set none."""
     metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
     del metadata["name"]
     ends = {"activeDeadlineSeconds": math.ceil(within_s) + SLACK_S, "ttlSecondsAfterFinished": TTL_S}
@@ -72,9 +73,9 @@ def _passing_storage(storage: Object) -> Object:
 
 
 def _take_away(api: Api, made: Object, report: Report, *, or_fail: bool) -> None:
-    """Delete the job. If that fails, report it by `report`, or with `or_fail` raise an error.
+    """Delete the job; if that fails, report it, or with `or_fail` raise an error that a retry cannot help.
 
-    `or_fail` is for successful trials: the error of a failed trial must stay the one that is shown.
+    `or_fail` is for successful trials: otherwise the error of the failed trial must be shown.
     """
     namespace, name = made["namespace"], made["name"]
     try:
@@ -106,7 +107,7 @@ def _wait(api: Api, namespace: str, name: str, within_s: float, report: Report) 
 
 
 def _status(api: Api, namespace: str, name: str, report: Report) -> Object | None:
-    """Return the job's status; None while the API server has no answer."""
+    """Return the job's status; None if the request failed and can be retried."""
     try:
         return api.get(TRAINING_JOBS, namespace, name).get("status")
     except ApiError as error:
@@ -117,7 +118,7 @@ def _status(api: Api, namespace: str, name: str, report: Report) -> Object | Non
 
 
 def _readable(status: Object) -> Status:
-    """Return the status as this release reads it; empty where another release has written another."""
+    """Return the parsed status; empty if another release wrote one that this release cannot read."""
     try:
         return Status.model_validate(status)
     except ValidationError:
@@ -125,7 +126,7 @@ def _readable(status: Object) -> Status:
 
 
 def _why(status: Object) -> str:
-    """Return reason and message of the condition that is the subject of the status."""
+    """Return reason and message of the condition with the job's whole message."""
     conditions = {condition["type"]: condition for condition in status.get("conditions", ())}
     if not conditions:
         return "nothing has looked at it: does the operator run, and does it look after this namespace?"

@@ -45,7 +45,7 @@ FOR_PEOPLE = {
 # These fields are read only for some nodes, such as a light, another type of bumper, a radar or a fluid.
 ELSEWHERE = {
     "LightSensor.colorFilter", "LightSensor.occlusion",  # the stub refuses lights
-    "TouchSensor.resolution", "DistanceSensor.redColorSensitivity", "GPS.noiseCorrelation",
+    "TouchSensor.resolution", "GPS.noiseCorrelation",
     "radarCrossSection", "recognitionColors", "contactMaterial", "immersionProperties", "physics",
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Discs and blocks push robots out and stop rays; fine sampling checks both."""
+"""Discs, blocks and hulls: pushing robots out and stopping rays, checked against what a fine ruler says."""
 
 import math
 
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
+from palaestra_sim.stub.obstacles import Block, Disc, Hull, Neighborhood
 
 places = st.floats(-3, 3)
 nearby = st.floats(-1.5, 1.5)  # from the center of an obstacle, so that most touch it
@@ -14,7 +14,20 @@ angles = st.floats(-math.pi, math.pi)
 sizes = st.floats(0.05, 2)
 discs = st.builds(Disc, places, places, sizes)
 blocks = st.builds(Block, places, places, angles, st.tuples(sizes, sizes))
-obstacles = st.one_of(discs, blocks)
+angles_around = st.lists(st.integers(0, 11), min_size=3, max_size=6, unique=True)
+
+
+@st.composite
+def hulls(draw):
+    """The hull of some points on an ellipse, and of one amid them."""
+    x, y, width, length = draw(places), draw(places), draw(sizes), draw(sizes)
+    corners = [math.pi * index / 6.0 for index in draw(angles_around)]
+    points = [(x + width * math.cos(turn), y + length * math.sin(turn)) for turn in corners]
+    middle = tuple(sum(numbers) / len(points) for numbers in zip(*points, strict=True))
+    return Hull([*points, middle])
+
+
+obstacles = st.one_of(discs, blocks, hulls())
 AHEAD = ((0.0, 0.0, 1.0, 0.0),)
 
 
@@ -126,6 +139,17 @@ def test_a_longer_obstacle_does_not_hide_a_nearer_one():
     Disc(5.0, 0.0, 0.5).scan(frame, AHEAD, distances)
 
     assert distances == [1.5]
+
+
+def test_a_robot_that_touches_a_hull_is_pushed_off_its_nearest_edge():
+    """A triangle of 2 m by 1 m; the robot is beside its slope, then inside, near its long side."""
+    wedge = Hull([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (0.5, 0.3)])
+    slope = (1.0 / math.sqrt(5.0), 2.0 / math.sqrt(5.0))
+
+    assert wedge.corners == [(0.0, 0.0), (2.0, 0.0), (0.0, 1.0)]
+    contact = wedge.contact(1.0 + 0.3 * slope[0], 0.5 + 0.3 * slope[1], 0.5)
+    assert contact == pytest.approx((*slope, 0.2))
+    assert wedge.contact(0.6, 0.1, 0.5) == pytest.approx((0.0, -1.0, 0.6))
 
 
 def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():

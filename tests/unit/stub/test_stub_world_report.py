@@ -165,15 +165,21 @@ def test_values_that_differ_from_webots_are_named(check):
     """A policy that is trained with these values gets others in Webots."""
     mesh = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 0 1 ] } }"
     devices = """DistanceSensor { type "infra-red" } Lidar { numberOfLayers 4 }
-        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 }"""
+        DistanceSensor { name "up" type "Sonar" rotation 0 1 0 -1 } Gyro { }
+        Solid { physics Physics { } children [ Accelerometer { } ] }"""
     robot = f'Robot {{ controller "ros" controllerArgs ["--name=a" "--synchronize"] children [ {devices} ] }}'
 
-    code, lines = check(f"Solid {{ boundingObject {mesh} }} {robot}")
+    look = 'PBRAppearance { baseColorMap ImageTexture { url "https://example.com/line.png" } }'
+    shape = f"Shape {{ appearance {look} geometry Plane {{ }} }}"
+
+    code, lines = check(f"Solid {{ children [ {shape} ] boundingObject {mesh} }} {robot}")
 
     assert code == 0
     assert lines[1:] == [
-        "differs from Webots: 1 infra-red DistanceSensor: textures do not count, rays pass the robot itself",
+        "differs from Webots: 1 infra-red DistanceSensor: rays pass the robot itself",
+        "differs from Webots: 1 Shape with a texture that infra-red DistanceSensors do not see",
         "differs from Webots: 1 Lidar: rays pass the robot itself",
-        "differs from Webots: 1 IndexedFaceSet as boundingObject: the box around its points",
+        "differs from Webots: 1 Gyro on a robot without physics: Webots measures nothing there",
+        "differs from Webots: 1 IndexedFaceSet as boundingObject: robots touch its convex hull",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",
     ]

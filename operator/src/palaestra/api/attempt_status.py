@@ -1,6 +1,6 @@
 """The history of a replica in the status: end of the last attempt, faults, and time by activity.
 
-Kubernetes deletes logs with their pod, so the status keeps the last lines. Every part is bounded, because a
+Kubernetes deletes logs with their pod, so the status keeps the last lines. Every part has a limit, because a
 status is one object of the API server and people read it.
 """
 

@@ -1,8 +1,8 @@
-"""The types of a TrainingJob's values, each bounded.
+"""The types of a TrainingJob's values, each with a limit.
 
 Every type has a largest size: an API server estimates the cost of a rule from the largest object that the
-schema allows, and refuses a schema with unbounded strings, lists or maps. Two regular expression engines read
-the patterns, Rust's here and Go's in the API server, so the patterns use plain ASCII classes only.
+schema allows, and refuses a schema with unlimited strings, lists or maps. Two regular expression engines read
+the patterns, Rust's here and Go's in the API server, so the patterns use only plain ASCII classes.
 """
 
 import json
@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
-# The mark, in a field's JSON schema, that the field may be changed after the job was accepted.
+# This mark in a field's JSON schema means that the field may be changed after the job was accepted.
 MAY_CHANGE = "x-may-change"
 
 LABEL = "^[a-z]([-a-z0-9]*[a-z0-9])?$"
@@ -90,7 +90,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     ROBOT: ("a robot", f"use {', '.join(ROBOTS)} or module:Class"),
 }
 
-# The pods' names, hash included, have to be DNS labels of at most 63 characters.
+# The pods' names, including the hash, must be DNS labels of at most 63 characters.
 JobName = Annotated[str, Field(min_length=1, max_length=48, pattern=LABEL)]
 GroupName = Annotated[str, Field(min_length=1, max_length=20, pattern=LABEL)]
 # The name of a job becomes part of the names of Services and ROS nodes, which must begin with a letter. The
@@ -108,13 +108,13 @@ Minutes = Annotated[int, Field(ge=1, le=525_600)]
 Count = Annotated[int, Field(ge=0, le=2_000_000_000)]
 Memory = Annotated[str, Field(max_length=32, pattern=MEMORY)]
 
-# Lists of the YAML become tuples, so that a job is immutable.
+# Lists in YAML become tuples, so that a job is immutable.
 Listed = Annotated[tuple[T, ...], Field(strict=False)]
 Words = Annotated[Listed[Word], Field(max_length=64)]
 
 
 def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> Any:
-    """Return the items as `read` validates them, without items that have an unknown enum value."""
+    """Return the items that `read` validated, without items that have an unknown enum value."""
     try:
         return read(items)
     except ValidationError as error:
@@ -126,8 +126,8 @@ def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> An
         return read([item for place, item in enumerate(items) if place not in unknown])
 
 
-# For a list of a status that is only displayed, or built again in each reconcile: a newer release may report
-# items of a kind that this one lacks.
+# It is for a list of a status that is only displayed, or is built again in each reconcile: a newer release
+# may report items of a kind that this release does not know.
 KNOWN_ITEMS = WrapValidator(_without_unknown_items)
 
 
@@ -144,7 +144,7 @@ N = TypeVar("N", bound=Named)
 
 
 def _uniquely_named(items: tuple[N, ...]) -> tuple[N, ...]:
-    """Return `items` if no two have the same name."""
+    """Return `items` if their names are unique."""
     names = [item.name for item in items]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise PydanticCustomError(
@@ -155,7 +155,7 @@ def _uniquely_named(items: tuple[N, ...]) -> tuple[N, ...]:
     return items
 
 
-# The keywords make the API server refuse equal names itself.
+# With these keywords the API server refuses equal names itself.
 NamedList = Annotated[
     Listed[N],
     AfterValidator(_uniquely_named),
@@ -199,7 +199,7 @@ _MOST_VALUES = 1000
 
 
 def _plain(value: object, depth: int) -> int:
-    """Return the number of values in `value`; raise an error for one that JSON cannot represent."""
+    """Return the number of values in `value`; raise an error for a value that JSON cannot represent."""
     if depth > _DEEPEST:
         raise PydanticCustomError("free", "is nested deeper than {most}; flatten it", {"most": _DEEPEST})
     if isinstance(value, dict):
@@ -224,8 +224,8 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
     return value
 
 
-# A map to values of any type, not an object with unknown fields: an API server misses a renamed key when it
-# compares two objects with unknown fields, so a frozen field could be changed.
+# This is a map to values of any type, not an object with unknown fields. An API server that compares two
+# objects with unknown fields misses a renamed key, so a frozen field could be changed.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -1,4 +1,4 @@
-"""Pages with a generated part between two marks; people write the rest."""
+"""Pages with a generated part between two marks; people write the other parts."""
 
 END = "<!-- end of the generated part -->"
 

@@ -28,7 +28,7 @@ from palaestra_protocol.pod.enums import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"
-START_TIMEOUT_S = 21_600  # Six hours: a job survives a registry outage of a night, not of a weekend.
+START_TIMEOUT_S = 21_600  # Six hours: a job survives a registry outage of a night, but not of a weekend.
 
 FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
@@ -37,7 +37,7 @@ MOST_SIMULATORS = 32  # In one pod; simulator k uses ports 7100+k and 7200+k.
 MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also limits their bytes.
 
 
-# Metadata that the API server writes; a file exported with `kubectl get -o yaml` contains it.
+# The API server writes these metadata; a file from `kubectl get -o yaml` contains them.
 _SERVER_FIELDS = frozenset(
     {
         "creationTimestamp",
@@ -187,7 +187,7 @@ class Spec(ApiModel):
 
     @property
     def most_fruitless(self) -> int:
-        """Return how many consecutive pods may end without a new step; 0: no limit."""
+        """Return the number of consecutive pods that may end without a new step; 0: no limit."""
         return FRUITLESS_PODS if self.no_progress_limit is None else self.no_progress_limit
 
     rules = (

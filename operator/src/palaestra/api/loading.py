@@ -1,8 +1,8 @@
-"""Load a TrainingJob from YAML or plain data, reporting all mistakes at once, and dump it.
+"""Load a TrainingJob from YAML or plain data, report all problems at once, and dump a TrainingJob.
 
-Pydantic does not check the rules of an object that has a wrong field. So each wrong field is reported and
-removed, and the rest is validated again, until it is valid. Then the rules are checked, except those that
-read a removed field.
+Pydantic does not check the rules of an object with a wrong field. So each wrong field is reported and
+removed, and the rest is validated again until it is valid. Then the rules are checked, except those that read
+a removed field.
 """
 
 import re
@@ -19,12 +19,12 @@ from palaestra.api.validation_messages import quoted, sentence
 from palaestra.api.yaml_io import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
-_NOT_EXACT = 2.0**53  # larger floats stand for several whole numbers
-_KEY = "[key]"  # last item of pydantic's path if the key of a mapping is wrong, not its value
+_NOT_EXACT = 2.0**53  # a larger float may stand for several whole numbers
+_KEY = "[key]"  # last item of pydantic's path if a mapping's key is wrong, not its value
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
 
-# Stand-ins for required objects that are wrong as a whole, so that the rest can be validated.
+# These replace required objects that are wrong as a whole, so that the rest can be validated.
 _STAND_INS: dict[Path, Any] = {("metadata",): {"name": "stand-in"}, ("spec",): {}}
 
 
@@ -32,7 +32,8 @@ def load(text: str, name: str = "job") -> TrainingJob:
     """Return the one TrainingJob in `text`, a YAML document; `name` is its file's path.
 
     Raises:
-        SpecErrors: the job is invalid; lists every mistake, or only the first if the text is not YAML.
+        SpecErrors: the job is invalid; the error lists every problem, or only the first if the text is not
+            YAML.
     """
     try:
         data = read(text, name)
@@ -44,11 +45,10 @@ def load(text: str, name: str = "job") -> TrainingJob:
 def validate(data: Any, name: str = "job") -> TrainingJob:
     """Return the TrainingJob in plain `data`, such as an API server returns.
 
-    A number that is whole is a whole number, however it is written: an API server stores 1e6 and 1.0 as
-    1000000 and 1.
+    A float with a whole value counts as a whole number: an API server stores 1e6 and 1.0 as 1000000 and 1.
 
     Raises:
-        SpecErrors: the job is invalid; lists every mistake.
+        SpecErrors: the job is invalid; the error lists every problem.
     """
     data = _stored(data)
     if not isinstance(data, Mapping):
@@ -60,7 +60,7 @@ def validate(data: Any, name: str = "job") -> TrainingJob:
         for key, ours in _HEADING
         if key in data and data[key] != ours
     ]
-    if len(other) == len(_HEADING):  # another kind of object, so its fields are not checked
+    if len(other) == len(_HEADING):  # this is another kind of object, so its fields are not checked
         raise SpecErrors(name, tuple(other))
     missing = [f"{key}: is missing; add {key}: {ours}" for key, ours in _HEADING if key not in data]
     job, problems = _examine(data)
@@ -103,7 +103,7 @@ def _unsupported(value: Any, ours: str) -> str:
 
 
 def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
-    """Return the job without its wrong fields, None if no job is left, and a line for each mistake."""
+    """Return the job without its wrong fields, or None, and a line for each problem."""
     pruned = Pruned(data)
     removed: list[Path] = []
     problems: list[str] = []
@@ -137,7 +137,7 @@ def _touches(path: Path, removed: list[Path]) -> bool:
 
 
 def _remove(pruned: Pruned, paths: list[Path], removed: list[Path]) -> bool:
-    """Remove the wrong fields, or the nearest object that exists; return whether anything was removed."""
+    """Remove the wrong fields, or their nearest existing parents; return whether a field was removed."""
     before = len(removed)
     for path in paths:
         if any(path[: len(other)] == other != path for other in removed):

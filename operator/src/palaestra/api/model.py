@@ -19,7 +19,7 @@ from pydantic.alias_generators import to_camel
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-# The validation context that skips the rules. `palaestra.api.loading` then checks them itself, even if some
+# This validation context skips the rules. `palaestra.api.loading` then checks them itself, even if some
 # fields are wrong.
 FIELDS_ONLY: Final = {"rules": "later"}
 

@@ -1,4 +1,4 @@
-"""The tree of the models: which field contains which model."""
+"""The tree of the models: the fields of each model, and the models in them."""
 
 from collections.abc import Iterator
 from types import UnionType
@@ -11,7 +11,7 @@ from palaestra.api.paths import Path
 
 
 def model_in(annotation: Any) -> type[ApiModel] | None:
-    """Return the model in a field's annotation, alone or in a list; None if there is none."""
+    """Return the model in a field's annotation, alone or in a list, or None."""
     if isinstance(annotation, type) and issubclass(annotation, ApiModel):
         return annotation
     if get_origin(annotation) in {Annotated, Union, UnionType, tuple, dict}:
@@ -21,12 +21,12 @@ def model_in(annotation: Any) -> type[ApiModel] | None:
 
 
 def fields_of(model: type[ApiModel]) -> dict[str, FieldInfo]:
-    """Return the fields of `model` under the names that they have in YAML."""
+    """Return the fields of `model` by their names in YAML."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def model_at(root: type[ApiModel], path: Path) -> type[ApiModel] | None:
-    """Return the model of the object at `path` below `root`; None if there is none."""
+    """Return the model of the object at `path` below `root`, or None."""
     model: type[ApiModel] | None = root
     for piece in path:
         if isinstance(piece, int) or model is None:
@@ -45,7 +45,7 @@ def walk(root: type[ApiModel], path: Path = ()) -> Iterator[tuple[Path, type[Api
 
 
 def objects(root: ApiModel, path: Path = ()) -> Iterator[tuple[Path, ApiModel]]:
-    """Yield `root` and every object below it, each with its path, indices included."""
+    """Yield `root` and every object below it, each with its path, including indices."""
     yield path, root
     for name, field in type(root).model_fields.items():
         value = getattr(root, name)

@@ -1,12 +1,12 @@
-"""Addresses with a password do not belong into a TrainingJob: everybody who may read the job sees them."""
+"""Find addresses with a password in a TrainingJob: everybody who may read the job could read the password."""
 
 import re
 from collections.abc import Mapping, Sequence
 
 from palaestra.api.model import Rule
 
-# User information with a password, between the scheme and the host of an address. Variables of a shell and
-# placeholders, such as ${TOKEN} and {token}, are not passwords. API servers read this expression too.
+# It matches user information with a password, between the scheme and the host of an address. Shell variables
+# and placeholders, such as ${TOKEN} and {token}, are not passwords. API servers use this expression too.
 PASSWORD = r"://[^\s/?#:@]*:[^\s/?#@${][^\s/?#@]*@"
 _PASSWORD = re.compile(PASSWORD)
 
@@ -15,7 +15,7 @@ _ELSEWHERE = "contains a password in an address; pass it in an environment varia
 
 
 def has_password(value: object) -> bool:
-    """Return whether a text has an address with a password in it, or any text in a list or mapping."""
+    """Return whether a text, or any text in a list or mapping, has an address with a password."""
     if isinstance(value, str):
         return _PASSWORD.search(value) is not None
     if isinstance(value, Mapping):
@@ -41,7 +41,7 @@ NO_PASSWORD_IN_WORDS = Rule(
     cel=f"!self.options.exists(word, word.matches(r'{PASSWORD}'))",
     message=_ELSEWHERE,
 )
-NO_PASSWORD_IN_OPTIONS = Rule(  # of a free object, which an API server cannot read
+NO_PASSWORD_IN_OPTIONS = Rule(  # in a free object, which an API server cannot check
     field="options",
     holds=lambda owner: not has_password(owner.options),
     reads=("options",),

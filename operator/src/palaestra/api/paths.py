@@ -13,7 +13,7 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def shown(path: Path) -> str:
-    """Return `path` as text, as in `a.b[1]["c.d"]`; keys that are not plain words are in brackets."""
+    """Return `path` as text, such as `a.b[1]["c.d"]`; keys that are not plain words are in brackets."""
     text = ""
     for piece in path:
         if isinstance(piece, int):
@@ -29,7 +29,7 @@ _PIECE = re.compile(r'(?:^|(?!^)\.)([A-Za-z_][A-Za-z0-9_]*)|\[([0-9]+)\]|\[("(?:
 
 
 def path_of(text: str) -> Path:
-    """Return the path that `shown` writes as `text`; empty if `text` is not a path."""
+    """Return the path for a text from `shown`; empty if `text` is not a path."""
     pieces: list[str | int] = []
     at = 0
     while at < len(text):
@@ -55,9 +55,9 @@ class Pruned:
         self._tree = _sparse(data)
 
     def take(self, path: Path, stand_in: Any = None) -> bool:
-        """Remove the value at `path`; return False if there was none.
+        """Remove the value at `path`; return False if it did not exist.
 
-        If a `stand_in` is given, put it there instead; return False if it was there already.
+        If a `stand_in` is given, replace the value by it; return False if it was already there.
         """
         *above, last = path
         tree = self._tree
@@ -78,7 +78,7 @@ class Pruned:
         return _dense(self._tree)
 
     def original(self, path: Path) -> Path:
-        """Return the original path of the value that is at `path` in `data()`."""
+        """Return the original path of the value at `path` in `data()`."""
         tree, found = self._tree, []
         for piece in path:
             if isinstance(tree, _SparseList) and isinstance(piece, int):

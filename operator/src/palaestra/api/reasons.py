@@ -1,7 +1,7 @@
 """All reasons of conditions, replicas and events, with their messages.
 
-A reason is one word for programs. Its message is a template; with the facts filled in it is a sentence for
-people: the fact and the remedy. `meaning` and `remedy` are the rows of docs/reference/reasons.md.
+A reason is one word for programs. Its message is a template, which the facts complete to a sentence for
+people: the fact and the remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from enum import StrEnum
 
 from palaestra.api.text import flat, one_line
 
-LONGEST_MESSAGE = 1024  # Characters; the API server's limit for an event, which all our messages respect.
+LONGEST_MESSAGE = 1024  # Characters; the API server's limit for an event, which applies to all messages.
 
-LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a registry, a trainer.
+LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a registry or a trainer.
 
 
 class Reason(StrEnum):
@@ -80,11 +80,11 @@ class Reason(StrEnum):
 
     @classmethod
     def known(cls, word: str) -> "Reason":
-        """Return the reason of this name; `JobFailed` for an unknown one, for example of a newer release."""
+        """Return the reason with this name; `JobFailed` for an unknown one, such as a newer release's."""
         return cls(word) if word in set(cls) else cls.JOB_FAILED
 
 
-# Reasons for which a job is not planned or resumed until a person acts.
+# A job with one of these reasons is not planned or resumed until a person acts.
 HELD = frozenset(
     {
         Reason.INVALID_SPEC,
@@ -103,8 +103,8 @@ HELD = frozenset(
     }
 )
 
-# Reasons for which a replica waits: the cluster retries, or a person must act. The metric
-# palaestra_replicas_waiting counts these.
+# A replica with one of these reasons waits: the cluster retries, or a person must act. The metric
+# palaestra_replicas_waiting counts such replicas.
 WAITING = (
     Reason.RUN_LOST,
     Reason.NAME_TAKEN,

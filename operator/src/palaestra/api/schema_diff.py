@@ -1,7 +1,7 @@
-"""Compare the definition of TrainingJobs in a cluster with that of this release.
+"""Compare the CustomResourceDefinition in a cluster with that of this release.
 
 An API server drops status fields that its definition lacks, and refuses a status with an enum value that its
-definition lacks. Additional fields of the served definition are of a newer release and are ignored.
+definition lacks. Additional fields of the served definition belong to a newer release and are ignored.
 """
 
 from collections.abc import Iterator, Mapping

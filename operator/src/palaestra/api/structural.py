@@ -1,6 +1,6 @@
 """Convert pydantic's JSON Schema into the structural schema that an API server requires.
 
-A structural schema has no references and no alternatives, and names the type and the bounds of every value.
+A structural schema has no references and no alternatives, and has the type and the limits of every value.
 Descriptions are copied from the models.
 """
 
@@ -12,7 +12,7 @@ Schema = dict[str, Any]
 
 FROZEN = "cannot be changed; make a new TrainingJob"
 
-# Keywords that have the same meaning in both schemas and are copied.
+# These keywords have the same meaning in both schemas and are copied.
 _KEPT = (
     "description", "type", "format", "pattern", "enum", "minimum", "maximum", "required",
     "minLength", "maxLength", "minItems", "maxItems", "minProperties", "maxProperties",
@@ -72,7 +72,7 @@ def _unwrapped(text: str) -> str:
 
 
 def _name_bounds(schema: Schema) -> None:
-    """Rename the bounds of lists and maps to the keywords for their type."""
+    """Rename the limits of lists and maps to the keywords for their type."""
     kind = _BOUNDS_OF.get(schema.get("type", ""))
     for bound in ("min", "max"):
         if kind and f"{bound}Length" in schema:
@@ -89,8 +89,9 @@ def _present(default: Any) -> Any:
 
 
 def freeze(schema: Schema) -> None:
-    """Add rules to the object `schema` that refuse a change of any field without the mark `MAY_CHANGE`."""
-    whole = False  # an API server accepts no rule on a field of arbitrary content, but one on its parent
+    """Add rules to the object `schema` that refuse a change of fields without the mark `MAY_CHANGE`."""
+    # An API server refuses a rule on a field with arbitrary content, so the field's parent gets the rule.
+    whole = False
     for name, inner in schema["properties"].items():
         if inner.get(MAY_CHANGE):
             continue

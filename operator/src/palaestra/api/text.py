@@ -13,13 +13,13 @@ def one_line(text: str, most: int) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text of any number of lines without characters that a terminal obeys, and without passwords."""
+    """Return text of any number of lines without control characters and without passwords."""
     plain = "".join(letter if letter.isprintable() or letter in "\n\t" else " " for letter in text)
     return masked(plain)
 
 
 def flat(text: str, most: int) -> str:
-    """Return the same, but keep a space at either end if `text` has one there."""
+    """Return the text like `one_line`, but keep one space at each end that has spaces."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", masked(plain))
     return words if len(words) <= most else words[: most - 3] + "..."

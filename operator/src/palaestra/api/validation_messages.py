@@ -16,13 +16,13 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, 
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
-_MISSPELLED = 0.92  # of a word of Python: every_steps is everySteps, but n_steps is not steps
-_OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))  # sections where people write words of Zoo
-_VARIABLES = "env"  # the environment variables of a container, more likely than an environment
+_MISSPELLED = 0.92  # for a name in Python's style: every_steps is everySteps, but n_steps is not steps
+_OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))  # sections in which people write keys of Zoo
+_VARIABLES = "env"  # it more likely means the environment variables of a container than an environment
 
 
 def sentence(path: Path, error: ErrorDetails) -> str:
-    """Return "<fact>; <remedy>" for the error that pydantic found at `path`."""
+    """Return "<fact>; <remedy>" for pydantic's error at `path`."""
     value = error["input"]
     if value is None and error["type"] not in _NOT_ABOUT_A_VALUE:
         return "is empty; give a value or remove the line"
@@ -34,7 +34,7 @@ def sentence(path: Path, error: ErrorDetails) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Return `value` as its author may have written it, on one line, truncated if it is long."""
+    """Return `value` on one line as its author may have written it, truncated if it is long."""
     if isinstance(value, dict | list):
         return "a mapping" if isinstance(value, dict) else "a list"
     text = json.dumps(value, ensure_ascii=False, default=str)

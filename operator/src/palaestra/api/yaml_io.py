@@ -44,7 +44,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _represent_text(dumper: _Dumper, text: str) -> ScalarNode:
-    """Return the node of `text`, quoted if it contains line breaks that YAML would fold."""
+    """Return the node of `text`; quote it if it contains line breaks that YAML would fold."""
     style = '"' if re.search("[\x85\u2028\u2029\r]", text) else None
     return dumper.represent_scalar(_TEXT, text, style)
 
@@ -141,7 +141,7 @@ class _Builder:
         return merged | own
 
     def _merged(self, node: Node) -> dict[str, Any]:
-        """Return the entries that `<<` merges; if several mappings have the same key, the first wins."""
+        """Return the entries that `<<` merges; if several mappings have a key, the first one is used."""
         value = self.value(node)
         sources = value if isinstance(value, list) else [value]
         if not all(isinstance(source, dict) for source in sources):

@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(error, error.exit_code)
     except (PalaestraError, SimError) as error:
         return _failed(error, WRONG_INPUT)
-    except KeyboardInterrupt:  # before anything was started
+    except KeyboardInterrupt:  # before a run was started
         return KILLED
 
 

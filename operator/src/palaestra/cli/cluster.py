@@ -43,7 +43,7 @@ def add_cluster(parser: argparse.ArgumentParser) -> None:
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to standard output and flush each at once; pods and other clients wrote some of them."""
+    """Write lines to standard output as printable text, because pods wrote some; flush each at once."""
     for line in lines:
         sys.stdout.write(f"{printable(line)}\n")
         sys.stdout.flush()
@@ -53,7 +53,7 @@ def say(lines: Iterable[str]) -> None:
 def cleaned_up() -> Iterator[None]:
     """Handle SIGTERM like Ctrl-C, so that temporary objects are deleted.
 
-    The first process of a container would otherwise ignore SIGTERM.
+    Otherwise the first process of a container would ignore SIGTERM.
     """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -63,7 +63,7 @@ def cleaned_up() -> Iterator[None]:
 
 
 def connected(work: Work) -> Callable[[argparse.Namespace], int]:
-    """Return a command that connects, does its work, and prints errors of the cluster in one line."""
+    """Return a command that connects, runs `work`, and prints errors of the cluster in one line."""
 
     def run(options: argparse.Namespace) -> int:
         client = Client(namespace=options.namespace, kubeconfig=options.kubeconfig, context=options.context)

@@ -1,7 +1,7 @@
 """The names of all commands, in the order of the help: the module of each, and its line in the help.
 
-`palaestra --help` is printed from this table alone, and a command imports only its own module: all of them
-together take a second to import.
+`palaestra --help` is printed from this table alone, and a command imports only its own module, because the
+import of all modules takes a second.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ class Command(NamedTuple):
     """One command.
 
     Attributes:
-        module: in `palaestra.cli`; its function `add` declares the command.
+        module: the module in `palaestra.cli`, whose function `add` declares the command.
         summary: the line in the help.
     """
 

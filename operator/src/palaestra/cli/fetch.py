@@ -57,7 +57,7 @@ def _size(text: str) -> int:
     """Return the bytes of a quantity of Kubernetes, above 0.
 
     Raises:
-        ArgumentTypeError: it is none.
+        ArgumentTypeError: the text is not a size.
     """
     try:
         size = in_bytes(text)

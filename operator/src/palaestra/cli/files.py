@@ -33,7 +33,7 @@ def read(file: Path, most_bytes: int = MOST_WORLD_BYTES) -> bytes:
     """Return the content of a file.
 
     Raises:
-        PalaestraError: it cannot be read, or is larger.
+        PalaestraError: the file cannot be read, or is larger than `most_bytes`.
     """
     try:
         return read_bounded(file, most_bytes)

@@ -78,7 +78,7 @@ def _delete(client: Client, options: argparse.Namespace) -> int:
 
 
 def _left(job: TrainingJob) -> str:
-    """Return how to delete the claims that stay; empty if none stays."""
+    """Return the command that deletes the remaining claims; empty if no claim remains."""
     storage = job.spec.storage
     if storage.ephemeral or storage.existing_claim or storage.retain is Retain.DELETE:
         return ""

@@ -26,7 +26,7 @@ OBJECT = re.compile(r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?")
 ALLOWED = re.compile(rf"({DOMAIN})?{NAME}|{DOMAIN}")
 NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
-# What jobs may ask for if the installation allows it: option, field of Allowed, kind of value, meaning.
+# Settings that an installation may allow to jobs: option, field of `Allowed`, kind of value, meaning.
 ALLOWANCES = (
     ("pod-label", "pod_labels", "KEY", "label that jobs may set on their pods"),
     ("pod-annotation", "pod_annotations", "KEY", "annotation that jobs may set on their pods"),
@@ -71,7 +71,7 @@ def add(commands: Commands) -> None:
 
 
 def _add_looking(parser: argparse.ArgumentParser) -> None:
-    """Add the options for which jobs are reconciled, how many at once and how often."""
+    """Add the options for the reconciled jobs, their number at the same time, and the interval."""
     parser.add_argument(
         "--namespace",
         metavar="NS",

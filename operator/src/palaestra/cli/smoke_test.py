@@ -35,7 +35,7 @@ def add(commands: Commands) -> None:
 def _try(client: Client, options: argparse.Namespace) -> int:
     try:
         tried = job(options.file)
-    except SpecErrors as error:  # The file is wrong and nothing was sent, so the exit code is 2.
+    except SpecErrors as error:  # The file is wrong and no request was sent, so the exit code is 2.
         raise PalaestraError(str(error)) from error
     content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content["metadata"].setdefault("namespace", client.namespace)

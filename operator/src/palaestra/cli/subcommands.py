@@ -34,7 +34,7 @@ exit codes of all commands:
 
 
 class Commands(Protocol):
-    """The object with which argparse adds commands; argparse's own class is not public."""
+    """The object that adds commands to argparse; argparse's own class is not public."""
 
     def add_parser(self, *args: Any, **options: Any) -> argparse.ArgumentParser:
         """Return the parser of a new command."""

@@ -31,7 +31,7 @@ from palaestra_protocol.pod.status import ExitCode
 from palaestra_protocol.signals import obeyed
 
 FAILED = 1
-SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it learns nothing from those that run
+SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it does not learn from running trials
 SWEEP = """\
 Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
@@ -78,9 +78,7 @@ def _sweep(options: argparse.Namespace) -> int:
     if options.cluster:
         return connected(_there)(options)
     if options.namespace or options.context or options.kubeconfig:
-        raise PalaestraError(
-            "--cluster: is missing; give it too, or remove the options that choose a cluster"
-        )
+        raise PalaestraError("--cluster: is missing; add it, or remove the options that choose a cluster")
     return _here(options)
 
 
@@ -100,7 +98,7 @@ def _here(options: argparse.Namespace) -> int:
 
 
 def _carried_out(search: Search, place: LocalBackend, folder: Path, objective: Objective) -> None:
-    """Run the trials, and end what still runs at the end."""
+    """Run the trials, and stop the runs that have not ended."""
     try:
         carry_out(search, place, folder, objective, _say)
     except KeyboardInterrupt:
@@ -124,7 +122,7 @@ def _loaded(file: Path) -> Sweep:
     """Return the Sweep in a file.
 
     Raises:
-        PalaestraError: it is wrong or cannot be read; nothing was sent to a cluster.
+        PalaestraError: the file is wrong or cannot be read; no request was sent to a cluster.
     """
     try:
         return load(file)
@@ -149,7 +147,7 @@ def _begun(sweep: Sweep, place: LocalBackend | ClusterBackend, folder: Path) -> 
         if optuna_search is None:
             yield InTurn(trials, trial_log.ended(folder))
         else:
-            yield optuna_search.Suggested(sweep, folder)
+            yield optuna_search.OptunaSearch(sweep, folder)
 
 
 def _extra(module: str, purpose: str) -> Any:
@@ -183,7 +181,7 @@ def _interruptible() -> Iterator[None]:
 
 
 def _shown(search: Search, place: TrialBackend, sweep: Sweep, folder: Path) -> int:
-    """Print the table, write it and the picture into the folder, and return the exit code."""
+    """Print the table, write it and the figure into the folder, and return the exit code."""
     ended, objective = trial_log.ended(folder), sweep.spec.objective
     rows = [
         TrialRow(

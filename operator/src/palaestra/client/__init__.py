@@ -6,9 +6,9 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` has the public class. `asking` raises an error for a missing object, `reading` interprets a status,
-`following` waits for changes, `waiting` prints them as lines, and `happenings` reads events. `fetching`
-copies a run out of its volume with the pod of `reading_pod`, which runs `packing`.
+`client` has the public class. `not_found_errors` raises an error for a missing object, `watch` waits for
+changes, `wait_progress` describes them as lines, and `events` reads events. `fetch` copies a run out of its
+volume: the pod of `volume_reader_pod` runs `tar_stream`, and `tar_extraction` unpacks its output.
 """
 
 from palaestra.client.client import Client

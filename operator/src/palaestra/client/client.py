@@ -33,22 +33,22 @@ class Client:
     """The TrainingJobs of one namespace of a cluster; safe to use from several threads.
 
     Attributes:
-        api: the cluster, for other requests.
-        namespace: of the jobs.
+        api: the connection to the cluster, for other requests.
+        namespace: the namespace of the jobs.
     """
 
     def __init__(
         self, *, namespace: str | None = None, kubeconfig: str | None = None, context: str | None = None
     ) -> None:
-        """Choose a cluster; nothing is sent yet.
+        """Choose a cluster; no request is sent yet.
 
         Args:
-            namespace: None for that of the context, or of the pod.
+            namespace: None for the namespace of the context, or of the pod.
             kubeconfig: None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
-            context: of the kubeconfig; None for its current one.
+            context: the context of the kubeconfig; None for its current one.
 
         Raises:
-            NotConfigured: no API server is named, or its credentials cannot be read.
+            NotConfigured: no API server is configured, or its credentials cannot be read.
         """
         self.api: Api = connect(kubeconfig, context)
         self.namespace = namespace or namespace_of(kubeconfig, context)
@@ -69,10 +69,10 @@ class Client:
         """Create a job, or change its mutable fields, and return the stored job.
 
         Args:
-            job: the job, plain data, YAML text, or the path of a file. Absent fields are left to the cluster.
+            job: the job, plain data, YAML text, or the path of a file. The cluster sets the absent fields.
 
         Raises:
-            SpecErrors: the job is wrong; lists every mistake; nothing was sent.
+            SpecErrors: the job is wrong; the error lists every problem. No request was sent.
             OSError: the file cannot be read.
             ApiError: the API server refuses, for example a change of an immutable field.
         """
@@ -89,7 +89,7 @@ class Client:
 
         Raises:
             NoSuchJob: no job has this name.
-            SpecErrors: another release wrote a job that this one cannot read.
+            SpecErrors: this release cannot read the job, which another release wrote.
         """
         return _job(self.raw(name))
 
@@ -145,7 +145,7 @@ class Client:
             until: the phase, or `ended`.
             deadline_s: for the whole wait.
             report: function such as `print` or `logging.info`, called with a line for each new phase, and for
-                each reason why a replica waits, with its time; None: no report.
+                each new waiting reason of a replica, with its time; None: no report.
 
         Raises:
             EndedOtherwise: the job ended in another phase than `until`.
@@ -242,9 +242,9 @@ class Client:
         return job
 
     def restart(self, name: str) -> TrainingJob:
-        """Let the replicas of a job whose runs are lost continue with what their run directories hold.
+        """Restart the replicas of a job whose runs are lost, from the content of their run directories.
 
-        A replica whose run directory is empty or whose claim is gone begins at step 0 again.
+        A replica whose run directory is empty or whose claim is gone starts at step 0 again.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -286,13 +286,13 @@ class Client:
     ) -> Path:
         """Copy policy, evaluations and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
 
-        Needs the rights to create and delete pods and to run commands in them. What comes from the pod is
-        not trusted: `most_bytes` bounds its size, by default four times the volume that the job asks for.
+        Needs the permissions to create and delete pods and to run commands in them. The data from the pod is
+        untrusted: `most_bytes` limits its size, by default to four times the volume that the job requests.
 
         Raises:
             NoSuchJob: no job has this name.
             NotFetched: the folder exists already, or the run does not exist or cannot be read.
-            TookTooLong: `deadline_s` passed; nothing was written.
+            TookTooLong: `deadline_s` passed; no file was written.
         """
         deadline = time.monotonic() + deadline_s
         return fetch(self.api, self.get(name), replica, into, deadline=deadline, most_bytes=most_bytes)
@@ -306,7 +306,7 @@ def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
     """Return the newest pod of a replica.
 
     Raises:
-        NoPod: it has none.
+        NoPod: the replica has no pod.
     """
     pod = next((known.pod for known in job.status.replicas if known.index == replica), None)
     if pod is None:
@@ -319,7 +319,7 @@ def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
 
 
 def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
-    """Return the names of the containers of a replica whose logs people read."""
+    """Return the names of a replica's containers with logs for people."""
     layout = ClusterLayout(images=Images.of_release(version("palaestra")))
     simulators = Replica(job=job, index=replica, layout=layout).simulators
     return (TRAINER, ROS_MASTER, *(simulator.container for simulator in simulators))
@@ -329,7 +329,7 @@ def _check_running(job: TrainingJob, verb: str) -> None:
     """Return if the job has not ended.
 
     Raises:
-        HasEnded: it has.
+        HasEnded: the job has ended.
     """
     phase = job.status.phase
     if phase is not None and phase in TERMINAL:

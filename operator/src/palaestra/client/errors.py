@@ -3,16 +3,16 @@
     ClientError
     ├── NotInstalled        the cluster has no TrainingJob definition
     ├── NoSuchNamespace     the namespace does not exist
-    ├── NoSuchJob           the TrainingJob does not exist, or was deleted meanwhile
+    ├── NoSuchJob           the TrainingJob does not exist, or was deleted in the meantime
     ├── QueueDecides        only Kueue suspends and resumes a job in a queue
     ├── HasEnded            the job has ended, so it is neither suspended nor resumed
     ├── NothingLost         no replica of the job has lost its run, so none is restarted
     ├── EndedOtherwise      the job ended in another phase than expected
     ├── TookTooLong         a deadline passed; the same call may be repeated
     ├── NoPod               a replica has no pod or no such container, so no log
-    └── NotFetched          a run could not be copied; nothing was written
+    └── NotFetched          a run could not be copied; no file was written
 
-If the API server refuses a request, that is an ApiError (palaestra.cluster.errors).
+A request that the API server refuses raises an ApiError (palaestra.cluster.errors).
 """
 
 from typing import Self
@@ -49,7 +49,7 @@ class NoSuchNamespace(ClientError, LookupError):
 
 
 class NoSuchJob(ClientError, LookupError):
-    """The TrainingJob does not exist, or was deleted meanwhile."""
+    """The TrainingJob does not exist, or was deleted in the meantime."""
 
     @classmethod
     def of(cls, name: str, namespace: str) -> Self:
@@ -78,7 +78,7 @@ class HasEnded(ClientError):
 
     @classmethod
     def of(cls, name: str, phase: str, verb: str) -> Self:
-        """Return the error about a job that ended in this phase; `verb` is what was requested."""
+        """Return the error about a job that ended in this phase; `verb` is the refused action: `resumed`."""
         return cls(
             f"job {name}: has ended ({phase}), so it cannot be {verb}; create a new job, and continue this "
             "run with spec.storage.resumeFrom"
@@ -86,7 +86,7 @@ class HasEnded(ClientError):
 
 
 class NothingLost(ClientError):
-    """No replica of the job has lost its run, so there is nothing to restart."""
+    """No replica of the job has lost its run, so none can be restarted."""
 
     @classmethod
     def of(cls, name: str) -> Self:
@@ -106,8 +106,8 @@ class TookTooLong(ClientError, TimeoutError):
 
 
 class NoPod(ClientError, LookupError):
-    """A replica has no pod or no such container, so there is no log."""
+    """A replica has no pod or no such container, so it has no log."""
 
 
 class NotFetched(ClientError):
-    """A run could not be copied; nothing was written."""
+    """A run could not be copied; no file was written."""

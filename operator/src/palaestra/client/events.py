@@ -14,7 +14,7 @@ from palaestra.plan.claim import claim_name
 
 MADE_FOR_REPLICAS = {"Job", "Pod", "PersistentVolumeClaim", "ConfigMap"}
 
-CONTAINER = re.compile(r"spec\.\w*[cC]ontainers\{(.+)\}")  # init and ephemeral ones, too
+CONTAINER = re.compile(r"spec\.\w*[cC]ontainers\{(.+)\}")  # also of init and ephemeral containers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Event:
         reason: one word; docs/reference/reasons.md explains those about the TrainingJob.
         message: one sentence.
         count: number of occurrences.
-        container: of the pod in `about`; empty: the whole pod, or another object.
+        container: the container of the pod in `about`; empty: the whole pod, or another object.
     """
 
     time: datetime
@@ -55,12 +55,12 @@ def happenings(api: Api, job: TrainingJob) -> tuple[Event, ...]:
 
 
 def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
-    """Return whether an event is about this job, or about a child, pod or claim of a replica of it."""
+    """Return whether an event is about this job, or about a Job, pod, ConfigMap or claim of its replicas."""
     about = event["involvedObject"]
     kind, name, uid = about.get("kind"), about.get("name", ""), about.get("uid")
     if kind == KIND:
         return name == job.metadata.name and uid in {None, job.metadata.uid}
-    # The pods of a Job end in five characters of Kubernetes' choice, ConfigMaps and most claims in a uid.
+    # Kubernetes ends the name of a Job's pod with five characters; ConfigMaps and most claims end with a uid.
     replica = rf"{re.escape(job.metadata.name)}-[0-9]+(-[a-z0-9]{{5}}|-{re.escape(job.metadata.uid or '')})?"
     claims = (
         claim_name(job.metadata.name, index, job.metadata.uid or "") for index in range(job.spec.replicas)

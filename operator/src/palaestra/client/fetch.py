@@ -1,6 +1,6 @@
 """Copy a run's results out of its volume: from the running pod, or with a temporary pod.
 
-The target folder appears complete or not at all: the files are written to a temporary folder beside it, which
+The target folder is complete or does not exist: the files are written to a temporary folder next to it, which
 is then renamed. docs/decisions/0011 explains why a command in a container sends the files.
 """
 
@@ -35,9 +35,9 @@ PARTS = (
     "attempts.jsonl",
     "tensorboard",
 )
-TIMES = 4  # provisioners round sizes up, and some do not limit a volume at all
+TIMES = 4  # provisioners round sizes up, and some do not limit a volume
 OF_EXISTING_BYTES = 2**34
-GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # A replica in these phases without a pod will get one.
+GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # A replica in these phases gets a pod if it has none.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,11 +57,11 @@ def fetch(
 
     Args:
         api: the cluster.
-        job: whose run it is.
+        job: the job of the run.
         replica: its number.
         into: the folder for results.
         deadline: on the monotonic clock.
-        most_bytes: of all files; None: `TIMES` the volume that the job asks for.
+        most_bytes: limit for all files together; None: `TIMES` times the volume that the job requests.
 
     Raises:
         NotFetched: the folder exists already, the run does not exist, or one of them cannot be accessed.
@@ -77,14 +77,14 @@ def fetch(
 
 
 def _usual_bytes(job: TrainingJob) -> int:
-    """Return the bound for the files of a run; the job does not state the size of an existing claim."""
+    """Return the limit for the files of a run; the job does not state the size of an existing claim."""
     storage = job.spec.storage
     return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 
 
 @contextmanager
 def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator[None]:
-    """Turn errors in the block into errors that name the place and the remedy."""
+    """Replace errors in the block by errors that name the place and the remedy."""
     try:
         yield
     except Unreachable as error:
@@ -93,7 +93,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
         raise TookTooLong(
             f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
         ) from error
-    except (ApiError, ClientError):  # some of which are OSErrors too
+    except (ApiError, ClientError):  # some of these are OSErrors too
         raise
     except CommandFailed as error:
         raise NotFetched(
@@ -111,7 +111,7 @@ def _with_remedies(source: RunSource, target: Path, deadline: float) -> Iterator
 
 def _copy(api: Api, source: RunSource, target: Path, deadline: float, most_bytes: int) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    program = files("palaestra.client").joinpath("packing.py").read_text(encoding="utf-8")
+    program = files("palaestra.client").joinpath("tar_stream.py").read_text(encoding="utf-8")
     command = ["python3", "-I", "-c", program, source.directory, *PARTS]
     chunks = api.execute(
         source.namespace, source.pod, source.container, command, within_s=deadline - time.monotonic()
@@ -159,7 +159,7 @@ def _template(api: Api, job: TrainingJob, replica: int) -> Object:
 
 
 def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
-    """Return the name of the replica's pod if it runs, None if it has ended.
+    """Return the name of the replica's pod if it runs; None if it has ended.
 
     Raises:
         NotFetched: the pod is about to start and needs its volume, or is just ending.
@@ -205,7 +205,7 @@ def _trainer_ended(status: Object) -> bool:
 
 @contextmanager
 def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline: float) -> Iterator[str]:
-    """Yield a temporary pod that reads the volume, and delete it in any case.
+    """Yield the name of a temporary pod that reads the volume, and delete the pod in any case.
 
     An error of the deletion is ignored, because the pod ends by itself at the deadline.
     """
@@ -241,7 +241,7 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
 
 
 def hindrance(pod: Object) -> str:
-    """Return why a pod does not run, as the cluster reports it; empty: no reason reported."""
+    """Return the cluster's reason for which a pod does not run; empty: no reason is reported."""
     status = pod["status"]
     waiting = [
         (container.get("state") or {}).get("waiting") for container in status.get("containerStatuses", ())

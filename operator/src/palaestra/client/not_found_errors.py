@@ -1,4 +1,4 @@
-"""Errors for what the API server does not find: a job, a namespace, or the TrainingJob definition."""
+"""Errors for missing objects: a job, a namespace, or the TrainingJob definition."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ def check_namespace(api: Api, name: str) -> None:
     """Check that a namespace exists; without permission to read it, it is assumed to exist.
 
     Raises:
-        NoSuchNamespace: it does not.
+        NoSuchNamespace: the namespace does not exist.
     """
     try:
         api.get(NAMESPACES, None, name)

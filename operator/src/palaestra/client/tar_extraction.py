@@ -1,7 +1,7 @@
-"""Unpack the tar that a container sends, which may send anything.
+"""Unpack an untrusted tar stream from a container.
 
-Only regular files that were asked for are written, below one folder. Their number, their bytes, the length of
-their names and what is kept in memory are bounded.
+Only requested regular files are written, below one folder. Their number, their total size, the length of
+their names and the memory are limited.
 """
 
 import io
@@ -16,21 +16,21 @@ from palaestra.api.text import one_line
 MOST_FILES = 10_000
 MOST_PARTS = 16
 MOST_NAME_BYTES = 255
-# What may come between two files: their headers, and the blocks that are read ahead.
+# The limit between two files, for their headers and the blocks that are read ahead.
 MOST_HEAD_BYTES = 2**16
 
 
 class WrongArchive(tarfile.TarError):
-    """A tar is damaged, or has what was not asked for; text for people."""
+    """A tar is damaged, or has an unrequested file; the message is for people."""
 
 
 def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_bytes: int) -> None:
     """Write the files of a tar stream into a new folder, and read the stream to its end.
 
     Args:
-        chunks: of the stream.
+        chunks: the chunks of the stream.
         into: the folder.
-        wanted: names of files, and of folders whose files are wanted.
+        wanted: names of the requested files, and of folders with requested files.
         most_bytes: of all files together.
 
     Raises:
@@ -51,14 +51,14 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
                 _write(tar, member, into / path)
     except WrongArchive:
         raise
-    except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile's reader raises all three
+    except (tarfile.TarError, ValueError, UnicodeError) as error:  # tarfile raises all three
         raise WrongArchive(f"it is damaged ({one_line(str(error), 200)})") from error
     for _ in chunks:  # The exit code of the command comes last.
         pass
 
 
 class _Seen:
-    """The files of an archive so far, and the folders that they are in."""
+    """The files of an archive so far, and their folders."""
 
     def __init__(self) -> None:
         self.files: set[PurePosixPath] = set()
@@ -69,15 +69,15 @@ class _Seen:
         self._folders.update(path.parents)
 
     def clashes_with(self, path: PurePosixPath) -> bool:
-        """Return whether a file cannot be beside those that were seen."""
+        """Return whether a file cannot exist together with the earlier files."""
         return path in self.files or path in self._folders or not self.files.isdisjoint(path.parents)
 
 
 def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> PurePosixPath:
-    """Return the path of a member that may be written.
+    """Return the path of a member, if it may be written.
 
     Raises:
-        WrongArchive: it may not.
+        WrongArchive: it must not be written.
     """
     name, path = member.name, PurePosixPath(member.name)
     shown = one_line(name, 100) or "a member without a name"
@@ -109,8 +109,8 @@ class _Stream(io.RawIOBase):
     """An iterator of chunks as a readable file.
 
     Attributes:
-        left: bytes that may be read before the next member is known; a header that is larger would be kept
-            in memory as a whole.
+        left: bytes that may be read before the next member is known; tarfile would keep a larger header in
+            memory as a whole.
     """
 
     def __init__(self, chunks: Iterator[bytes]) -> None:
@@ -126,7 +126,7 @@ class _Stream(io.RawIOBase):
         """Copy received bytes into the buffer and return their number; 0 at the end.
 
         Raises:
-            WrongArchive: too many come between two files.
+            WrongArchive: too many bytes are between two files.
         """
         while not self._rest:
             try:

@@ -1,8 +1,8 @@
 """Write parts of a folder to standard output as one tar: run as `python3 -I -c TEXT FOLDER NAME...`.
 
-The text of this file is sent to a container, so it uses the standard library only. The run may continue
-meanwhile. Each file is opened before its size is read: a growing file is truncated at that size, and a file
-that is replaced meanwhile is complete. Missing files are skipped.
+The text of this file is sent to a container, so it uses the standard library only. The run may continue in
+the meantime. Each file is opened before its size is read: a growing file is truncated at that size, and a
+replaced file is complete. Missing files are skipped.
 """
 
 import os
@@ -11,7 +11,7 @@ import tarfile
 
 
 def files(folder: str, name: str) -> list[str]:
-    """Return the paths of all files of that name or below it, relative to the folder, in order."""
+    """Return the paths of the file `name`, or of all files below it, sorted and relative to the folder."""
     path = os.path.join(folder, name)
     if os.path.isfile(path):
         return [name]

@@ -1,8 +1,8 @@
 """The pod that reads the volume of a run after the run's own pod has ended.
 
-Pure. The pod is built from the template of the replica's Job in the cluster, so it has the same security,
-scheduling, pull secrets and trainer image as the run's pods. It mounts the volume read-only, has no token,
-and ends by itself even if it is not deleted.
+Pure. The pod is built from the template of the replica's Job in the cluster, so it has the same security
+context, scheduling, pull secrets and trainer image as the run's pods. It mounts the volume read-only, has no
+token, and ends by itself even if it is not deleted.
 """
 
 import copy
@@ -25,7 +25,7 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
     Args:
         job: the job of the run.
         template: the pod template of the replica's Job.
-        name: of the pod, different each time.
+        name: name of the pod, different for each call.
         lives_s: whole seconds after which it ends by itself.
     """
     spec = copy.deepcopy(dict(template["spec"]))
@@ -51,9 +51,9 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 
 
 def _reader(template: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
-    """Return the container: the trainer's image and security, with only the run mounted, read-only.
+    """Return the container: the trainer's image and security context, and only the run as a read-only mount.
 
-    It has the resources of the ROS master, the smallest that a quota of the namespace has admitted.
+    It has the resources of the ROS master, the smallest that a quota of the namespace is known to admit.
     """
     trainer = trainer_of(template)
     [master] = (each for each in template["spec"]["initContainers"] if each["name"] == ROS_MASTER)

@@ -1,4 +1,4 @@
-"""What a command reads in a status while it waits: progress as lines of text, and the reason of the phase."""
+"""The progress of a job in its status, as lines of text, and the reason of its phase."""
 
 import re
 from collections.abc import Iterator
@@ -11,20 +11,20 @@ _NUMBERS = re.compile(r"\d+")
 
 
 class News:
-    """Reports each phase of a job, and each reason why a replica waits, once.
+    """Reports each phase of a job, and each waiting reason of a replica, once.
 
     The kubelet alternates between two messages and counts its retries. A known message, or one that differs
     only in its numbers, is reported again only after the reason has changed.
     """
 
     def __init__(self, name: str) -> None:
-        """Start with nothing reported; each line begins with `name`."""
+        """Start without reported lines; each line begins with `name`."""
         self._name = name
         self._phase = ""
         self._reported: set[tuple[object, ...]] = set()
 
     def of(self, phase: str, status: Status) -> Iterator[str]:
-        """Yield a line for a new phase, then one for each replica with a new reason to wait."""
+        """Yield a line for a new phase, then one for each replica with a new waiting reason."""
         if phase != self._phase:
             self._phase = phase
             yield f"{self._name}: {phase}"
@@ -41,7 +41,7 @@ def current(job: TrainingJob) -> bool:
 
 
 def why(status: Status) -> str:
-    """Return reason and message of the condition of the phase; empty if there is none."""
+    """Return reason and message of the condition of the phase; empty without that condition."""
     for condition in status.conditions:
         if (
             status.phase

@@ -32,11 +32,11 @@ def changes(
         namespace: of the object.
         name: of the object.
         deadline: on the monotonic clock.
-        uid: of the object; empty: of the first object seen.
+        uid: uid of the object; empty: that of the first object found.
 
     Raises:
         TookTooLong: the deadline passed.
-        ApiError: the API server refuses. Retryable errors are retried once the object was seen.
+        ApiError: the API server refuses. After the object was found, retryable errors are retried.
     """
     version, failures = "", 0
     while True:

@@ -1,21 +1,21 @@
 """The only package that connects to an API server.
 
-Requests and answers are plain JSON. The official client merges the files of a kubeconfig; its models are
-not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
+Requests and responses are plain JSON. The official client merges the files of a kubeconfig; its models are
+not used (docs/decisions/0004). These modules know Kubernetes, but not TrainingJobs:
 
-- `resources`: the kinds of objects and their addresses
+- `resources`: the kinds of objects and their API paths
 - `connection`: the API server and the identity to use; `client_config`: its address and credentials
-- `kubeconfig`, `service_account`: where they come from, outside a pod and in one
-- `identity`, `plugin`, `tokens`, `impersonation`: who asks, and for whom
-- `proxies`, `connection_pool`, `tls`: the way to the server, and whether it is the right one
-- `timeouts`: deadlines, and waits before the next attempt
+- `kubeconfig`, `service_account`: their sources, outside a pod and in a pod
+- `identity`, `plugin`, `tokens`, `impersonation`: the user who sends requests, and the user for whom they act
+- `proxies`, `connection_pool`, `tls`: the route to the server, and the verification of its certificate
+- `timeouts`: deadlines, and waits before a retry
 - `api`: one request, with a deadline
-- `transport`: the bytes of a request
-- `errors`: one error for each refusal
+- `transport`: the bytes of requests and responses
+- `errors`: one exception for each kind of refusal
 - `watch`: one watch, until it ends
 - `reflector`: a cache that follows the API server
 - `store`: the objects of that cache
-- `workqueue`: work for the controller, one worker a key
+- `workqueue`: keys to reconcile, each with one worker at a time
 - `lease`: leader election; `lease_timing`: its arithmetic
 - `recorder`: events for people
 - `pod_logs`: the log of a running container

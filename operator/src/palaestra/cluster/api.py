@@ -1,7 +1,7 @@
-"""Requests to an API server: plain JSON in and out, a deadline on each, one typed error for each refusal.
+"""Requests to an API server: plain JSON, a deadline on each, and a typed exception for each kind of refusal.
 
 Only two kinds of requests are retried, within the deadline of the call: a request that a busy server rejected
-(429), and a read whose connection broke. For all others the caller's queue retries.
+(429), and a read whose connection broke. All others are retried by the caller's queue.
 """
 
 import time
@@ -48,7 +48,7 @@ class Api:
     """An API server, as one identity; safe to use from several threads.
 
     Attributes:
-        limits: how long anything may take.
+        limits: the deadlines.
     """
 
     def __init__(self, transport: Transport, call_s: float | None = None) -> None:
@@ -62,7 +62,7 @@ class Api:
 
     @property
     def on_request(self) -> OnRequest:
-        """Called after every request, also of `within`: verb, plural, HTTP status (0: no answer), seconds.
+        """Called after every request, also of `within`: verb, plural, HTTP status (0: no response), seconds.
 
         A watch is reported when it ends.
         """
@@ -85,7 +85,7 @@ class Api:
         return True
 
     def schema(self, group_version: str, kind: str) -> Object:
-        """Return the OpenAPI schema of a kind, as the API server publishes it to every account.
+        """Return the OpenAPI schema of a kind, which the API server publishes to every account.
 
         The schema of a custom resource is published some seconds after its definition.
 
@@ -111,7 +111,7 @@ class Api:
         fields: str | None = None,
         limit: int = PAGE,
     ) -> Objects:
-        """Return all objects that match, as of one moment, read in pages of `limit`.
+        """Return all matching objects, as a consistent list, read in pages of `limit`.
 
         Namespace None means all namespaces. `labels` and `fields` are selectors as in kubectl:
         `palaestra.dev/job=x,palaestra.dev/replica` and `involvedObject.uid=…`.
@@ -120,7 +120,7 @@ class Api:
             try:
                 pages = self.pages(resource, namespace, labels=labels, fields=fields, limit=limit)
                 return [item for page in pages for item in page.items]
-            except Gone:  # the version of the list has expired before its last page was read
+            except Gone:  # the version of the list expired before the last page was read
                 if attempt == LISTS_FROM_THE_START - 1:
                     raise
         raise AssertionError("unreachable: the last attempt returns or raises")
@@ -154,7 +154,7 @@ class Api:
         """Return one object.
 
         Raises:
-            NotFound: there is none of that name.
+            NotFound: the object does not exist.
         """
         return _complete(resource, self._object(_call("get", resource, namespace, name)))
 
@@ -166,18 +166,18 @@ class Api:
         *,
         labels: str | None = None,
     ) -> Object:
-        """Return one object or a list as the `Table` that the API server makes for people.
+        """Return one object or a list as the `Table` that the API server renders for people.
 
         Raises:
-            NotFound: there is none of that name.
+            NotFound: the object does not exist.
         """
         call = _call("get" if name else "list", resource, namespace, name, query={"labelSelector": labels})
         return self._object(replace(call, accept=TABLE))
 
     def create(self, resource: Resource, obj: Object, *, dry_run: bool = False) -> Object:
-        """Create an object in the namespace that it names, and return it as stored.
+        """Create an object in its `metadata.namespace`, and return it as stored.
 
-        With `dry_run` the API server does all its checks, admission included, and stores nothing.
+        With `dry_run` the API server runs all its checks, including admission, and does not store the object.
 
         Raises:
             AlreadyExists: the name is taken.
@@ -235,13 +235,13 @@ class Api:
         resource_version: str | None = None,
         propagation: str = "Background",
     ) -> None:
-        """Delete one object; its dependents by `propagation`: `Background`, `Foreground` or `Orphan`.
+        """Delete one object; `propagation` applies to its dependents: `Background`, `Foreground` or `Orphan`.
 
         With a `uid`, a later object of the same name is not deleted. With a `resource_version`, the object is
         deleted only if it has this version.
 
         Raises:
-            NotFound: there is none.
+            NotFound: the object does not exist.
             Conflict: the object of this name has another uid or version.
         """
         options: dict[str, Any] = {
@@ -255,14 +255,14 @@ class Api:
         self._object(_call("delete", resource, namespace, name).sending(options, method="DELETE"))
 
     def evict(self, namespace: str, name: str, *, uid: str) -> None:
-        """Ask for the eviction of the pod with this uid.
+        """Evict the pod with this uid.
 
-        A disruption budget refuses with 429 as a busy server does, maybe for days, so this is not retried.
+        A disruption budget refuses with 429, like a busy server, maybe for days, so this is not retried.
 
         Raises:
-            NotFound: there is none of this name.
+            NotFound: no pod has this name.
             Conflict: the pod of this name has another uid.
-            TooManyRequests: a disruption budget allows no eviction now, or the server is busy.
+            TooManyRequests: a disruption budget does not allow an eviction now, or the server is busy.
         """
         eviction = {
             "apiVersion": "policy/v1",
@@ -283,7 +283,7 @@ class Api:
         fields: str | None = None,
         seconds: float,
     ) -> Watch:
-        """Return the changes after `version`, where a list or an earlier watch ended.
+        """Return the changes after `version`, the version of a list or of an earlier watch's last event.
 
         The API server ends the watch after `seconds`. Iterate over it once, to its end or to `close`.
 
@@ -315,9 +315,9 @@ class Api:
         """Yield the last `tail` lines of a container's log; with `follow` until the container has ended.
 
         Raises:
-            NotFound: there is no such pod.
+            NotFound: the pod does not exist.
             Invalid: the container has not started, or the pod has no container of that name.
-            Unreachable: the connection broke, or the log did not end `within_s`.
+            Unreachable: the connection broke, or the log did not end within `within_s`.
         """
         query = {
             "container": container,
@@ -328,10 +328,10 @@ class Api:
         yield from self._lines(call, within_s)
 
     def proxied(self, namespace: str, pod: str, port: int, path: str) -> str:
-        """Return a pod's answer to a GET through the API server; `path` has no leading slash.
+        """Return a pod's response to a GET through the API server; `path` has no leading slash.
 
         Raises:
-            ApiError: the pod answers with an error, or the API server does not reach it.
+            ApiError: the pod responds with an error, or the API server cannot reach it.
         """
         call = _call("get", PODS, namespace, f"{pod}:{port}", subresource=f"proxy/{path}")
         return "\n".join(self._lines(call, self._call_s))
@@ -343,7 +343,8 @@ class Api:
 
         Raises:
             CommandFailed: its exit code is not 0.
-            Unreachable: the connection broke, or the command did not end `within_s`; output is missing.
+            Unreachable: the connection broke, or the command did not end within `within_s`; output is
+                missing.
             ApiError: the API server refuses.
         """
         deadline = time.monotonic() + within_s

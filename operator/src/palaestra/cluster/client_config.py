@@ -15,12 +15,12 @@ class Access:
     """An API server's address, and the credentials for it.
 
     Attributes:
-        host: address, as `https://10.0.0.1:443`.
-        pool: connections, with the TLS settings of that server, through its proxy.
-        authorization: returns the header of that name, None without one; called by one thread at a time.
-            Raises Unreachable if the credentials cannot be read.
-        headers: those that every request has besides: whom it acts for. A name may come several times.
-        proxy: where all connections go first, for messages.
+        host: the address, such as `https://10.0.0.1:443`.
+        pool: connections with the TLS settings for that server, through its proxy.
+        authorization: returns the header `Authorization`, or None; called by one thread at a time. Raises
+            Unreachable if the credentials cannot be read.
+        headers: further headers of every request, for impersonation. A name may occur several times.
+        proxy: the proxy of all connections, for messages.
     """
 
     host: str

@@ -1,4 +1,4 @@
-"""The API server to connect to, and the identity: by a kubeconfig, or by the pod's service account."""
+"""The API server to connect to, and the identity: from a kubeconfig, or from the pod's service account."""
 
 import os
 from pathlib import Path
@@ -15,15 +15,15 @@ DEFAULT = "default"
 
 
 def connect(kubeconfig: str | None = None, context: str | None = None, limits: Timeouts | None = None) -> Api:
-    """Return the API server to use; nothing is sent yet.
+    """Return the API server to use; no request is sent yet.
 
     Args:
         kubeconfig: a file; None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
-        context: of the kubeconfig; None for its current one.
+        context: the context of the kubeconfig; None for its current one.
         limits: deadlines; None for the usual ones.
 
     Raises:
-        NotConfigured: no API server is named, or its credentials cannot be read.
+        NotConfigured: no API server is configured, or its credentials cannot be read.
     """
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
     return Api(Transport(_access(files, context), limits or Timeouts()))
@@ -65,6 +65,6 @@ def own_namespace(default: str) -> str:
 def _home() -> str | None:
     try:
         file = Path.home() / ".kube" / "config"
-    except RuntimeError:  # no home, as in a pod with a number for a user
+    except RuntimeError:  # the user has no home, for example a pod's numeric user
         return None
     return str(file) if file.is_file() else None

@@ -10,10 +10,10 @@ from urllib3.util import make_headers
 
 from palaestra.cluster.proxies import Proxy
 
-POOL = 32  # connections kept open: more than there are workers and watches
-# The kernel finds peers that are gone, also behind silent proxies.
+POOL = 32  # connections kept open: more than the number of workers and watches
+# With these options the kernel detects dead peers, also behind silent proxies.
 KEPT_ALIVE = (
-    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),  # as urllib3 has it, whose default these options replace
+    (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),  # urllib3's own default, which these options replace
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
     (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 30),
     (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 30),
@@ -24,12 +24,12 @@ KEPT_ALIVE = (
 def connections(
     context: ssl.SSLContext, proxy: Proxy | None = None, server_name: str | None = None
 ) -> PoolManager:
-    """Return connections with these TLS settings, through a proxy where one is named.
+    """Return connections with these TLS settings, through `proxy` if it is not None.
 
     Args:
-        context: verifies the server, and a proxy that is connected to by TLS.
-        proxy: where all connections go first.
-        server_name: the name that the server's certificate must have; None: its host's.
+        context: verifies the server, and also a proxy with an https address.
+        proxy: the proxy of all connections.
+        server_name: the name that the server's certificate must have; None: the host's name.
     """
     options: dict[str, Any] = {
         "maxsize": POOL,
@@ -53,14 +53,14 @@ def _through_socks(proxy: Proxy, options: dict[str, Any]) -> PoolManager:
 
 
 def dialed(pool: PoolManager, server: str, wait_s: float) -> socket.socket:
-    """Return a new connection to a server that no other request uses, TLS included; the caller closes it.
+    """Return a new connection to a server, with TLS, for one request only; the caller closes it.
 
     Raises:
-        urllib3.exceptions.HTTPError, OSError: no connection stands in `wait_s` seconds.
+        urllib3.exceptions.HTTPError, OSError: the connection was not established within `wait_s` seconds.
     """
     target = pool.connection_from_url(server)
     first = target.proxy or target
-    # mypy knows only a protocol of the classes, which has no `sock`.
+    # mypy knows only the protocol of these classes, which has no `sock`.
     connection: Any = target.ConnectionCls(
         host=first.host or "", port=first.port, timeout=wait_s, **target.conn_kw
     )

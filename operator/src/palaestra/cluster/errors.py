@@ -1,19 +1,19 @@
-"""The errors for an API server's refusals, and for its absence.
+"""The exceptions for an API server that refuses a request or does not respond.
 
-ApiError                    any answer but success; `retryable` says whether it may succeed later
+ApiError                    any response but success; `retryable`: whether a retry may succeed
 ├── NotFound                404
-│   └── NoSuchKind          404 that names no object: the kind itself is not served
+│   └── NoSuchKind          404 without an object: the kind itself is not served
 ├── AlreadyExists           409, the name is taken
-├── Conflict                409, somebody else wrote first: read again
+├── Conflict                409, another client wrote first: read again
 ├── Forbidden               403, RBAC, a quota or admission refuses
-│   └── NamespaceTerminating 403, nothing can be created in a namespace that is being deleted
+│   └── NamespaceTerminating 403, the namespace is being deleted, so creations are refused
 ├── Invalid                 400 and 422, the object is wrong: never retried
 ├── Gone                    410, the version to continue from has expired: list again
 ├── TooManyRequests         429, with the wait that the server asks for
-├── ServerError             5xx, the API server or its store is in trouble
-└── Unreachable             no answer, or none that can be read
-    └── Untrusted           the server's certificate is refused: nothing was sent
-NotConfigured               no API server is named, or its credentials cannot be read
+├── ServerError             5xx, the API server or its store has failed
+└── Unreachable             no response, or an unreadable one
+    └── Untrusted           the server's certificate is not trusted: the request was not sent
+NotConfigured               no API server is configured, or its credentials cannot be read
 CommandFailed               the exit code of a command in a container is not 0
 
 A message is the API server's own: it names the object and, if the object is invalid, the field.
@@ -36,14 +36,14 @@ CONFIGURE = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod 
 
 
 class NotConfigured(PalaestraError, ValueError):
-    """No API server is named, or its credentials cannot be read; retrying cannot help."""
+    """No API server is configured, or its credentials cannot be read; retrying cannot help."""
 
 
 class ApiError(PalaestraError, OSError):
-    """An answer other than success.
+    """A response other than success, or no response.
 
     Attributes:
-        code: the HTTP status; 0 without an answer.
+        code: the HTTP status; 0 without a response.
         reason: the API server's reason, such as `AlreadyExists`; compare it for equality.
         message: the API server's message.
     """
@@ -61,7 +61,7 @@ class ApiError(PalaestraError, OSError):
 
 
 class NotFound(ApiError):
-    """There is no such object, or no such kind of objects."""
+    """The object or its kind does not exist."""
 
 
 class NoSuchKind(NotFound):
@@ -79,16 +79,16 @@ class Conflict(ApiError):
 
 
 class Forbidden(ApiError):
-    """RBAC, a quota, Pod Security or a webhook refuses; a person has to act."""
+    """RBAC, a quota, Pod Security or a webhook refuses; a person must act."""
 
     @property
     def lacks_right(self) -> bool:
-        """Return whether RBAC refuses, by its message; no field of the answer says so."""
+        """Return whether RBAC refuses, by its message; no field of the response shows it."""
         return re.search(r" cannot \S+ resource ", self.message) is not None
 
 
 class NamespaceTerminating(Forbidden):
-    """The namespace is being deleted, so nothing can be created in it any more."""
+    """The namespace is being deleted, so no object can be created in it."""
 
 
 class Invalid(ApiError):
@@ -105,7 +105,7 @@ class TooManyRequests(ApiError):
     """The API server is busy.
 
     Attributes:
-        retry_after_s: seconds that it asks us to wait.
+        retry_after_s: seconds that the API server requests to wait.
     """
 
     retryable = True
@@ -116,23 +116,23 @@ class TooManyRequests(ApiError):
 
 
 class ServerError(ApiError):
-    """The API server or its store is in trouble (5xx)."""
+    """The API server or its store has failed (5xx)."""
 
     retryable = True
 
 
 class Unreachable(ApiError):
-    """No answer in time, or an unreadable one; whether a write took place is unknown."""
+    """No response in time, or an unreadable one; a write may or may not have happened."""
 
     retryable = True
 
 
 class Untrusted(Unreachable):
-    """The server's certificate is refused, so nothing was sent.
+    """The server's certificate is not trusted, so the request was not sent.
 
     Attributes:
-        fact: which server, and what is wrong with its certificate.
-        remedy: what a person does about it.
+        fact: the server, and the problem with its certificate.
+        remedy: the action for a person.
     """
 
     def __init__(self, fact: str, remedy: str) -> None:
@@ -150,7 +150,7 @@ class CommandFailed(PalaestraError):
     """
 
     def __init__(self, code: int, said: str) -> None:
-        super().__init__(f"exit code {code}: {said or 'it said nothing'}")
+        super().__init__(f"exit code {code}: {said or 'no output'}")
         self.code = code
         self.said = said
 
@@ -171,14 +171,14 @@ BY_CAUSE: dict[str, type[ApiError]] = {"NamespaceTerminating": NamespaceTerminat
 
 
 def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = None) -> ApiError:
-    """Return the error for an HTTP status and the `Status` object that came with it.
+    """Return the exception for an HTTP status and the `Status` object in the response.
 
     Args:
         code: the HTTP status, or the code in the Status of an ERROR event.
-        status: the body; anything may be missing in it.
+        status: the body; any field may be missing.
         retry_after: the Retry-After header, in seconds.
     """
-    if code == NOT_FOUND and not status:  # for a path that it does not serve, the answer is plain text
+    if code == NOT_FOUND and not status:  # for a path that is not served, the response is plain text
         return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
     message = str(status.get("message") or "the API server gave no message")
@@ -191,7 +191,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
-    """Return the error that a cause names, for reasons that several errors share."""
+    """Return the exception for a cause, because several exceptions share a reason."""
     causes = (status.get("details") or {}).get("causes") or ()
     return next((BY_CAUSE[cause["reason"]] for cause in causes if cause.get("reason") in BY_CAUSE), None)
 

@@ -1,6 +1,6 @@
 """The credentials of a kubeconfig's user, as a header and as a certificate of the client.
 
-client-go's rules: one way to log in at most, a token's file before a token, a plugin only without both.
+The rules are client-go's: at most one way to log in, a token file before a token, a plugin without both.
 """
 
 import ssl
@@ -25,13 +25,13 @@ EXEC, PROVIDER = "exec", "auth-provider"
 def authorization(
     user: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any], context: ssl.SSLContext
 ) -> Authorization:
-    """Return a source of the header `Authorization` for a user, other than one of an auth-provider.
+    """Return a function for the header `Authorization` of a user; it ignores an auth-provider.
 
     Args:
-        user: of a kubeconfig.
-        folder: of that kubeconfig, in which relative paths begin.
-        cluster: what a plugin may ask to know of the cluster.
-        context: gets the certificate that a plugin gives.
+        user: the user in a kubeconfig.
+        folder: the folder of that kubeconfig; relative paths start there.
+        cluster: the information about the cluster for a plugin.
+        context: receives the certificate of a plugin's credentials.
 
     Raises:
         NotConfigured: the user has several ways to log in, or one is wrong.
@@ -59,7 +59,7 @@ def authorization(
 
 
 class _OfPlugin:
-    """The header from a plugin's credentials, which are kept until they expire."""
+    """The header from a plugin's credentials, which are cached until they expire."""
 
     def __init__(self, plugin: Plugin, context: ssl.SSLContext) -> None:
         self._plugin = plugin
@@ -67,10 +67,10 @@ class _OfPlugin:
         self._last: Credentials | None = None
 
     def __call__(self) -> str | None:
-        """Return the header; None if the plugin gave a certificate alone.
+        """Return the header; None if the plugin returned only a certificate.
 
         Raises:
-            Unreachable: the plugin gave no usable credentials.
+            Unreachable: the plugin did not return usable credentials.
         """
         last = self._last
         if last is None or (last.expires is not None and datetime.now(UTC) >= last.expires):

@@ -1,6 +1,6 @@
-"""Whom the requests of a kubeconfig's user act for: `as` and its companions, as headers.
+"""Headers for impersonation, from `as` and its related fields of a kubeconfig's user.
 
-Source of the names and of the escapes: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
+Source of the names and the escape rules: NewImpersonatingRoundTripper in k8s.io/client-go/transport.
 """
 
 import string
@@ -15,10 +15,10 @@ _LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").enc
 
 
 def impersonation(user: Mapping[str, Any]) -> Headers:
-    """Return the headers of a kubeconfig's user; none if it acts for itself.
+    """Return the headers of a kubeconfig's user; empty without impersonation.
 
     Raises:
-        NotConfigured: a value has another type, or `as` names no user.
+        NotConfigured: a value has a wrong type, or `as` does not name a user.
     """
     groups, extra = user.get(GROUPS) or [], user.get(EXTRA) or {}
     if not isinstance(groups, list):
@@ -28,7 +28,9 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
     name, uid = user.get(USER) or "", user.get(UID) or ""
     if not name:
         if groups or extra or uid:
-            raise NotConfigured(f"{USER} is missing beside {GROUPS}, {UID} or {EXTRA}; name the user there")
+            raise NotConfigured(
+                f"{USER} is missing, but required with {GROUPS}, {UID} or {EXTRA}; name the user there"
+            )
         return ()
     found = [("Impersonate-User", _text(name, USER))]
     found += [("Impersonate-Uid", _text(uid, UID))] if uid else []

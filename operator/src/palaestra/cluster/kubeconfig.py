@@ -1,8 +1,8 @@
-"""A kubeconfig, understood as kubectl does.
+"""Read a kubeconfig by the rules of kubectl.
 
-The official client merges the files and knows auth-providers. It ignores `as` and passes over the errors of
-plugins, so the rest is read here. This module is imported only if a kubeconfig is used, because the client
-needs 10 MiB of memory.
+The official client merges the files and supports auth-providers. It ignores `as` and the errors of plugins,
+so this module reads the rest. It is imported only if a kubeconfig is used, because the client needs 10 MiB of
+memory.
 """
 
 import base64
@@ -43,13 +43,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A part of a kubeconfig, and the folder of its file, in which relative paths begin."""
+    """A part of a kubeconfig, and the folder of its file, where relative paths start."""
 
     content: Mapping[str, Any]
     folder: Path
 
     def bytes_of(self, field: str) -> bytes | None:
-        """Return what a field holds, or the file that it names; `-data` comes first, as for kubectl."""
+        """Return the content of a field's `-data`, else of the file that the field names, as kubectl does."""
         given, path = self.content.get(f"{field}-data"), self.content.get(field)
         if given:
             try:
@@ -63,7 +63,7 @@ def access(files: str, context: str | None) -> Access:
     """Return the access of a context in a kubeconfig; None is the current context.
 
     Raises:
-        NotConfigured: it cannot be read, or something in it is wrong.
+        NotConfigured: it cannot be read, or a field in it is wrong.
     """
     try:
         merger, config = _merged(files)
@@ -77,10 +77,10 @@ def access(files: str, context: str | None) -> Access:
 
 
 def namespace(files: str, context: str | None) -> str | None:
-    """Return the namespace that a context of a kubeconfig names; None: it names none.
+    """Return the namespace of a context of a kubeconfig, or None.
 
     Raises:
-        NotConfigured: it has no such context, or cannot be read.
+        NotConfigured: the kubeconfig does not have the context, or cannot be read.
     """
     try:
         _, config = _merged(files)
@@ -90,12 +90,12 @@ def namespace(files: str, context: str | None) -> str | None:
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     if chosen is None:
-        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` names them")
+        raise NotConfigured(f"--context: {files} has no {name!r}; `kubectl config get-contexts` lists them")
     return str(found) if found else None
 
 
 def _merged(files: str) -> tuple[KubeConfigMerger, Any]:
-    """Return the kubeconfig's files, and the one ConfigNode of all; the first current context decides."""
+    """Return the kubeconfig's files and their merged ConfigNode; the first current context is used."""
     merger = KubeConfigMerger(files)
     config = merger.config
     if config is None:
@@ -113,7 +113,7 @@ def _entry(node: ConfigNode) -> _Entry:
 
 
 def _user(config: ConfigNode, chosen: ConfigNode) -> _Entry:
-    """Return the user of a context; without fields if none is named, or the named one is missing."""
+    """Return the user of a context; without fields if the context has no user, or the user is missing."""
     name = chosen.safe_get("user")
     found = config["users"].get_with_name(name, safe=True) if name and config.safe_get("users") else None
     if found is None or not found.safe_get("user"):
@@ -142,7 +142,7 @@ def _access(files: str, merger: KubeConfigMerger, context: str, cluster: _Entry,
 
 def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> ssl.SSLContext:
     try:
-        pem = authority.decode("ascii", "ignore") if authority else None  # comments may have other letters
+        pem = authority.decode("ascii", "ignore") if authority else None  # comments may be non-ASCII
         found = verification(pem=pem, verified=not insecure)
     except (OSError, ValueError) as error:
         raise NotConfigured(f"{AUTHORITY} is no certificate in PEM ({error}); copy it anew") from error
@@ -152,7 +152,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
             add_identity(found, certificate, key)
         except OSError as error:
             raise NotConfigured(
-                f"{CERTIFICATE} and {KEY} cannot be used together ({error}); copy both anew"
+                f"{CERTIFICATE} and {KEY} cannot be used together ({error}); copy both again"
             ) from error
     elif certificate or key:
         missing = KEY if certificate else CERTIFICATE
@@ -161,7 +161,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
 
 
 def _host(cluster: _Entry, *, secure: bool) -> str:
-    """Return the server's address; without a scheme TLS is used where there are settings for it."""
+    """Return the server's address; if it has no scheme, `secure` selects https."""
     text = str(cluster.content.get(SERVER) or "").strip().rstrip("/")
     if text and "://" not in text:
         text = f"{'https' if secure else 'http'}://{text}"
@@ -175,7 +175,7 @@ def _host(cluster: _Entry, *, secure: bool) -> str:
 
 
 def _proxy(cluster: _Entry, host: str) -> Proxy | None:
-    """Return the proxy of a cluster: its own, whatever NO_PROXY says, or the environment's."""
+    """Return the proxy of a cluster: its own, even if NO_PROXY excludes the server, or the environment's."""
     named = cluster.content.get(PROXY)
     return proxy_named(str(named), PROXY) if named else proxy_of_environment(host, os.environ)
 
@@ -194,7 +194,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
     if (name := provider.get("name")) != OIDC:
         raise NotConfigured(f"{PROVIDER}: {name!r} is not known any more; use a plugin under `exec`")
     configuration = Configuration()
-    base: Any = None  # each file's own folder
+    base: Any = None  # None stands for each file's own folder
     loader = KubeConfigLoader(
         merger.config, active_context=context, config_base_path=base, config_persister=merger.save_changes
     )
@@ -202,7 +202,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
 
     def header() -> str | None:
         try:
-            settings = configuration.auth_settings()  # asks for a token again if it has expired
+            settings = configuration.auth_settings()  # requests a new token if it has expired
         except (*WRONG, OpenApiException) as error:
             raise Unreachable(0, "NoCredentials", f"{PROVIDER} gave no token ({error})") from error
         return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
@@ -211,7 +211,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
 
 
 def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
-    """Return what a plugin with `provideClusterInfo` learns."""
+    """Return the cluster information for a plugin with `provideClusterInfo`."""
     authority = cluster.bytes_of(AUTHORITY)
     told = {
         name: cluster.content[name] for name in (SERVER, NAME, INSECURE, PROXY) if cluster.content.get(name)
@@ -225,7 +225,7 @@ def _told_to_plugins(cluster: _Entry) -> dict[str, Any]:
 
 
 def _warn(files: str, host: str, proxy: Proxy | None) -> None:
-    """Warn once, in place of urllib3, which warns at every request."""
+    """Warn once, instead of urllib3's warning at every request."""
     log.warning(
         "%s: %s is set, so the certificate of %s is not verified: others may read your credentials",
         files,
@@ -238,5 +238,5 @@ def _warn(files: str, host: str, proxy: Proxy | None) -> None:
 
 
 def _fact(files: str, error: Exception) -> str:
-    said = " ".join(str(error).split())  # YAML's mistakes come on several lines
+    said = " ".join(str(error).split())  # messages about YAML have several lines
     return f"{files}: {said}" if isinstance(error, NotConfigured) else f"{files}: {said}; {CONFIGURE}"

@@ -1,8 +1,8 @@
-"""Leader election: of several operators, one works.
+"""Leader election: only one of several operators works.
 
 Candidates take and renew one Lease object with its resourceVersion, so the API server refuses the second of
-two concurrent writes. `leads()` compares the clock each time: after a process was paused for a minute, its
-first call returns False (see tenure.py). Election only saves work. Correctness does not depend on it: names
+two concurrent writes. `leads()` reads the clock each time: after a process was paused for a minute, its first
+call returns False (see lease_timing.py). Election only saves work. Correctness does not depend on it: names
 are deterministic, and the API server refuses a second object of the same name.
 """
 
@@ -23,7 +23,7 @@ from palaestra.objects import Object
 log = structlog.get_logger("palaestra.cluster")
 
 DURATION_S = 15.0
-RENEW_S = 3.0  # three renewals may fail before the leader has to stop
+RENEW_S = 3.0  # three renewals may fail before the leader must stop
 
 
 def _nothing() -> None:
@@ -31,7 +31,7 @@ def _nothing() -> None:
 
 
 class Leadership:
-    """A candidate for one lease, and its leader while `leads()` is true."""
+    """A candidate for one Lease, and its leader while `leads()` is true."""
 
     def __init__(
         self,
@@ -43,15 +43,15 @@ class Leadership:
         duration_s: float = DURATION_S,
         renew_s: float = RENEW_S,
     ) -> None:
-        """Prepare; nothing is sent before `start`.
+        """Prepare; no request is sent before `start`.
 
         Args:
             api: the API server that stores the Lease.
             namespace: of the Lease.
             name: of the Lease.
-            identity: of this process, different from that of any other.
+            identity: the identity of this process; no other process may have it.
             duration_s: whole seconds after which another candidate may replace a leader that has died.
-            renew_s: seconds between renewals, and between reads of another's lease; at most a third of
+            renew_s: seconds between renewals, or between reads of another leader's Lease; at most a third of
                 `duration_s`.
         """
         self._api = api.within(renew_s)
@@ -75,19 +75,20 @@ class Leadership:
         stopped: Callable[[], None] = _nothing,
         renewed: Callable[[], None] = _nothing,
     ) -> None:
-        """Stand for election; once.
+        """Join the election; call it once.
 
         Args:
             started: called when this process becomes the leader; must return soon.
-            stopped: called when it is no longer the leader, maybe some time after `leads()` is false.
-            renewed: called when it is still the leader after a renewal failed, in the same tenure: what was
-                given up meanwhile can be done now; must return soon.
+            stopped: called when this process is no longer the leader, maybe some time after `leads()` became
+                false.
+            renewed: called when a renewal succeeds after a failed one in the same tenure: work refused in the
+                meantime can be done now; must return soon.
         """
         self._started, self._stopped, self._renewed = started, stopped, renewed
         self._thread.start()
 
     def stop(self, deadline_s: float = 2.0) -> None:
-        """Stop leading, and release the lease so that another candidate can take it at once.
+        """Stop leading, and release the Lease so that another candidate can take it at once.
 
         `leads()` is false from now on, so stop all writers first. If the release takes longer than
         `deadline_s`, the lease expires instead.
@@ -104,7 +105,7 @@ class Leadership:
     def term(self) -> int | None:
         """Return the number of this tenure, from 1; None if this process may not act as the leader.
 
-        Do not write the decisions of one tenure in a later one: another process may have led in between.
+        Do not execute the decisions of one tenure in a later one: another process may have led in between.
         """
         term = self._terms
         return term if self.leads() else None
@@ -133,7 +134,7 @@ class Leadership:
         except NotFound:
             self._create(sent)
             return
-        except Conflict:  # written by another process, or by a request of ours whose answer was lost
+        except Conflict:  # another process wrote it, or this one did and lost the response
             found = self._api.get(LEASES, self._namespace, self._name)
         claim = LeaseSpec.read(found)
         self._version = str(found["metadata"]["resourceVersion"])
@@ -202,7 +203,7 @@ class Leadership:
         try:
             self._api.merge(LEASES, self._namespace, self._name, patch, resource_version=self._version)
         except ApiError as error:
-            log.warning("lease left to run out", lease=self._name, error=str(error))
+            log.warning("lease not released", lease=self._name, error=str(error))
 
 
 def _now() -> str:

@@ -1,16 +1,16 @@
-"""The arithmetic of a Lease: when a leader stops and when another may start. The time is passed in.
+"""The arithmetic of a Lease: the time at which a leader stops, and another may start. The clock is passed in.
 
 Each process compares durations on its own monotonic clock; the times in a Lease are for people. A follower
-counts from the moment when it *saw* the last renewal, which is after the write. A leader counts from the
-moment when it *sent* the renewal, which is before the write, and stops at two thirds. So a leader has stopped
-before another starts, unless one clock runs at two thirds of the other's speed.
+counts from the time at which it *saw* the last renewal, which is after the write. A leader counts from the
+time at which it *sent* the renewal, which is before the write, and stops after two thirds of the duration. So
+a leader has stopped before another starts, unless one clock runs at two thirds of the other's speed.
 """
 
 from dataclasses import dataclass, field
 
 from palaestra.objects import Object
 
-SHARE = 2 / 3  # of a lease's duration, for its leader; the rest is for writes that are in flight
+SHARE = 2 / 3  # of a Lease's duration, for its leader; the rest is for writes in flight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,9 +19,10 @@ class LeaseSpec:
 
     Attributes:
         holder: identity of the leader; "" without a leader.
-        duration_s: seconds without a renewal after which others may take it.
-        renewed: the leader's time of the last renewal; compared for equality only, never with a clock.
-        transitions: how often the leader has changed.
+        duration_s: seconds without a renewal after which another candidate may take it.
+        renewed: time of the last renewal by the leader's clock; compared for equality only, never with a
+            clock.
+        transitions: number of changes of the leader.
     """
 
     holder: str = ""
@@ -31,7 +32,7 @@ class LeaseSpec:
 
     @classmethod
     def read(cls, lease: Object) -> "LeaseSpec":
-        """Return the claim in a Lease object; an absent field is "" or 0."""
+        """Return the spec of a Lease object; an absent field is "" or 0."""
         spec = lease.get("spec") or {}
         return cls(
             holder=str(spec.get("holderIdentity") or ""),
@@ -43,33 +44,33 @@ class LeaseSpec:
 
 @dataclass(slots=True)
 class ObservedLease:
-    """A follower's view of the lease: the last claim, and when the follower saw it change."""
+    """A follower's view of the Lease: its last spec, and the time at which the follower saw it change."""
 
     claim: LeaseSpec = field(default_factory=LeaseSpec)
     since: float = float("-inf")
 
     def see(self, claim: LeaseSpec, now: float) -> None:
-        """Record the claim that the Lease has now."""
+        """Record the current spec of the Lease."""
         if claim != self.claim:
             self.claim, self.since = claim, now
 
     def free(self, now: float) -> bool:
-        """Return whether the lease may be taken: it has no holder, or was not renewed for its duration."""
+        """Return whether the Lease may be taken: it has no holder, or was not renewed for its duration."""
         return not self.claim.holder or now >= self.since + self.claim.duration_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tenure:
-    """A leader's own view: when it sent the last successful renewal.
+    """A leader's own view: the time at which it sent the last successful renewal.
 
     Attributes:
-        sent: on the leader's clock, just before the request.
-        duration_s: of the lease.
+        sent: time on the leader's clock, just before the request.
+        duration_s: duration of the Lease.
     """
 
     sent: float
     duration_s: float
 
     def holds(self, now: float) -> bool:
-        """Return whether the leader may still act; false before another may."""
+        """Return whether the leader may still act; it becomes false before another may act."""
         return now < self.sent + self.duration_s * SHARE

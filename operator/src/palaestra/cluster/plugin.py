@@ -1,4 +1,4 @@
-"""A program that gives credentials: `exec` of a kubeconfig's user.
+"""A credential plugin: the program in `exec` of a kubeconfig's user.
 
 Source: https://kubernetes.io/docs/reference/access-authn-authz/authentication/#client-go-credential-plugins
 """
@@ -25,13 +25,13 @@ MODES = (ALWAYS, NEVER, "IfAvailable")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """What a plugin gave.
+    """The credentials from a plugin.
 
     Attributes:
-        token: for the header `Authorization`; None without one.
-        certificate: of the client, as PEM; None without one.
+        token: for the header `Authorization`, or None.
+        certificate: of the client, as PEM, or None.
         key: of that certificate.
-        expires: from when on the plugin has to be asked again; None: never.
+        expires: time after which the plugin must run again; None: never.
     """
 
     token: str | None
@@ -41,15 +41,15 @@ class Credentials:
 
 
 class Plugin:
-    """The program of a kubeconfig's user, which is run whenever its credentials have expired."""
+    """The program of a kubeconfig's user; it runs again when its credentials have expired."""
 
     def __init__(self, entry: Mapping[str, Any], folder: Path, cluster: Mapping[str, Any]) -> None:
         """Check the entry.
 
         Args:
             entry: `exec` of the user.
-            folder: of the kubeconfig, in which a command with a `/` begins.
-            cluster: what a plugin may ask to know of the cluster.
+            folder: folder of the kubeconfig; a command with a `/` is relative to it.
+            cluster: the information about the cluster for the plugin.
 
         Raises:
             NotConfigured: the entry is wrong.
@@ -75,11 +75,11 @@ class Plugin:
         """Run the program and return its credentials.
 
         Raises:
-            Unreachable: it gave none; the message says why.
+            Unreachable: it did not return credentials; the message has the reason.
         """
         interactive = self._mode != NEVER and sys.stdin is not None and sys.stdin.isatty()
         if self._mode == ALWAYS and not interactive:
-            raise self._failure("needs a terminal for its questions; run the command in one")
+            raise self._failure("needs a terminal for its prompts; run the command in a terminal")
         return self._read(self._run(interactive=interactive))
 
     def _run(self, *, interactive: bool) -> str:
@@ -103,7 +103,7 @@ class Plugin:
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise self._failure(f"gave no answer in {WAIT_S:.0f} s; run it by hand") from error
+            raise self._failure(f"did not respond within {WAIT_S:.0f} s; run it by hand") from error
         except (OSError, ValueError) as error:
             raise self._failure(f"cannot be run ({error})") from error
         if ended.returncode:
@@ -127,7 +127,7 @@ class Plugin:
             raise self._failure("gave an answer that is no ExecCredential with a status")
         if answer.get("apiVersion") != self._version:
             given = answer.get("apiVersion")
-            raise self._failure(f"answers in apiVersion {given!r}; the kubeconfig asks for {self._version}")
+            raise self._failure(f"returned apiVersion {given!r}; the kubeconfig requires {self._version}")
         return self._given(status)
 
     def _given(self, status: Mapping[str, Any]) -> Credentials:
@@ -138,7 +138,7 @@ class Plugin:
         if bool(certificate) is not bool(key):
             raise self._failure("gave a certificate without its key, or a key without its certificate")
         if token and not (token.isascii() and token.isprintable()):
-            raise self._failure("gave a token that is no text of one line")
+            raise self._failure("returned a token that is not one line of text")
         return Credentials(
             token=token or None,
             certificate=str(certificate) if certificate else None,
@@ -152,7 +152,7 @@ class Plugin:
         try:
             found = datetime.fromisoformat(str(text))
         except ValueError as error:
-            raise self._failure(f"gave an expirationTimestamp that is no time: {text!r}") from error
+            raise self._failure(f"returned an expirationTimestamp that is not a time: {text!r}") from error
         return found if found.tzinfo else found.replace(tzinfo=UTC)
 
     def _failure(self, fact: str) -> Unreachable:

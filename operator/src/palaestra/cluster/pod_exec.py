@@ -1,7 +1,7 @@
 """A command in a container: its output, byte for byte, and its result.
 
 The first byte of each message of the websocket is the number of a stream. At the end the API server sends the
-result on a stream of its own. Without a result the output is incomplete.
+result on a separate stream. Without a result the output is incomplete.
 """
 
 import json
@@ -17,19 +17,19 @@ from palaestra.cluster.errors import SERVER_ERROR, ApiError, CommandFailed, Unre
 
 PROTOCOLS = ["v5.channel.k8s.io", "v4.channel.k8s.io"]
 STDOUT, STDERR, STATUS = 1, 2, 3
-MOST_STDERR = 4096  # bytes kept of it, the first ones: they name the cause
+MOST_STDERR = 4096  # the first bytes are kept, because they name the cause
 EXIT_CODE = "ExitCode"
 UNKNOWN_CODE = -1
 
 
 def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -> websocket.WebSocket:
-    """Return the socket of a running command, which the caller closes; a read waits `wait_s` at most.
+    """Return the socket of a running command; the caller closes it. A read waits at most `wait_s`.
 
     Args:
-        connection: to the API server, with TLS and through a proxy where there is one.
+        connection: to the API server, with TLS and the proxy, if any.
         url: of the command.
         headers: of the request.
-        wait_s: until the command runs.
+        wait_s: longest time until the command runs.
 
     Raises:
         ApiError: the API server refuses, or cannot be reached.
@@ -44,7 +44,7 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
             subprotocols=PROTOCOLS,
             suppress_origin=True,
             skip_utf8_validation=True,
-            redirect_limit=0,  # credentials go to no other server
+            redirect_limit=0,  # credentials are not sent to another server
         )
     except websocket.WebSocketBadStatusException as error:
         raise from_status(error.status_code, _decoded(error.resp_body)) from error
@@ -77,7 +77,8 @@ def output(command: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                     raise failure
                 return
     finally:
-        # No closing handshake: a peer that is gone would not answer it. The library closes no TLS within TLS.
+        # No closing handshake: a dead peer would not respond to it. The library does not close TLS within
+        # TLS.
         if command.sock is not None:
             command.sock.close()
         command.shutdown()
@@ -97,12 +98,12 @@ def _message(command: websocket.WebSocket, deadline: float) -> tuple[int, bytes]
     if opcode == websocket.ABNF.OPCODE_CLOSE:
         raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
-        return -1, b""  # a ping, which the library has answered, or an empty frame
+        return -1, b""  # a ping, to which the library has responded, or an empty frame
     return frame.data[0], frame.data[1:]
 
 
 def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError | None:
-    """Return why the command failed; None if it did not."""
+    """Return the exception for a failed command, or None."""
     if status.get("status") == "Success":
         return None
     causes = (status.get("details") or {}).get("causes") or ()
@@ -115,6 +116,6 @@ def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError |
 def _decoded(body: bytes | str | None) -> dict[str, Any]:
     try:
         found = json.loads(body or b"")
-    except ValueError:  # a proxy in between answers in HTML
+    except ValueError:  # a proxy in between responds with HTML
         return {}
     return found if isinstance(found, dict) else {}

@@ -1,4 +1,4 @@
-"""The lines of a streamed answer, such as the log of a running container."""
+"""The lines of a streamed response, such as the log of a running container."""
 
 import time
 from collections.abc import Iterator
@@ -10,14 +10,14 @@ from palaestra.cluster.transport import read_some
 
 
 def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
-    """Yield each line without its line end, as soon as it is complete; the last line may lack the end.
+    """Yield each line without its line end, as soon as it is complete; the last line needs no line end.
 
     Args:
         response: closed at the end.
         deadline: on the monotonic clock; checked after each read.
 
     Raises:
-        Unreachable: the connection broke, was silent for too long, or the answer did not end in time.
+        Unreachable: the connection broke, was silent for too long, or the response did not end in time.
     """
     pending = b""
     try:
@@ -25,7 +25,7 @@ def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
             *whole, pending = (pending + part).split(b"\n")
             yield from (line.decode(errors="replace") for line in whole)
             if time.monotonic() > deadline:
-                raise Unreachable(0, "Timeout", "the answer did not end in time")
+                raise Unreachable(0, "Timeout", "the response did not end in time")
         if pending:
             yield pending.decode(errors="replace")
     finally:

@@ -1,4 +1,4 @@
-"""Which proxy a connection takes, by the environment's variables and a kubeconfig, as kubectl reads them.
+"""The proxy of a connection, from environment variables and a kubeconfig, by the rules of kubectl.
 
 Source of the rules: golang.org/x/net/http/httpproxy, which kubectl uses for the environment.
 """
@@ -24,7 +24,7 @@ class Proxy:
 
     Attributes:
         address: `http://proxy:3128`, without credentials.
-        user: the name to give there; None without one.
+        user: the user name for the proxy, or None.
         password: of that user.
     """
 
@@ -34,17 +34,17 @@ class Proxy:
 
     @property
     def socks(self) -> bool:
-        """Whether it speaks SOCKS; others are asked with CONNECT."""
+        """Whether it uses SOCKS; other proxies use CONNECT."""
         return self.address.startswith(SOCKS)
 
 
 def proxy_named(text: str, where: str) -> Proxy:
-    """Return the proxy that a text names; without a scheme it is an HTTP proxy, as for curl.
+    """Return the proxy at the address in a text; without a scheme it is an HTTP proxy, as for curl.
 
-    Names are resolved by SOCKS5 proxies, because kubectl leaves that to them.
+    SOCKS5 proxies resolve host names, as with kubectl.
 
     Raises:
-        NotConfigured: it is no address, or the scheme is unknown; the message begins with `where`.
+        NotConfigured: the text is not an address, or the scheme is unknown; the message begins with `where`.
     """
     text = text if "://" in text else f"http://{text}"
     url = _parsed(text)
@@ -57,10 +57,10 @@ def proxy_named(text: str, where: str) -> Proxy:
 
 
 def proxy_of_environment(server: str, environment: Mapping[str, str]) -> Proxy | None:
-    """Return the proxy that the environment names for a server's address; None: connect directly.
+    """Return the proxy in the environment for a server's address; None: connect directly.
 
     Raises:
-        NotConfigured: the variable names no proxy.
+        NotConfigured: the variable is not the address of a proxy.
     """
     url = _parsed(server)
     if url is None or not url.host:
@@ -75,7 +75,7 @@ def proxy_of_environment(server: str, environment: Mapping[str, str]) -> Proxy |
 
 
 def connects_directly(host: str, port: int, exceptions: str) -> bool:
-    """Return whether no proxy is used: for this machine itself, and for what NO_PROXY names.
+    """Return whether no proxy is used: for this machine itself, and for the hosts in NO_PROXY.
 
     Args:
         host: a name or an address, the latter without brackets.
@@ -110,7 +110,7 @@ def _covers(
 
 
 def _split(entry: str) -> tuple[str, str]:
-    """Return name and port of an entry, "" without a port."""
+    """Return name and port of an entry; the port may be ""."""
     if _address(entry.strip("[]")) is not None:
         return entry.strip("[]"), ""
     name, colon, port = entry.rpartition(":")

@@ -1,9 +1,10 @@
 """Events, which `kubectl describe` shows below an object.
 
-There is one Event for each (object, reason, message); a repetition increases its count and its last time. Its
-name is derived from these three, so a restarted operator increases the count of the existing event.
-If an event cannot be written, the recorder logs that and drops it, so that nothing waits for it. If the
-namespace is being deleted, it raises instead, because the log would have a line for every event there.
+There is one Event for each (object, reason, message); a repetition increases its count and sets its last
+time. Its name is derived from these three, so a restarted operator increases the count of the existing event.
+If an event cannot be written, the recorder logs that and drops the event, so that no caller waits for it. If
+the namespace is being deleted, it raises an exception instead, because the log would have a line for every
+event in that namespace.
 """
 
 import hashlib
@@ -21,7 +22,7 @@ from palaestra.objects import Object
 
 log = structlog.get_logger("palaestra.cluster")
 
-LONGEST_MESSAGE = 1024  # characters that an API server takes
+LONGEST_MESSAGE = 1024  # characters that an API server accepts
 LONGEST_NAME = 253
 REMEMBERED = 2048
 COMPONENT = "palaestra-operator"
@@ -31,10 +32,10 @@ class Recorder:
     """Writes events; safe to use from several threads."""
 
     def __init__(self, api: Api, component: str = COMPONENT, instance: str = "") -> None:
-        """Prepare; nothing is sent.
+        """Prepare; no request is sent.
 
         Args:
-            api: where events are written.
+            api: the API server.
             component: the name of the reporting program, as `kubectl describe` shows it.
             instance: the name of the reporting process.
         """
@@ -52,10 +53,10 @@ class Recorder:
             kind: `Normal` or `Warning`.
             reason: one word.
             message: a sentence; cut at 1024 characters.
-            once: leave an event that exists as it is.
+            once: do not change an existing event.
 
         Raises:
-            NamespaceTerminating: there will be no event about this object any more.
+            NamespaceTerminating: events about this object can no longer be written.
         """
         event = self._event(obj, kind, reason, message)
         try:

@@ -1,8 +1,8 @@
 """A cache that follows the API server: list in pages, then watch, forever.
 
 - If a watch is silent for longer than the interval of bookmarks, the reflector closes it and opens another.
-- If the version has expired (410, as an answer or as an event), it lists again. A new list removes objects
-  that are gone and reports each, so no deletion is missed.
+- If the version has expired (410, as a response or as an event), it lists again. A new list removes deleted
+  objects and reports each, so no deletion is missed.
 - After each failure it waits longer.
 """
 
@@ -27,7 +27,7 @@ Changed = Callable[[Object], None]
 
 
 class Reflector:
-    """The objects of one kind, as they were a moment ago.
+    """The objects of one kind; the cache may be slightly behind the cluster.
 
     Attributes:
         store: the cached objects; any thread may read it.
@@ -43,17 +43,17 @@ class Reflector:
         keep: Keep,
         changed: Changed,
     ) -> None:
-        """Prepare; nothing is sent before `start`.
+        """Prepare; no request is sent before `start`.
 
         Args:
-            api: which API server.
-            resource: which kind of objects.
+            api: the API server.
+            resource: the kind of objects.
             namespace: None for all namespaces.
             labels: a label selector.
             keep: returns the part of an object to cache; its metadata must keep namespace, name and labels.
-            changed: called after the store is up to date, with the cached part of the object; for a deleted
-                one with the part that was cached last. The reflector's thread calls it, so it must return at
-                once.
+            changed: called after the store is updated, with the cached part of the object; for a deleted
+                object, with the part that was cached last. The reflector's thread calls it, so it must return
+                at once.
         """
         self.store = Store()
         self._api = api
@@ -71,7 +71,7 @@ class Reflector:
 
     @property
     def synced(self) -> bool:
-        """Return whether a whole list was read, at least once."""
+        """Return whether a whole list was read at least once."""
         return self._synced.is_set()
 
     def wait_synced(self, deadline_s: float) -> bool:
@@ -79,7 +79,7 @@ class Reflector:
         return self._synced.wait(deadline_s)
 
     def start(self) -> None:
-        """Start the thread; once."""
+        """Start the thread; call it once."""
         self._thread.start()
 
     def stop(self, deadline_s: float = 1.0) -> None:
@@ -110,14 +110,14 @@ class Reflector:
             self._stopping.wait(waited_s)
 
     def _turn(self) -> ApiError | None:
-        """List if necessary, and watch until the watch ends; return the error that ended it, if one did."""
+        """List if necessary, and watch until the watch ends; return the error that ended it, or None."""
         try:
             if self._version is None:
                 self._version = self._relist()
             self._follow(self._version)
         except Gone:
             self._version = None
-            log.info("lists anew", resource=self._resource.plural)
+            log.info("lists again", resource=self._resource.plural)
         except ApiError as error:
             return error
         return None
@@ -129,7 +129,7 @@ class Reflector:
         for page in self._api.pages(self._resource, self._namespace, labels=self._labels, limit=size):
             version = page.version
             gone -= self._put_all(page)
-            del page  # else it would stay in memory while the next one is read
+            del page  # otherwise it would stay in memory while the next one is read
         for key in gone:
             self._drop(key)
         self._synced.set()
@@ -166,11 +166,11 @@ class Reflector:
             kept = self._keep(obj)
             before = self.store.relabeled(kept)
             different = self.store.put(kept)
-            if before is not None:  # the job that owned it by its old label has lost it
+            if before is not None:  # the job of its old label no longer owns it
                 self._changed(before)
             if different:
                 self._changed(kept)
-        except Exception:  # one unforeseen object must not hide all others
+        except Exception:  # one unexpected object must not hide all others
             log.exception("object not cached", resource=self._resource.plural, key=key_of(obj))
 
     def _drop(self, key: Key) -> None:

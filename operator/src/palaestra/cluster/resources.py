@@ -1,4 +1,4 @@
-"""The kinds of objects that the operator reads or writes, and their addresses at the API server."""
+"""The kinds of objects that the operator reads or writes, and their paths at the API server."""
 
 from dataclasses import dataclass, replace
 from urllib.parse import quote
@@ -15,9 +15,9 @@ class Resource:
         kind: as in objects: `Job`.
         plural: as in addresses and RBAC rules: `jobs`.
         namespaced: false for cluster-scoped kinds.
-        metadata_only: read only the metadata of objects, so that the contents of ConfigMaps and Secrets, for
-            instance, are not transferred.
-        page: objects that a cache reads at once, so that no page is large.
+        metadata_only: whether to read only the metadata of objects, so that the contents of ConfigMaps and
+            Secrets, for example, are not transferred.
+        page: number of objects that a cache reads in one page, so that pages stay small.
     """
 
     api_version: str
@@ -25,10 +25,10 @@ class Resource:
     plural: str
     namespaced: bool = True
     metadata_only: bool = False
-    page: int = 25  # of some 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB
+    page: int = 25  # of about 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB
 
     def address(self, namespace: str | None = None, name: str | None = None) -> str:
-        """Return the path of one object, or of all of them.
+        """Return the path of one object, or of the collection.
 
         Args:
             namespace: None for all namespaces, and for cluster-scoped kinds.
@@ -52,7 +52,7 @@ TRAINING_JOBS = Resource(
     api_version="palaestra.dev/v1alpha1",
     kind="TrainingJob",
     plural="trainingjobs",
-    page=10,  # of up to 1.5 MB each: as much as an API server stores
+    page=10,  # of up to 1.5 MB each, the limit of an API server
 )
 JOBS = Resource(api_version="batch/v1", kind="Job", plural="jobs")
 PODS = Resource(api_version="v1", kind="Pod", plural="pods")
@@ -65,7 +65,7 @@ EVENTS = Resource(
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )
-# Kueue's, served since 0.15; the version that it stores since 0.16, so that no webhook has to convert it.
+# Kueue serves this version since 0.15, and stores it since 0.16, so that no webhook must convert it.
 WORKLOADS = Resource(api_version="kueue.x-k8s.io/v1beta2", kind="Workload", plural="workloads")
 LEASES = Resource(api_version="coordination.k8s.io/v1", kind="Lease", plural="leases")
 NODES = Resource(api_version="v1", kind="Node", plural="nodes", namespaced=False)
@@ -81,7 +81,7 @@ DEPLOYMENTS = Resource(api_version="apps/v1", kind="Deployment", plural="deploym
 STORAGE_CLASSES = Resource(
     api_version="storage.k8s.io/v1", kind="StorageClass", plural="storageclasses", namespaced=False
 )
-# Access reviews: creating one asks RBAC whether this account, or another one, has a right.
+# Access reviews: the response to their creation says whether this or another account has a permission.
 OWN_RIGHTS = Resource(
     api_version="authorization.k8s.io/v1",
     kind="SelfSubjectAccessReview",

@@ -1,6 +1,6 @@
-"""A pod's service account: two files, which the kubelet keeps up to date, and two environment variables.
+"""A pod's service account: two files, which the kubelet updates, and two environment variables.
 
-They are read here, because the official client needs 10 MiB of memory to read them.
+This module reads them, because the official client would need 10 MiB of memory for that.
 """
 
 import os
@@ -51,9 +51,10 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
 
 
 class _Kept:
-    """The header of an account, and its authority: a kubelet replaces both files.
+    """The header and the certificate authority of an account; the kubelet replaces both files.
 
-    A new authority is trusted in addition; the old one until the end of the process, as client-go does it.
+    A new authority is trusted in addition to the old one, which stays trusted until the process ends, as in
+    client-go.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class _Kept:
             self._looked_at = self._clock()
             text = text_of(self._authority)
             if text and text != self._known:
-                with suppress(OSError, ValueError):  # half written: the next look is in a minute
+                with suppress(OSError, ValueError):  # the file is incomplete; it is read again in a minute
                     self._tls.load_verify_locations(cadata=text)
                     self._known = text
         return self._token()

@@ -4,7 +4,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-JITTER = 0.5  # a wait is cut by up to this share, so that many clients do not come back at once
+JITTER = 0.5  # a wait is shortened by up to this share, so that many clients do not retry at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +22,7 @@ class Backoff:
     chance: Callable[[], float] = random.random
 
     def wait_s(self, failures: int) -> float:
-        """Return the seconds to wait after so many failures in a row.
+        """Return the seconds to wait after `failures` consecutive failures.
 
         At least half of `first_s` and at most `cap_s`; after n failures at most `first_s * 2**(n-1)`.
         """
@@ -36,13 +36,14 @@ class Timeouts:
     """Deadlines, in seconds; one place for all of them.
 
     Attributes:
-        connect_s: until a connection stands.
-        call_s: for one request and its whole answer, waiting on a busy server included.
-        watch_s: shortest and longest life of one watch; between them by chance, so that not all end at once.
-        silence_s: longest silence on a watch. An API server sends a bookmark about every 60 s, so more than
-            that means a connection that only looks alive.
-        again: waits between attempts to list and watch.
-        turned_away: waits after an answer 429, added to those that the server asks for, which may be none.
+        connect_s: until a connection is established.
+        call_s: for one request and its whole response, including waits for a busy server.
+        watch_s: shortest and longest duration of one watch; it is random between them, so that watches end at
+            different times.
+        silence_s: longest silence on a watch. An API server sends a bookmark about every 60 s, so a longer
+            silence means a dead connection.
+        again: waits between failed lists or watches.
+        turned_away: waits after a response 429, in addition to the wait in its Retry-After header, if any.
     """
 
     connect_s: float = 5.0

@@ -1,4 +1,4 @@
-"""How the certificate of an API server is verified, and why one was refused."""
+"""The verification of an API server's certificate, and the reason for a refusal."""
 
 import ssl
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 
 # Source: OpenSSL's x509_vfy.h. All other codes are about the chain.
 DATES = {9: "is not valid yet", 10: "has expired"}
-NAMES = (62, 64)  # of a host, of an address
+NAMES = (62, 64)  # a host's name, an IP address
 DATES_REMEDY = "compare this machine's clock with the certificate's dates, or have the certificate renewed"
 NAMES_REMEDY = (
     "connect by a name that the certificate has, or set `tls-server-name` of the kubeconfig's cluster"
@@ -20,19 +20,19 @@ CHAIN_REMEDY = (
 def verification(
     authority: Path | None = None, pem: str | None = None, *, verified: bool = True
 ) -> ssl.SSLContext:
-    """Return what a server is verified with; without an authority, those of this machine are trusted.
+    """Return the TLS settings that verify a server; without an authority, those of this machine are trusted.
 
-    Chain, name and dates count, and the authority's extensions do not: Python 3.13 asks for extensions that
-    the authorities of many clusters lack, and kubectl does not.
+    Chain, name and dates are checked, but not the authority's extensions: Python 3.13 requires extensions
+    that the authorities of many clusters lack, and kubectl does not.
 
     Args:
         authority: the file of the certificate authority.
         pem: the certificate authority itself.
-        verified: False: any certificate is taken.
+        verified: False: any certificate is accepted.
 
     Raises:
         OSError: the authority cannot be read.
-        ValueError: it is no certificate.
+        ValueError: it is not a certificate.
     """
     found = ssl.create_default_context(cafile=authority, cadata=pem)
     found.verify_flags &= ~ssl.VERIFY_X509_STRICT
@@ -44,14 +44,12 @@ def verification(
 
 
 def add_identity(context: ssl.SSLContext, certificate: bytes, key: bytes) -> None:
-    """Let new connections of a context show a client's certificate.
+    """Make new connections of a context send a client's certificate.
 
     Raises:
         OSError: the certificate or key is unusable.
     """
-    with (
-        tempfile.TemporaryDirectory() as folder
-    ):  # ssl reads files only; nobody else can look into the folder
+    with tempfile.TemporaryDirectory() as folder:  # ssl reads only files; other users cannot read the folder
         files = Path(folder) / "certificate", Path(folder) / "key"
         for file, content in zip(files, (certificate, key), strict=True):
             file.write_bytes(content)
@@ -59,7 +57,7 @@ def add_identity(context: ssl.SSLContext, certificate: bytes, key: bytes) -> Non
 
 
 def refused_certificate(error: BaseException) -> tuple[str, str] | None:
-    """Return why a server's certificate was refused, and the remedy; None if the error is another one."""
+    """Return the reason and remedy for a refused server certificate; None if the error is another one."""
     found = _verification_error(error)
     if found is None:
         return None

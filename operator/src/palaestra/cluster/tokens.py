@@ -1,4 +1,4 @@
-"""A token in a file, which somebody replaces before it expires."""
+"""A token in a file, which the kubelet or another program replaces before it expires."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""The bytes of a request, with a deadline on the whole answer.
+"""The bytes of requests and responses, with a deadline on the whole response.
 
-The official client makes no request: its models need ten times the time and twice the memory of plain JSON,
-and its calls have no deadline for the answer's body.
+The official client does not send the requests: its models need ten times the time and twice the memory of
+plain JSON, and its calls have no deadline for the response's body.
 """
 
 import json
@@ -31,7 +31,7 @@ JSON = "application/json"
 
 
 class ConnectionBroke(Unreachable):
-    """The connection broke before the end of the answer: a read may be repeated at once."""
+    """The connection broke before the end of the response: a read may be repeated at once."""
 
 
 def nothing(verb: str, resource: str, code: int, seconds: float) -> None:
@@ -47,8 +47,8 @@ class Call:
         verb: as in metrics and RBAC: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
         plural: the resource, for metrics.
         path: from the root of the API server.
-        query: parameters; those that are None are left out, a list repeats its name.
-        accept: media type of the answer.
+        query: parameters; None is left out, a list repeats its name.
+        accept: media type of the response.
         body: an object, sent as JSON.
         waits: whether to retry within the deadline if the server is busy (429).
     """
@@ -79,7 +79,7 @@ class Transport:
     """Connections to one API server, as one identity; safe to use from several threads.
 
     Attributes:
-        limits: how long anything may take.
+        limits: the deadlines.
         on_request: called after every request.
     """
 
@@ -92,19 +92,19 @@ class Transport:
         self._credentials = threading.Lock()
 
     def call(self, call: Call, call_s: float) -> dict[str, Any]:
-        """Return the answer to one request, an object.
+        """Return the object in the response to one request.
 
-        It takes at most twice `call_s`, even if the answer comes byte by byte.
+        It takes at most twice `call_s`, even if the response arrives byte by byte.
 
         Raises:
-            ApiError: the answer is another one, or there is none.
+            ApiError: the API server refuses, cannot be reached, or returns something else.
         """
         deadline = time.monotonic() + call_s
         broke, turned_away = False, 0
         while True:
             try:
                 return self._timed(call, deadline)
-            except TooManyRequests as error:  # rejected, so certainly not done
+            except TooManyRequests as error:  # rejected, so it was certainly not executed
                 turned_away += 1
                 wait_s = error.retry_after_s + self.limits.turned_away.wait_s(turned_away)
                 if not call.waits or time.monotonic() + wait_s >= deadline:
@@ -116,7 +116,7 @@ class Transport:
                 broke = True
 
     def open(self, call: Call, *, silence_s: float) -> BaseHTTPResponse:
-        """Return a streamed answer, which the caller reads and closes; a read waits `silence_s` at most.
+        """Return a streamed response, which the caller reads and closes; a read waits at most `silence_s`.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
@@ -129,7 +129,7 @@ class Transport:
             raise
 
     def output(self, call: Call, deadline: float) -> Iterator[bytes]:
-        """Start a command in a container, and return what yields its standard output; see `executing`.
+        """Start a command in a container, and return an iterator over its standard output; see `pod_exec`.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
@@ -205,7 +205,7 @@ class Transport:
         if call.body is not None:
             headers["Content-Type"] = call.media_type
         for name, value in (*self._authorization(), *self._access.headers):
-            headers.add(name, value.encode().decode("latin-1"))  # as which the library sends what it is given
+            headers.add(name, value.encode().decode("latin-1"))  # the library encodes headers as latin-1
         try:
             return self._pool.request(
                 call.method,
@@ -221,12 +221,12 @@ class Transport:
             raise self._unreachable(error, f"{call.method} {self.host}{call.path}") from error
 
     def _authorization(self) -> Headers:
-        with self._credentials:  # one thread reads the token or runs the plugin, for all that wait
+        with self._credentials:  # one thread reads the token or runs the plugin, for all waiting threads
             header = self._access.authorization()
         return () if header is None else (("Authorization", header),)
 
     def _unreachable(self, error: Exception, what: str) -> Unreachable:
-        """Return the error for a request that got no answer; it names the proxy, where there is one."""
+        """Return the exception for a request without a response; it names the proxy, if any."""
         if (refused := refused_certificate(error)) is not None:
             fact, remedy = refused
             return Untrusted(f"{self.host}{self._by_way}: {fact}", remedy)
@@ -240,7 +240,7 @@ class Transport:
         retry_after = response.headers.get("Retry-After")
         try:
             status = json.loads(_body(response, deadline))
-        except ValueError:  # a proxy in between answers in HTML
+        except ValueError:  # a proxy in between responds with HTML
             status = None
         except Unreachable:
             status = None
@@ -248,15 +248,15 @@ class Transport:
 
 
 def read_some(response: BaseHTTPResponse) -> bytes:
-    """Return the next bytes of an answer, as soon as there are any; b"" at its end.
+    """Return the next bytes of a response, as soon as they arrive; b"" at its end.
 
     Raises:
         Unreachable: the connection broke, or was silent for too long.
     """
     try:
         return response.read1(CHUNK)
-    except (HTTPError, OSError, ValueError) as error:  # ValueError: TLS that another thread has shut down
-        raise _unreachable(error, "reading the answer") from error
+    except (HTTPError, OSError, ValueError) as error:  # ValueError: another thread has shut down TLS
+        raise _unreachable(error, "reading the response") from error
 
 
 def _body(response: BaseHTTPResponse, deadline: float) -> bytes:
@@ -265,9 +265,9 @@ def _body(response: BaseHTTPResponse, deadline: float) -> bytes:
         size += len(part)
         parts.append(part)
         if size > MOST_BYTES:
-            raise Unreachable(response.status, "TooLarge", f"the answer has more than {MOST_BYTES} bytes")
+            raise Unreachable(response.status, "TooLarge", f"the response has more than {MOST_BYTES} bytes")
         if time.monotonic() > deadline:
-            raise Unreachable(0, "Timeout", "the answer did not end in time")
+            raise Unreachable(0, "Timeout", "the response did not end in time")
     return b"".join(parts)
 
 
@@ -275,9 +275,9 @@ def _decoded(body: bytes, what: str) -> dict[str, Any]:
     try:
         answer = json.loads(body)
     except ValueError as error:
-        raise Unreachable(0, "Unreadable", f"{what}: the answer is no JSON ({error})") from error
+        raise Unreachable(0, "Unreadable", f"{what}: the response is not JSON ({error})") from error
     if not isinstance(answer, dict):
-        raise Unreachable(0, "Unreadable", f"{what}: the answer is no JSON object")
+        raise Unreachable(0, "Unreadable", f"{what}: the response is not a JSON object")
     return answer
 
 

@@ -13,7 +13,7 @@ from palaestra.cluster.transport import MOST_BYTES, Call, OnRequest, read_some
 
 
 class Watch:
-    """The changes after a version: iterate over events, dicts with `type` and `object`.
+    """The changes after a version: iterate over events, which are dicts with `type` and `object`.
 
     Types are ADDED, MODIFIED, DELETED and BOOKMARK; an ERROR event is raised as an ApiError. An incomplete
     last line is not yielded.
@@ -47,11 +47,11 @@ class Watch:
             self._on_request(self._call.verb, self._call.plural, code, time.monotonic() - self._started)
 
     def close(self) -> None:
-        """End the watch; a thread that waits for its next event returns at once. May be called twice."""
+        """End the watch; a thread that waits for an event returns at once. A second call has no effect."""
         self._closed.set()
         try:
             self._response.shutdown()
-        except (ValueError, RuntimeError, OSError):  # it has ended already
+        except (ValueError, RuntimeError, OSError):  # the watch has already ended
             return
 
     def _lines(self) -> Iterator[bytes]:
@@ -73,7 +73,7 @@ def _event(line: bytes) -> dict[str, Any]:
         event = json.loads(line)
         kind, found = str(event["type"]), dict(event["object"])
     except (ValueError, KeyError, TypeError) as error:
-        raise Unreachable(0, "Unreadable", f"the watch carries no event ({error})") from error
+        raise Unreachable(0, "Unreadable", f"the watch sent a line that is not an event ({error})") from error
     if kind == "ERROR":
         code = found.get("code")
         raise from_status(code if isinstance(code, int) else SERVER_ERROR, found)

@@ -1,11 +1,11 @@
-"""Work for the controller: names of objects, each once, each with one worker at a time.
+"""A queue of work for the controller: names of objects, each once, each with one worker at a time.
 
-A name that is added while a worker has it is handed out again after that worker is done. So no change is
+If a name is added while a worker has it, it is returned again after that worker is done. So no change is
 missed, and two workers never work on one object. The queue holds names, not events: a worker reads the
 current state of the object.
 
-Names are in lanes, which take turns. So a thousand names of one lane delay a name of another lane only by the
-work that has begun.
+Names are in lanes, which take turns. So a thousand names in one lane delay a name in another lane only by the
+work in progress.
 """
 
 import heapq
@@ -35,8 +35,8 @@ class WorkQueue(Generic[Item]):
     """A deduplicating queue with delays; safe to use from several threads.
 
     Args:
-        again: the wait of a name whose work failed.
-        waited: called with the seconds for which a name was ready before a worker took it.
+        again: the wait before work on a name is retried.
+        waited: called with the seconds between a name's readiness and its start with a worker.
         lane: returns the lane of a name.
         clock: a monotonic clock, in seconds.
     """
@@ -54,35 +54,35 @@ class WorkQueue(Generic[Item]):
         self._lane = lane
         self._clock = clock
         self._changed = threading.Condition()
-        self._ready: dict[Hashable, deque[Item]] = {}  # by lane, that of the next turn first
-        self._since: dict[Item, float] = {}  # names that wait for a worker, also if one has them now
+        self._ready: dict[Hashable, deque[Item]] = {}  # by lane; the lane of the next turn is first
+        self._since: dict[Item, float] = {}  # names that wait for a worker, even if a worker has them now
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []
         self._due: dict[Item, float] = {}
         self._failures: dict[Item, int] = {}
-        self._order = itertools.count()  # orders entries of the same moment
+        self._order = itertools.count()  # orders entries of the same time
         self._closed = False
 
     @property
     def depth(self) -> int:
-        """Return how many names are ready for a worker."""
+        """Return the number of names that are ready for a worker."""
         with self._changed:
             self._promote(self._clock())
             return sum(map(len, self._ready.values()))
 
     @property
     def closed(self) -> bool:
-        """Return whether `close` was called; then no name is handed out."""
+        """Return whether `close` was called; after it, `get` returns None."""
         return self._closed
 
     def add(self, key: Item) -> None:
-        """Ask for work on a name as soon as a worker is free."""
+        """Queue a name for the next free worker."""
         with self._changed:
             self._add(key, self._clock())
             self._changed.notify_all()
 
     def add_after(self, key: Item, seconds: float) -> None:
-        """Ask for work on a name after `seconds`; of several such requests the earliest counts."""
+        """Queue a name after `seconds`; of several such calls the earliest time counts."""
         with self._changed:
             due = self._clock() + seconds
             if due < self._due.get(key, float("inf")):
@@ -91,7 +91,7 @@ class WorkQueue(Generic[Item]):
                 self._changed.notify_all()
 
     def retry(self, key: Item) -> float:
-        """Ask for work on a name that failed, later after each failure; return the seconds until then."""
+        """Queue a name after a failure, with a longer wait after each; return that wait in seconds."""
         with self._changed:
             self._failures[key] = self._failures.get(key, 0) + 1
             wait_s = self._again.wait_s(self._failures[key])
@@ -99,7 +99,7 @@ class WorkQueue(Generic[Item]):
         return wait_s
 
     def failures(self, key: Item) -> int:
-        """Return how often in a row work on a name has failed."""
+        """Return the number of consecutive failures of a name."""
         with self._changed:
             return self._failures.get(key, 0)
 
@@ -109,7 +109,7 @@ class WorkQueue(Generic[Item]):
             self._failures.pop(key, None)
 
     def get(self, deadline_s: float) -> Item | None:
-        """Return a name to work on, then call `done`; None after `deadline_s`, or if the queue is closed."""
+        """Return a name, for which the caller must call `done`; None after `deadline_s`, or if closed."""
         with self._changed:
             ends = self._clock() + deadline_s
             while not self._closed:
@@ -123,7 +123,7 @@ class WorkQueue(Generic[Item]):
             return None
 
     def done(self, key: Item) -> None:
-        """End a worker's work on a name; it is handed out again if it was added meanwhile."""
+        """End a worker's work on a name; if it was added in the meantime, it is queued again."""
         with self._changed:
             self._working.discard(key)
             if key in self._since:
@@ -131,7 +131,7 @@ class WorkQueue(Generic[Item]):
                 self._changed.notify_all()
 
     def close(self) -> None:
-        """Hand out nothing more; workers that wait return at once."""
+        """Close the queue; waiting workers return at once."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -159,6 +159,6 @@ class WorkQueue(Generic[Item]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # else an earlier request has replaced it
+            if self._due.get(key) == due:  # otherwise an earlier request has replaced it
                 del self._due[key]
                 self._add(key, due)

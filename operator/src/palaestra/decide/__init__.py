@@ -1,9 +1,9 @@
 """Decide the status of a job and the actions for it, from the job and an observation.
 
-Pure: the clocks are passed in. Decisions are ordered lists of small named checks. `HOLDS` in `preparing` has
-those that keep a job from starting; `JUDGED` in `judging` has those of a replica.
+Pure: the clocks are passed in. Decisions are ordered lists of small named checks. `HOLDS` in `preconditions`
+lists the checks that keep a job from starting; `JUDGED` in `replica_policy` lists those of a replica.
 
-    job = accept(raw)                                  # Refused: decision = reject(raw, refused, now)
+    job = accept(raw)                                  # JobRefused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
     # add the verdicts of worlds_to_check(job, observed, layout) to the observation
     planned = prepare(job, observed, layout)           # plans only what is still missing
@@ -12,8 +12,8 @@ those that keep a job from starting; `JUDGED` in `judging` has those of a replic
     # emit decision.events;
     # decision.record is for the next reconcile
 
-Objects are created only after the status that accepts the job was written. It holds the release's images, so
-that an upgraded operator makes the same plan. Terminal replicas are never planned again.
+Objects are created only after the status that accepts the job was written. That status holds the release's
+images, so that an upgraded operator makes the same plan. Terminal replicas are never planned again.
 """
 
 from palaestra.decide.clocks import ReconcileRecord, Times

@@ -29,11 +29,11 @@ def actions(
 
 
 def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) -> tuple[Create, ...]:
-    """Return the missing objects of replicas that have not ended, in the order of creation.
+    """Return the missing objects of unfinished replicas, in the order of creation.
 
-    A Job is created only after the pods of the Job before it have ended: two pods of a replica would write to
-    one volume. If a Job exists, its volumes have the names in it, even if a newer release names them
-    otherwise.
+    A Job is created only after the pods of the previous Job have ended, because two pods of a replica would
+    write to one volume. If a Job exists, its volumes keep the names in it, even if a newer release uses other
+    names.
     """
     going_on = [replica for replica in observed.replicas if replicas[replica.index].phase not in TERMINAL]
     if not going_on:
@@ -65,7 +65,7 @@ def _there(thing: Object, observed: Observed) -> bool:
 
 
 def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
-    """Yield a stop for each replica that has to end and was not stopped yet."""
+    """Yield a stop for each replica that must end and was not stopped yet."""
     for seen, replica in zip(observed.replicas, decided, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue
@@ -80,7 +80,7 @@ def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
 
 
 def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Replace]:
-    """Yield a replacement for each pod that counts as one, unless the pod is being deleted."""
+    """Yield a replacement for each pod that must be replaced, unless it is being deleted."""
     for seen, replica in zip(observed.replicas, decided, strict=True):
         why = replica.course.replace
         if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
@@ -104,9 +104,9 @@ def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Re
 def _switches(
     job: TrainingJob, observed: Observed, prepared: Prepared, decided: Sequence[Decided]
 ) -> Iterator[SetSuspend]:
-    """Yield a change for each Job whose `suspend` is not as in the spec; a hold prevents a resumption.
+    """Yield a change for each Job whose `suspend` differs from the spec; a hold prevents a resumption.
 
-    The Job of a lost run is suspended, because its trainer would begin at step 0.
+    The Job of a lost run is suspended, because its trainer would start at step 0.
     """
     for seen, replica in zip(observed.replicas, decided, strict=True):
         suspend = job.spec.suspend or seen.index in prepared.lost
@@ -123,7 +123,7 @@ def _switches(
 
 
 def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
-    """Yield the deletion of each stopped and suspended Job, once the status says that its replica ended.
+    """Yield the deletion of each stopped and suspended Job, once the status shows that its replica ended.
 
     The deadline of a suspended Job does not run, so nothing else would ever end it.
     """

@@ -1,8 +1,8 @@
-"""Check what a job asks of a cluster that affects other people: the installation has to allow it.
+"""Check the settings of a job that affect other users of the cluster: the installation must allow them.
 
-A job is checked until it is accepted, and never again. So neither a new check nor a value that is taken away
-ends a job that was accepted. Affinities are free objects: a value of an unexpected type is skipped here, and
-an API server refuses it.
+A job is checked until it is accepted, and never again. So neither a new check nor a removed value ends an
+accepted job. The schema of affinities is open: a value of an unexpected type is skipped here, and the API
+server refuses it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -40,7 +40,7 @@ def pod_metadata_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def priority_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Pods of a higher priority evict those of others."""
+    """Pods of a higher priority preempt the pods of other users."""
     name = job.spec.scheduling.priority_class_name
     if name is None or name in allowed.priority_classes:
         return None
@@ -48,7 +48,7 @@ def priority_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def runtime_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Another runtime may isolate a container less, or give it devices."""
+    """Another runtime may isolate a container less, or give it access to devices."""
     name = job.spec.scheduling.runtime_class_name
     if name is None or name in allowed.runtime_classes:
         return None
@@ -56,7 +56,7 @@ def runtime_is_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def tolerations_are_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A taint reserves nodes for others, unless it is named after a resource that the job requests."""
+    """A taint reserves nodes for other users, unless its key is a resource that the job requests."""
     for place, toleration in enumerate(job.spec.scheduling.tolerations):
         if not (_allows(allowed.tolerations, toleration.key) or _requests(job, toleration.key)):
             field, fact = f"tolerations[{place}]", f"toleration of taint {toleration.key}"
@@ -65,7 +65,7 @@ def tolerations_are_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
 
 
 def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """An affinity to pods of other namespaces decides where their pods may run, and tells where they do."""
+    """An affinity to pods of other namespaces affects where they may run, and reveals where they run."""
     known = (job.metadata.namespace, *allowed.affinity_namespaces)
     terms = (term for kind, strength in product(KINDS, STRENGTHS) for term in _terms(job, kind, strength))
     for where, term in terms:
@@ -79,7 +79,7 @@ def affinity_stays_in_its_namespace(job: TrainingJob, allowed: Allowed) -> Hold 
 
 
 def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """A scheduler obeys a required anti-affinity for both sides: pods that it selects get no such node."""
+    """A scheduler applies a required anti-affinity both ways: selected pods cannot use the job's nodes."""
     for where, term in _terms(job, ANTI_AFFINITY, REQUIRED):
         selector = term.get("labelSelector")
         if selector is not None and not _selects_own(job, term) and not _selects_allowed(selector, allowed):
@@ -92,7 +92,7 @@ def no_pods_of_others_are_kept_away(job: TrainingJob, allowed: Allowed) -> Hold 
     return None
 
 
-# All that an installation decides about a job, in the order of the messages.
+# All checks of a job against the installation's lists, in the order of the messages.
 CHECKS: tuple[Check, ...] = (
     pod_metadata_is_allowed,
     priority_is_allowed,
@@ -104,7 +104,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def not_allowed(job: TrainingJob, allowed: Allowed) -> Hold | None:
-    """Return the hold for the first thing in a job that the installation does not allow."""
+    """Return the hold for the first setting of a job that the installation does not allow."""
     return next((found for check in CHECKS if (found := check(job, allowed))), None)
 
 
@@ -119,15 +119,16 @@ def _not_allowed(field: str, fact: str, remedy: str) -> Hold:
 
 
 def _allows(allowed: Iterable[str], key: str) -> bool:
-    """Return whether a key is among `allowed`, itself or by its domain."""
+    """Return whether `allowed` contains a key or its domain."""
     domain, slash, _ = key.partition("/")
     return key in allowed or (bool(slash) and f"{domain}/" in allowed)
 
 
 def _requests(job: TrainingJob, resource: str) -> bool:
-    """Return whether the job requests an extended resource, as in Kubernetes' ExtendedResourceToleration.
+    """Return whether the job requests an extended resource, as Kubernetes' ExtendedResourceToleration does.
 
-    Such a pod gets only nodes that have the resource. A scheduler ignores unknown resources of kubernetes.io.
+    Such a pod runs only on nodes that have the resource. A scheduler ignores unknown resources of
+    kubernetes.io.
     """
     if "/" not in resource or "kubernetes.io/" in resource:
         return False
@@ -146,7 +147,7 @@ def _terms(job: TrainingJob, kind: str, strength: str) -> Iterator[tuple[str, Te
 
 
 def _selects_own(job: TrainingJob, term: Term) -> bool:
-    """Return whether a term selects pods of the job alone: all requirements of a selector must hold."""
+    """Return whether a term selects only pods of the job; one requirement suffices, as all must hold."""
     own, selector = job.metadata.name, term.get("labelSelector")
     return (
         _mapping(selector, "matchLabels").get(JOB_LABEL) == own
@@ -159,7 +160,7 @@ def _selects_own(job: TrainingJob, term: Term) -> bool:
 
 
 def _selects_allowed(selector: object, allowed: Allowed) -> bool:
-    """Return whether a selector demands a label that the installation allows."""
+    """Return whether a selector requires a label that the installation allows."""
     demanded = [
         *_mapping(selector, "matchLabels"),
         *(each.get("key") for each in _expressions(selector) if each.get("operator") in ("In", "Exists")),
@@ -172,12 +173,12 @@ def _expressions(selector: object) -> Iterator[Mapping[str, Any]]:
 
 
 def _mapping(raw: object, name: str) -> Mapping[str, Any]:
-    """Return a mapping in a free object; empty for any other value, which an API server refuses."""
+    """Return a mapping in untyped data; empty for any other value, which the API server refuses."""
     found = raw.get(name) if isinstance(raw, Mapping) else None
     return found if isinstance(found, Mapping) else {}
 
 
 def _listed(raw: object, name: str) -> list[Any]:
-    """Return a list in a free object; empty for any other value, which an API server refuses."""
+    """Return a list in untyped data; empty for any other value, which the API server refuses."""
     found = raw.get(name) if isinstance(raw, Mapping) else None
     return found if isinstance(found, list) else []

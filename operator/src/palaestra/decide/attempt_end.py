@@ -1,6 +1,6 @@
-"""Why one attempt of a replica ended, by its pod and its trainer's last report: the first check that holds.
+"""The end of one attempt, by its pod and its trainer's last report: the first check that holds.
 
-The cause of a disruption comes before the trainer's reaction to it, as in the Job's podFailurePolicy.
+The cause of a disruption precedes the trainer's reaction to it, as in the Job's podFailurePolicy.
 """
 
 from collections.abc import Callable
@@ -25,10 +25,10 @@ from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.enums import SILENT
 from palaestra_protocol.pod.status import ExitCode, Termination
 
-BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
+BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes that a deletion may cause
 GONE = "its pod is gone; no last word"
 TAKEN, AGAIN = ", which took it back", "; it continues when it is admitted again"
-_HUNG = "SimulatorHung"  # how a last word begins
+_HUNG = "SimulatorHung"  # the start of a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,12 +51,12 @@ class EndedAttempt:
 
     @property
     def word(self) -> Termination | None:
-        """Return the trainer's termination message, its last word."""
+        """Return the trainer's termination message."""
         return self.situation.seen.terminations.get(self.pod.uid) if self.pod is not None else None
 
     @property
     def words(self) -> str:
-        """Return why it ended, in the best words that are known."""
+        """Return the most detailed known description of its end."""
         if self.word is not None:
             return self.word.reason
         return how_it_failed(self.situation, self.pod) if self.pod is not None else GONE
@@ -71,7 +71,7 @@ def of_pod(situation: ReplicaContext, pod: PodView, number: int) -> EndedAttempt
 
 
 def ended_silently(attempt: EndedAttempt) -> Explanation | None:
-    """The built-in loop did not say that it was complete: a library has ended its process."""
+    """The built-in loop did not report that it was complete: a library ended its process."""
     if attempt.code != ExitCode.DONE or attempt.pod is None or attempt.word is not None:
         return None
     own = attempt.situation.job.spec.trainer.command
@@ -89,7 +89,7 @@ def evicted_for_storage(attempt: EndedAttempt) -> Explanation | None:
 
 
 def replaced(attempt: EndedAttempt) -> Explanation | None:
-    """The operator replaced the pod, because no kubelet repairs it."""
+    """The operator replaced the pod, because the kubelet does not repair it."""
     return None if attempt.pod is None else mark_of(attempt.situation, attempt.pod)
 
 
@@ -116,7 +116,7 @@ def gone(attempt: EndedAttempt) -> Explanation | None:
 
 
 def deleted(attempt: EndedAttempt) -> Explanation | None:
-    """The pod was deleted: by us, by Kueue, or by a person."""
+    """The pod was deleted by the operator, by Kueue or by a person."""
     pod, job = attempt.pod, attempt.situation.seen.job
     if attempt.code not in BY_SIGNAL or pod is None or pod.gone_by is None:
         return None
@@ -124,14 +124,14 @@ def deleted(attempt: EndedAttempt) -> Explanation | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
         return paused(attempt.situation)
-    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # the Job counts it so
+    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # a failure for its Job too
         how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
         return explain(Reason.TRAINER_FAILED, how=how)
     return _disrupted(attempt, "it was deleted")
 
 
 def ended_by_probe(attempt: EndedAttempt) -> Explanation | None:
-    """The kubelet ended the trainer, because a probe failed; the cluster reports that for the newest pod."""
+    """A probe failed and the kubelet ended the trainer; the cluster reports this only for the newest pod."""
     known, newest = attempt.situation.old.last_attempt, attempt.situation.seen.pod
     if attempt.pod is None or attempt.code not in BY_SIGNAL:
         return None
@@ -167,7 +167,7 @@ def diverged(attempt: EndedAttempt) -> Explanation | None:
 
 
 def trainer_out_of_memory(attempt: EndedAttempt) -> Explanation | None:
-    """The trainer ran out of memory; a retry would need as much."""
+    """The trainer ran out of memory; a retry would need the same amount."""
     trainer = attempt.pod.trainer if attempt.pod is not None else None
     if trainer is None or not killed_for_memory(trainer):
         return None
@@ -179,7 +179,7 @@ def trainer_out_of_memory(attempt: EndedAttempt) -> Explanation | None:
 
 
 def simulator_hung(attempt: EndedAttempt) -> Explanation | None:
-    """The trainer waited for one simulator until it gave up."""
+    """The trainer waited for one simulator until its deadline passed."""
     if attempt.code != ExitCode.STALLED or attempt.word is None or not attempt.word.reason.startswith(_HUNG):
         return None
     return explain(Reason.SIMULATOR_HUNG, what=attempt.word.reason)
@@ -199,7 +199,7 @@ def storage_full(attempt: EndedAttempt) -> Explanation | None:
     return full_volume(attempt.word)
 
 
-# Ends that a new pod would repeat.
+# Causes that would end a new pod too.
 CAUSES: tuple[EndCheck, ...] = (
     configuration_refused,
     simulator_budget_spent,
@@ -225,7 +225,7 @@ ENDS: tuple[EndCheck, ...] = (
 
 
 def why(attempt: EndedAttempt) -> Explanation:
-    """Return why an attempt ended, by the first check that holds."""
+    """Return the reason for which an attempt ended, by the first check that holds."""
     return first(ENDS, attempt) or explain(Reason.TRAINER_FAILED, how=attempt.words)
 
 
@@ -235,7 +235,7 @@ def first(checks: tuple[EndCheck, ...], attempt: EndedAttempt) -> Explanation | 
 
 
 def stop_of(job: JobView) -> Explanation | None:
-    """Return why the operator stopped a replica, by the mark on its Job; None if it did not."""
+    """Return the reason for the operator's stop of a replica, by the mark on its Job, or None."""
     if job.stopped is None:
         return None
     reason, message = job.stopped
@@ -243,7 +243,7 @@ def stop_of(job: JobView) -> Explanation | None:
 
 
 def paused(situation: ReplicaContext, why: str = "") -> Explanation:
-    """Return why a Job is suspended; if it has a queue, Kueue did it, and `why` is its message."""
+    """Return the reason for a Job's suspension; if it has a queue, Kueue suspended it with message `why`."""
     queue = (
         situation.seen.job.queue if situation.seen.job else ""
     ) or situation.job.spec.scheduling.queue_name
@@ -268,7 +268,7 @@ def _disrupted(attempt: EndedAttempt, words: str) -> Explanation:
 
 
 def _memory(attempt: EndedAttempt) -> str:
-    """Return which simulators of the attempt ran out of memory, with the remedy; "" if none did."""
+    """Return the simulators of the attempt that ran out of memory, with the remedy; "" if none did."""
     uid = attempt.pod.uid if attempt.pod is not None else None
     killed = [
         f"{kill.container} ran out of memory and was killed ({limit_of(kill.limit)})"

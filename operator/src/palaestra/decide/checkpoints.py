@@ -1,4 +1,4 @@
-"""What the next pod of a replica begins with, in words."""
+"""Text about the start of a replica's next pod: from a checkpoint, or from step 0."""
 
 from palaestra.decide.replica_context import ReplicaContext
 
@@ -7,9 +7,10 @@ BEGINS = "the next pod starts the run again, because no checkpoint was reported"
 
 
 def next_pod(situation: ReplicaContext) -> str:
-    """Return the beginning of a replica's next pod; a run without a reported checkpoint does not resume.
+    """Return the text about the start of a replica's next pod; a run resumes only from a reported checkpoint.
 
-    A program of the job's own need not report its checkpoints; a reported step is all that is known then.
+    A custom program (`spec.trainer.command`) need not report its checkpoints, so its reported step counts as
+    one.
     """
     return RESUMES if has_checkpoint(situation) else BEGINS
 

@@ -1,10 +1,10 @@
-"""The clocks of one reconcile, and the record of the reconcile before it in this process.
+"""The clocks of one reconcile, and the record of the previous reconcile in this process.
 
-Clocks differ: a node's may be minutes off, and the operator's own may be set. So a wait is measured on this
-process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader every
-wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only the
-time to live is measured by it, from a time that the operator wrote. A status has whole seconds, so
-decisions do too.
+Clocks differ: a node's may be minutes off, and someone may set the operator's own. So a wait is measured on
+this process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader
+every wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only
+the time to live is measured by it, from a time that the operator wrote. A status has times in whole seconds,
+so decisions use whole seconds too.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ class Wait:
     Attributes:
         key: identifies the wait within a replica; a wait with another key begins again.
         seconds: the deadline.
-        begun_s: when it began, on the monotonic clock; None: when the operator first found it.
+        begun_s: when it began, on the monotonic clock; None: it began when the operator first found it.
     """
 
     key: tuple[str, ...]
@@ -37,7 +37,8 @@ class WaitingReason:
 
     Attributes:
         explanation: the reason and its message.
-        gone_s: when a reconcile first did not find it, on the monotonic clock; None: it is still there.
+        gone_s: time of the first reconcile that did not find it, on the monotonic clock; None: it still
+            exists.
     """
 
     explanation: Explanation
@@ -49,10 +50,11 @@ class ReconcileRecord:
     """The record that one reconcile leaves to the next in the same process; a restart may lose it.
 
     Attributes:
-        waits: when each open wait was first found, on the monotonic clock.
-        troubles: by replica, while it waits for its first step.
-        active_s: seconds for which the job was active, as far as this process knows.
-        active_at_s: the moment up to which they are counted; None: the job is not active.
+        waits: time at which each open wait was first found, on the monotonic clock.
+        troubles: waiting reason of each replica that waits for its first step.
+        active_s: seconds for which this process knows that the job was active.
+        active_at_s: time up to which `active_s` is counted, on the monotonic clock; None: the job is not
+            active.
     """
 
     waits: Mapping[WaitKey, float] = field(default_factory=dict)
@@ -68,7 +70,7 @@ class Times:
     Attributes:
         now: the wall clock, with a time zone.
         clock_s: the monotonic clock of this process.
-        record: of the reconcile before.
+        record: the record of the previous reconcile.
     """
 
     now: datetime
@@ -76,12 +78,12 @@ class Times:
     record: ReconcileRecord = field(default_factory=ReconcileRecord)
 
     def since_s(self, replica: int, wait: Wait) -> float:
-        """Return when a wait of a replica began."""
+        """Return the start time of a replica's wait."""
         begun_s = self.clock_s if wait.begun_s is None else min(wait.begun_s, self.clock_s)
         return self.record.waits.get((replica, *wait.key), begun_s)
 
     def active_s(self, written_s: int) -> float:
-        """Return how long the job was active; `written_s` is the value in its status."""
+        """Return the seconds for which the job was active; `written_s` is the value in its status."""
         record = self.record
         elapsed_s = 0.0 if record.active_at_s is None else self.clock_s - record.active_at_s
         return max(float(written_s), record.active_s + elapsed_s)
@@ -98,15 +100,15 @@ def after(at: datetime, seconds: float) -> datetime:
 
 
 def seconds_between(before: datetime, later: datetime) -> int:
-    """Return the whole seconds from one moment to a later one, 0 where it is not later."""
+    """Return the whole seconds from `before` to `later`; 0 if `later` is not later."""
     return max(int((later - before).total_seconds()), 0)
 
 
 def seconds_to(at: datetime | None, now: datetime) -> float | None:
-    """Return the seconds from `now` to `at`; None where there is no such moment."""
+    """Return the seconds from `now` to `at`; None if `at` is None."""
     return None if at is None else (at - now).total_seconds()
 
 
 def first_of(waits_s: Iterable[float | None]) -> float | None:
-    """Return the seconds until the first of some waits is over; None: none goes on."""
+    """Return the seconds until the first open wait ends; None if no wait is open."""
     return min((waits_ for waits_ in waits_s if waits_ is not None and waits_ > 0), default=None)

@@ -1,11 +1,12 @@
 """The conditions of a TrainingJob.
 
-Five of them always exist, each with a reason, whether it holds or not. The subject of a job's reason is the
-condition of its phase. For a Pending job, the subject is Accepted while that does not hold, then Running.
+Five of them always exist, each with a reason, whether it holds or not. The condition of the job's phase
+carries the job's message. A Pending job has no such condition; there the message is in Accepted until it
+holds, then in Running.
 
-Two more exist only while they hold. Flux and `helm --wait` read them through the library kstatus: a job is
-`Reconciling` while it is not yet as its spec asks, and `Stalled` if it needs a person to get there. A job
-with neither is as its spec asks: it trains, has succeeded, or is suspended.
+Two more exist only while they hold. Flux and `helm --wait` read them through the library kstatus. A job is
+`Reconciling` while its state differs from its spec, and `Stalled` if only a person can change that. The state
+of a job with neither matches its spec: it trains, has succeeded, or is suspended.
 """
 
 from collections.abc import Mapping
@@ -45,8 +46,8 @@ ConditionStates = Mapping[ConditionType, ConditionState]
 def condition_states(accepted: ConditionState, phase: Phase, why: Explanation) -> ConditionStates:
     """Return the state of each condition of a job in `phase` for the reason `why`.
 
-    All have the reason, but only its subject has the whole message; otherwise `kubectl describe` would print
-    it four times.
+    All have the reason, but only one has the whole message; otherwise `kubectl describe` would print it four
+    times.
     """
     true = _CONDITION_OF.get(phase)
     subject = true or (ConditionType.RUNNING if accepted.holds else ConditionType.ACCEPTED)
@@ -59,15 +60,15 @@ def condition_states(accepted: ConditionState, phase: Phase, why: Explanation) -
 
 
 def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> ConditionStates:
-    """Return `Stalled` or `Reconciling` if a job is not as its spec asks, else neither.
+    """Return `Stalled` or `Reconciling` if the state of a job differs from its spec, else neither.
 
-    Each has the whole message, because kstatus shows nothing else. A job in a queue is `Reconciling` even if
-    its spec asks for a suspension, because Kueue ignores that.
+    Both have the whole message, because kstatus shows nothing else. A job in a queue is `Reconciling` even if
+    `spec.suspend` is true, because Kueue ignores `spec.suspend`.
 
     Args:
-        phase: of the job.
+        phase: the job's phase.
         why: the job's reason.
-        suspend: whether the spec asks for a suspended job.
+        suspend: the job's `spec.suspend`.
     """
     if phase is Phase.FAILED or why.reason in HELD:
         return {ConditionType.STALLED: ConditionState(holds=True, explanation=why)}
@@ -78,7 +79,7 @@ def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> Conditio
 
 
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
-    """Return the conditions of an ended job: those that it has, and `Stalled` if it failed.
+    """Return the conditions of an ended job: its existing ones, and `Stalled` if it failed.
 
     `Stalled` may be missing: the cluster's definition was not yet known to have this condition.
     """
@@ -91,7 +92,7 @@ def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
 def conditions(
     old: Status, current: ConditionStates, generation: int | None, now: datetime
 ) -> tuple[Condition, ...]:
-    """Return the conditions that are current; if a status has not changed, its time stays."""
+    """Return the current conditions; a condition whose status has not changed keeps its transition time."""
     before = {condition.type: condition for condition in old.conditions}
     return tuple(
         _condition(kind, state, before.get(kind), generation, now) for kind, state in current.items()

@@ -1,4 +1,4 @@
-"""Checks for a replica that continues and has no trouble: its state."""
+"""Checks for a replica that continues without a waiting reason: its state."""
 
 from dataclasses import replace
 
@@ -12,11 +12,11 @@ from palaestra.observe.models import PodView
 
 UNASKED = "; why that takes long was not asked, as too many others wait"
 DESCRIBE = "; `kubectl describe` shows it"
-DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # no other object has Kueue's words
+DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only this object has Kueue's message
 
 
 def held(situation: ReplicaContext) -> Finding | None:
-    """Its run is lost, or an object that the job names does not exist or is not for jobs: nothing begins."""
+    """It does not start: its run is lost, or an object that the job names is missing or not for jobs."""
     if situation.hold is None:
         return None
     job = situation.seen.job
@@ -25,7 +25,7 @@ def held(situation: ReplicaContext) -> Finding | None:
 
 
 def suspending(situation: ReplicaContext) -> Finding | None:
-    """It is suspended, or was until a moment ago, and its pod still saves a checkpoint."""
+    """It is or was just suspended, and its pod still saves a checkpoint."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or not (situation.suspended or ended_by_suspension(situation.seen, pod)):
         return None
@@ -42,7 +42,7 @@ def suspended(situation: ReplicaContext) -> Finding | None:
 
 
 def _with_words(situation: ReplicaContext, why: Explanation) -> str:
-    """Return the message of `why`; after a restart the operator keeps Kueue's words until it has asked."""
+    """Return the message of `why`; a restarted operator keeps Kueue's message until it reads the Workload."""
     if situation.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = situation.old.message or "", why.message.removesuffix(AGAIN)
@@ -60,7 +60,7 @@ def trainer_has_ended(situation: ReplicaContext) -> Finding | None:
 
 
 def trains(situation: ReplicaContext) -> Finding | None:
-    """The trainer runs and has answered."""
+    """The trainer runs and has responded."""
     if not runs(situation):
         return None
     if situation.seen.polled is not None and not situation.trains:
@@ -87,9 +87,9 @@ def starts(situation: ReplicaContext) -> Finding | None:
 
 
 def runs(situation: ReplicaContext) -> bool:
-    """Return whether the trainer runs, in a pod of the replica's Job, and has answered once.
+    """Return whether the trainer runs, in a pod of the replica's Job, and has responded once.
 
-    The kubelet reports the first answer to its startup probe. A program of the job's own has no such probe.
+    The kubelet reports the first response to its startup probe. A custom program has no such probe.
     """
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.trainer is None or not _in_trainer(pod):

@@ -15,7 +15,7 @@ from palaestra.plan.job import suspend_set
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Basis:
-    """The versions on which a change of a Job was decided; if they have changed, the change is not made.
+    """The versions on which a change of a Job was decided; if they have changed, the change is skipped.
 
     Attributes:
         uid, version: of the Job.
@@ -31,8 +31,8 @@ class Basis:
 class Create:
     """Create `object` in its namespace; `replica` is None if it belongs to the whole job.
 
-    AlreadyExists is no error for a ConfigMap, claim or NetworkPolicy, because their names determine their
-    content. A Job that exists is added to `Objects.jobs`, also if another object owns it; `observe` finds its
+    AlreadyExists is not an error for a ConfigMap, claim or NetworkPolicy, because their names determine their
+    content. A Job that exists is added to `Objects.jobs`, even if another object owns it; `observe` finds its
     owner.
     """
 
@@ -63,12 +63,12 @@ class Stop:
 class Replace:
     """Replace the pod of a replica: first patch its Job, then evict the pod with this uid.
 
-    In this order both steps can be repeated: if the marked pod still runs, the eviction has to be done.
+    In this order both steps can be repeated: if the marked pod still runs, the eviction is still to be done.
 
     Attributes:
-        times: pods of the replica that were replaced this way, including this one.
-        marked: whether the Job has the mark already.
-        ended: whether the pod has ended, so that the mark is all.
+        times: number of pods of the replica that were replaced this way, including this one.
+        marked: whether the Job already has the mark.
+        ended: whether the pod has ended, so that only the mark is needed.
     """
 
     job: str
@@ -165,7 +165,7 @@ class Decision:
 
     Attributes:
         status: the whole status; `write_in_s` returns when to write it. None leaves the status unchanged.
-        actions: in the order in which to do them.
+        actions: in the order of their execution.
         events: to be written after the status.
         wake_after_s: seconds until the decision may change by time alone; None: never.
         record: for the next reconcile of this process.

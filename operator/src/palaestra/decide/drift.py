@@ -1,4 +1,4 @@
-"""Changes by others in the operator's objects: each is reported once, and none is undone."""
+"""Changes by other clients in the operator's objects: each is reported once, and none is reverted."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ from palaestra.observe.models import JobView, Observed
 def edits(job: TrainingJob, observed: Observed) -> Iterator[EmittedEvent]:
     """Yield an event for each edit that is still there; its message is unique, so it is written once."""
     for name, generation in observed.edited:
-        fact = f"spec, generation {generation}; delete it and it is made again as planned"
+        fact = f"spec, generation {generation}; if you delete it, the operator creates it again as planned"
         yield _event(f"NetworkPolicy {name}", fact, None)
     for seen in observed.replicas:
         if seen.job is not None and seen.job.end is None and (fact := _changed(job, seen.job)):

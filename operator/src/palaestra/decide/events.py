@@ -31,7 +31,7 @@ def happening(reason: Reason, message: str, replica: int | None = None) -> Emitt
 
 
 def of_change(old: Status, new: Status) -> Iterator[EmittedEvent]:
-    """Yield an event for each change of a condition or replica for which a person or program may wait."""
+    """Yield an event for each change of a condition or replica that a person or program may wait for."""
     yield from _of_condition(old, new, ConditionType.ACCEPTED)
     before = {replica.index: replica for replica in old.replicas}
     for replica in new.replicas:
@@ -44,7 +44,7 @@ def of_change(old: Status, new: Status) -> Iterator[EmittedEvent]:
 
 
 def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()) -> Iterator[EmittedEvent]:
-    """Yield an event for each action; the objects of a replica have one together."""
+    """Yield an event for each action; the created objects of a replica share one."""
     saved = {replica.index for replica in replicas if replica.last_checkpoint is not None}
     created: dict[int | None, list[str]] = {}
     for action in actions:
@@ -56,7 +56,7 @@ def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()
             case SetSuspend(suspend=False, replica=replica):
                 what = "resumes from the last checkpoint" if replica in saved else "continues"
                 yield happening(Reason.RESUMED, say(Reason.RESUMED, what=what), replica)
-            case Discard() | Replace() | SetSuspend():  # the replica's end, or its reason, has an event
+            case Discard() | Replace() | SetSuspend():  # an event reports the replica's end or reason
                 continue
             case Delete():
                 yield happening(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
@@ -65,7 +65,7 @@ def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()
 
 
 def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[EmittedEvent]:
-    """Yield an event if a condition changed, except that a job has not ended yet."""
+    """Yield an event if a condition changed, except for a condition of the end that does not hold yet."""
     before, now = condition(old, kind), condition(new, kind)
     silent = now is None or (kind in _ENDS and now.status is ConditionStatus.FALSE)
     if now is None or silent or (before is not None and _same(before, now)):
@@ -87,7 +87,7 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitt
 
 
 def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
-    """Yield the event of a disrupted attempt; its pod may be gone and the next one running."""
+    """Yield the event of a disrupted attempt; its pod may be gone and the next pod may run."""
     last, before = new.last_attempt, old.last_attempt if old is not None else None
     if last is None or last.reason not in _BY_ATTEMPT:
         return

@@ -1,11 +1,11 @@
-"""Checks for pods that no kubelet repairs: the operator replaces them through an eviction, and counts that.
+"""Checks for pods that the kubelet does not repair: the operator evicts them, and counts that.
 
 An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. The operator counts it
 in an annotation of the Job, the mark, before it evicts. If it is killed between the two writes, it finds the
 mark of a running pod after its restart, and evicts again.
 
-A trainer that a failed probe interrupted ends with 75, which its Job does not count either. Its pod gets the
-mark too; it has ended, so nothing is evicted.
+A trainer that a failed probe interrupted exits with 75, which its Job does not count either. Its pod gets the
+mark too; it has ended, so no pod is evicted.
 """
 
 from dataclasses import replace
@@ -20,7 +20,7 @@ from palaestra.decide.waiting_reasons import mark_of, probe_failed
 from palaestra.observe.pods import dropped
 
 STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
-FORGOTTEN_S = 300  # a node needs seconds to start the trainer: its image is already there, for the ROS master
+FORGOTTEN_S = 300  # the trainer starts in seconds: the ROS master has the same image
 
 
 def marked(situation: ReplicaContext) -> Finding | None:
@@ -41,7 +41,7 @@ def restart_policy_dropped(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_never_started(situation: ReplicaContext) -> Finding | None:
-    """All sidecars run, but the node does not start the trainer."""
+    """All sidecars run, but the kubelet does not start the trainer."""
     pod = situation.pod
     if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
         return None
@@ -53,7 +53,7 @@ def trainer_never_started(situation: ReplicaContext) -> Finding | None:
 
 
 def stalled(situation: ReplicaContext) -> Finding | None:
-    """The trainer answers, its step count does not move, and its watchdog has not ended it."""
+    """The trainer responds, its step count does not change, and its watchdog has not ended it."""
     wait = standstill(situation)
     if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None
@@ -65,7 +65,7 @@ def stalled(situation: ReplicaContext) -> Finding | None:
 
 
 def ended_by_probe(situation: ReplicaContext) -> Finding | None:
-    """The kubelet ended the trainer, because a probe failed, and its Job does not count that."""
+    """The kubelet ended the trainer because a probe failed, and its Job does not count that."""
     pod = situation.seen.pod
     if pod is None or not pod.ended or not situation.seen.probe:
         return None
@@ -75,7 +75,7 @@ def ended_by_probe(situation: ReplicaContext) -> Finding | None:
 
 
 def replaced_too_often(situation: ReplicaContext) -> Finding | None:
-    """A pod has to be replaced, but as many were replaced as `backoffLimit` allows."""
+    """A pod must be replaced, but `backoffLimit` allows no further replacement."""
     job = situation.seen.job
     times = job.replaced.times if job is not None and job.replaced is not None else 0
     if situation.suspended or marked(situation) is not None or times < situation.job.spec.backoff_limit:

@@ -1,4 +1,4 @@
-"""Checks that stop a replica for good: the limits that its author set, and causes that no retry removes."""
+"""Checks that stop a replica for good: limits that its author set, and causes that a retry cannot remove."""
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.replica_context import Finding, ReplicaContext, explain, first_waiting, found
@@ -16,14 +16,14 @@ def active_deadline(situation: ReplicaContext) -> Finding | None:
 
 
 def cannot_be_planned(situation: ReplicaContext) -> Finding | None:
-    """No objects can be created from its spec, and a spec does not change."""
+    """Its objects cannot be created from its spec, and a spec does not change."""
     if situation.seen.job is not None or situation.hold is None or not situation.hold.final:
         return None
     return Finding(explanation=situation.hold.explanation)
 
 
 def image_name_is_invalid(situation: ReplicaContext) -> Finding | None:
-    """No registry has an image of such a name."""
+    """The name of an image is invalid, so it is in no registry."""
     stuck = first_waiting(situation.pod, frozenset({"InvalidImageName"}))
     return None if stuck is None else of_image(stuck)
 

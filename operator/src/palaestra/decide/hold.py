@@ -1,4 +1,4 @@
-"""What keeps a job from being planned: a hold, with its reason and its message."""
+"""A hold: the cause that keeps a job from being planned, with its reason and message."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The decision: each replica by itself, then the job as a whole, then the actions."""
+"""The decision: first on each replica, then on the whole job, then the actions."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,8 +38,8 @@ EPHEMERAL = "; the run is ephemeral and goes with its pod"
 def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Times) -> Decision:
     """Return the status of a job and the actions for it.
 
-    A second decision on the resulting status and record, with the same observation, gives the same status and
-    no event of a change. Its actions are only those without an effect so far.
+    A second decision on the resulting status and record, with the same observation, returns the same status
+    and no event of a change. It returns only actions that have had no effect so far.
     """
     now = whole(times.now)
     times = replace(times, now=now)
@@ -69,7 +69,7 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
 
 
 def _record(job: TrainingJob, decided: Sequence[Decided], status: Status, times: Times) -> ReconcileRecord:
-    """Return the record for the next reconcile: open waits, their troubles, and the active time."""
+    """Return the record for the next reconcile: open waits, waiting reasons, and the active time."""
     return ReconcileRecord(
         waits={
             (replica.status.index, *wait.key): times.since_s(replica.status.index, wait)
@@ -105,12 +105,12 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 
 
 def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: Times) -> Decided:
-    """Return a replica with the run that it has lost; a person's word gives up a run that was shown."""
+    """Return a replica with its lost run; a person's annotation gives up a run that the status shows."""
     shown, lost = found.status.lost, prepared.lost.get(found.status.index)
     if found.status.phase in TERMINAL:
         return found
     if lost is None:
-        gone = shown is not None and shown.restarted is None  # the claim is there again
+        gone = shown is not None and shown.restarted is None  # the claim exists again
         return replace(found, status=found.status.model_copy(update={"lost": None})) if gone else found
     if shown == lost and new_word(job) is not None:
         return replace(found, status=restarted(found.status, lost, times.now))
@@ -118,13 +118,13 @@ def _with_lost_run(found: Decided, job: TrainingJob, prepared: Prepared, times: 
 
 
 def _kept(job: TrainingJob, decided: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
-    """Return the replicas of an ended job; only those that its status has."""
+    """Return the replicas of an ended job that its status has."""
     had = {replica.index for replica in job.status.replicas}
     return tuple(replica.status for replica in decided if replica.status.index in had)
 
 
 def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Explanation | None:
-    """Return why to stop a failed replica whose Job still runs, for example because it was just created."""
+    """Return the reason to stop a failed replica whose Job still runs, for example a Job just created."""
     going_on = seen.job is not None and seen.job.end is None and seen.job.stopped is None
     if not going_on or old.phase is not Phase.FAILED:
         return None
@@ -132,7 +132,7 @@ def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Explanation | N
 
 
 def _active_left_s(job: TrainingJob, times: Times) -> float | None:
-    """Return how much of its active time a job has left; None if it is suspended or has no deadline."""
+    """Return the remaining active seconds of a job; None if it is suspended or has no deadline."""
     bound, spent_s = job.spec.active_deadline_seconds, times.active_s(job.status.active_seconds)
     if bound is None or (job.status.active_since is None and spent_s < bound):
         return None

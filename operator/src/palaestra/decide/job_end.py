@@ -1,4 +1,4 @@
-"""How a replica ended, by its Job.
+"""The end of a replica, by its Job.
 
 `palaestra.decide.replica_policy` has the order: first a stop mark, because it caused everything after it;
 then the trainer's exit code and termination message; then the Job's own message.
@@ -19,12 +19,12 @@ from palaestra.decide.waiting_reasons import how_it_failed
 from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
-LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is seen too
+LAST_WORD_S = 30  # after the end of a Job, the longest wait for the end of its pod
 _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
 
 
 def ended_by_others(situation: ReplicaContext) -> Finding | None:
-    """The Job is complete, but the built-in loop did not say so: a library has ended its process."""
+    """The Job is complete, but the built-in loop did not report it: a library ended its process."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.COMPLETE or pod is None:
         return None
@@ -49,7 +49,7 @@ def stopped(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_was_done(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, but its trainer was done: a container of others has failed."""
+    """The Job has failed, but its trainer was done: a foreign container has failed."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is not JobEnd.FAILED or pod is None or exit_code(pod) != ExitCode.DONE:
         return None
@@ -63,7 +63,7 @@ def _with_phase(end: Finding) -> Finding:
 
 
 def would_end_the_same(situation: ReplicaContext) -> Finding | None:
-    """The Job has failed, and the last attempt ended by itself for a cause that has a name."""
+    """The Job has failed, and the last attempt ended by itself for a known cause."""
     job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is None:
         return None
@@ -90,14 +90,14 @@ def job_failed(situation: ReplicaContext) -> Finding | None:
     if job is None or job.end is None:
         return None
     words = ": ".join(word for word in (job.end_reason, job.end_message) if word)
-    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it does not say why"))
+    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it has no reason"))
 
 
 def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:
-    """Return an end, after the end of the pod was seen too or `LAST_WORD_S` passed.
+    """Return an end that holds once the end of the pod is observed too, or after `LAST_WORD_S`.
 
-    Two watches have different delays, so the Job's end may be seen before that of the pod, which has the
-    termination message.
+    The two watches have different delays, so the Job's end may be observed before the pod's. Only the pod has
+    the termination message.
     """
     if job.stopped is not None or situation.pod is None:
         return Finding(explanation=why, phase=Phase.FAILED)

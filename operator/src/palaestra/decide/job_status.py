@@ -1,4 +1,4 @@
-"""The job as a whole: one phase, one reason, and the columns of `kubectl get`."""
+"""The status of the whole job: one phase, one reason, and the columns of `kubectl get`."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from palaestra.decide.replica_context import ReplicaVerdict
 from palaestra.observe.models import Observed
 
 LONGEST_NODES = 256  # characters of the names of all nodes
-LONGEST_LEFT_OUT = 230  # of a line: a group's name, and 200 characters of a simulator
+LONGEST_LEFT_OUT = 230  # of a line: a group's name, and 200 characters from a simulator
 
 
 def standing(replicas: Sequence[ReplicaStatus]) -> ReplicaVerdict:
@@ -39,7 +39,7 @@ def active(phase: Phase, replicas: Sequence[ReplicaStatus]) -> bool:
 
 
 def started(old: Status, observed: Observed) -> datetime | None:
-    """Return when the job's first pod was started, by its node's clock."""
+    """Return the start time of the job's first pod, by its node's clock."""
     if old.start_time is not None:
         return old.start_time
     begun = [pod for replica in observed.replicas for pod in replica.pods if pod.started is not None]
@@ -48,7 +48,7 @@ def started(old: Status, observed: Observed) -> datetime | None:
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
-    """Return the columns of `kubectl get tj`, from the replica with the fewest steps and from the worst."""
+    """Return the columns of `kubectl get tj`; each has the value of the replica that is worst in it."""
     up = sum(replica.phase in {Phase.RUNNING, Phase.SUCCEEDED} for replica in replicas)
     steps = [replica.step for replica in replicas if replica.step is not None]
     saved = [replica.last_checkpoint.time for replica in replicas if replica.last_checkpoint is not None]
@@ -66,7 +66,7 @@ def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, An
 
 
 def left_out(old: Status, observed: Observed) -> tuple[str, ...] | None:
-    """Return what the simulators leave out of their worlds; the last report stays; None: there is none.
+    """Return the parts of the worlds that the simulators left out, by the last report; None without a report.
 
     All replicas have the same worlds and simulators, so one report is enough.
     """

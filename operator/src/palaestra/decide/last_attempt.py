@@ -1,7 +1,7 @@
 """The record of the newest ended attempt in the status, because a pod's logs are deleted with the pod.
 
-The record is written as soon as the trainer has ended, and stays after the pod is gone. If no reconcile saw
-the end of a pod, the record is written once the next pod exists.
+The record is written as soon as the trainer has ended, and stays after the pod is gone. If no reconcile
+observed the end of a pod, the record is written once the next pod exists.
 """
 
 from palaestra.api.attempt_status import Fault, LastAttempt
@@ -46,10 +46,10 @@ def last_attempt(situation: ReplicaContext, end: ReplicaVerdict | None = None) -
 
 
 def late_word(situation: ReplicaContext) -> LastAttempt | None:
-    """Return the record of the last attempt of a replica whose end was seen before that of its pod.
+    """Return the record of the last attempt of a replica whose end was observed before that of its pod.
 
-    If the pod disappears without a termination message, the record has the replica's own end. The caches of
-    Jobs and pods are updated in any order, and the record must not depend on it.
+    If the pod disappears without a termination message, the record has the reason of the replica's end. The
+    caches of Jobs and pods are updated in any order, and the record must not depend on that order.
     """
     known, newest, named = situation.old.last_attempt, situation.seen.pod, situation.old.pod
     if named is None or _knows(known, situation.old.attempt):
@@ -76,7 +76,7 @@ def _knows(known: LastAttempt | None, number: int) -> bool:
 
 
 def _replaced(situation: ReplicaContext) -> EndedAttempt | None:
-    """Return the attempt before the newest pod, if that pod is seen for the first time."""
+    """Return the attempt before the newest pod, if that pod is observed for the first time."""
     named, newer = situation.old.pod, newer_pods(situation.old, situation.seen.pods)
     if not newer:
         return None

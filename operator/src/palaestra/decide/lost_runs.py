@@ -1,8 +1,8 @@
-"""Runs that are lost: the claim of a replica is gone, or its run directory is empty, although it has trained.
+"""Lost runs: the claim of a replica is gone, or its run directory is empty, although it has trained.
 
 Such a replica would train from step 0 again. It is held instead, and its Job is suspended, until a person
-restores the run or gives it up. The person's word is an annotation of the TrainingJob with any new value,
-such as the time. The status keeps the value that was obeyed last, so one word has one effect.
+restores the run or gives it up. To give it up, the person sets an annotation of the TrainingJob to any new
+value, such as the time. The status keeps the value that was applied last, so each value has one effect.
 """
 
 from collections.abc import Collection, Iterable
@@ -21,7 +21,7 @@ from palaestra.plan.replica import RESTART_LOST_RUNS
 def lost_runs(
     job: TrainingJob, replicas: Iterable[ReplicaObserved], present: Collection[tuple[str, str]]
 ) -> dict[int, LostRun]:
-    """Return the lost runs for which a person's word is missing, by replica; `present` has the claims."""
+    """Return the lost runs that no person has given up yet, by replica; `present` has the claims."""
     before = {replica.index: replica for replica in job.status.replicas}
     found = {
         seen.index: _lost(job, before.get(seen.index, ReplicaStatus(index=seen.index)), seen, present)
@@ -42,13 +42,13 @@ def why_lost(job: TrainingJob, index: int, lost: LostRun) -> Explanation:
 
 
 def new_word(job: TrainingJob) -> str | None:
-    """Return the person's word that the operator has not obeyed yet; None: there is none."""
+    """Return the value of the person's annotation if the operator has not applied it yet, else None."""
     word = job.metadata.annotations.get(RESTART_LOST_RUNS, "")[:256]
     return word if word and word != job.status.lost_runs_restarted else None
 
 
 def restarted(replica: ReplicaStatus, lost: LostRun, now: datetime) -> ReplicaStatus:
-    """Return the status of a replica whose lost run was given up: it begins at step 0 again."""
+    """Return the status of a replica whose lost run was given up: it starts at step 0 again."""
     forgotten = (
         "step",
         "furthest_step",
@@ -83,9 +83,9 @@ def _lacks_claim(
 
 
 def _is_empty(job: TrainingJob, old: ReplicaStatus, seen: ReplicaObserved) -> bool:
-    """Return whether a later attempt has found no record of earlier ones, so that it calls itself the first.
+    """Return whether a later attempt reports the number 1, because it found no record of earlier attempts.
 
-    An ephemeral run is deleted with its pod. A program of the job's own reports no number of its attempt.
+    An ephemeral run is deleted with its pod. A custom program does not report the number of its attempt.
     """
     if seen.polled is None or old.last_checkpoint is None or job.spec.storage.ephemeral:
         return False

@@ -1,7 +1,7 @@
-"""Containers that were killed because they ran out of memory: which, how often, and at which limit.
+"""Containers that were killed because they ran out of memory, with the number of kills and the limit.
 
 On cgroup v2 the kernel kills a whole container, including the sidecar process, and the kubelet restarts it
-within a second. Then only the last termination of the container shows that the simulator ran out of memory.
+within a second. Then only the container's last termination state shows that the simulator ran out of memory.
 """
 
 from datetime import datetime
@@ -23,10 +23,10 @@ def killed_for_memory(container: ContainerView) -> bool:
 
 
 def memory_kills(situation: ReplicaContext) -> tuple[MemoryKills, ...]:
-    """Return the kills by container, including those that are new in this observation.
+    """Return the kills by container, including the new ones in this observation.
 
-    A kill is identified by its pod and the container's run in it. All kills in pods before the one that the
-    status names are counted already.
+    A kill is identified by its pod and the container's run in it. All kills in pods older than the one in the
+    status are counted already.
     """
     kills = {kill.container: kill for kill in situation.old.memory_kills}
     named = [
@@ -72,10 +72,10 @@ def _one_more(
 
 
 def kills_of(situation: ReplicaContext, container: str) -> int:
-    """Return how often a container was seen to be killed because it ran out of memory."""
+    """Return the number of times that a container was killed because it ran out of memory."""
     return next((kill.times for kill in memory_kills(situation) if kill.container == container), 1)
 
 
 def limit_of(limit: str | None) -> str:
-    """Return a memory limit in words."""
+    """Return the text about a memory limit."""
     return f"limit {limit}" if limit else "no limit, so its node ran short"

@@ -1,13 +1,14 @@
-"""Which fields a person sets so that a quota on limits or a LimitRange admits the pods of a job.
+"""The fields that a person sets so that a quota on limits or a LimitRange admits the pods of a job.
 
-The API server names containers; a job has fields. The ROS master and `install-sidecar` are in no job by name.
+The API server's message names containers, but a person sets fields. No field has the name of the ROS master's
+container or of `install-sidecar`.
 """
 
 import re
 
 from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 
-# The words of Kubernetes' admission plugins ResourceQuota and LimitRanger.
+# These match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
 _UNSPECIFIED = re.compile(r"must specify (?P<containers>.+)$")
 _NAMES = re.compile(r"for: (?P<names>[a-z0-9,-]+)")
 _SIZES = re.compile(r"\b(?:usage|ratio) per (?:Container|Pod) is ")
@@ -26,7 +27,7 @@ def remedy_of(words: str) -> str:
 
 
 def _field(container: str) -> str:
-    """Return the field with the resources of a container; "" for one that a webhook has added."""
+    """Return the field with the resources of a container; "" if a webhook has added the container."""
     if container == TRAINER:
         return "spec.trainer.resources"
     if container in {ROS_MASTER, INSTALL_SIDECAR}:

@@ -1,4 +1,4 @@
-"""Plan the missing objects, or return what keeps the job from being planned.
+"""Plan the missing objects, or return the hold that keeps the job from being planned.
 
 A replica with all its objects is not planned at all, so a later change of its worlds' ConfigMaps, or a newer
 release, has no effect on it.
@@ -30,7 +30,7 @@ class Prepared:
     """The plan with its images, or the hold that prevents it; neither if no object is missing.
 
     `closed` keeps existing Jobs from being resumed: an object that they use is no longer for jobs. `lost` has
-    the replicas that must not train, because their runs are lost.
+    the lost runs by replica; those replicas must not train.
     """
 
     plan: Plan | None = None
@@ -60,7 +60,7 @@ _MISSING = {ReferenceKind.SECRET: Reason.SECRET_MISSING, ReferenceKind.CLAIM: Re
 
 
 def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
-    """Return the plan of a job with missing objects; its images are those of its acceptance."""
+    """Return the plan of a job with missing objects, with the images from its acceptance."""
     closed = sources_are_still_for_jobs(job, observed) if resuming(job, observed) else None
     lost = _lost(job, observed)
     if complete(job, observed):
@@ -89,17 +89,17 @@ def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Pre
 
 
 def worlds_to_check(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> tuple[GivenWorld, ...]:
-    """Return the worlds whose verdicts the plan of a job needs; none while it is not planned next."""
+    """Return the worlds whose verdicts the plan of a job needs; empty while the job is not planned next."""
     if complete(job, observed) or _held(job, observed, layout) is not None:
         return ()
     try:
         return given_worlds(job, _worlds(job, observed))
-    except PlanError:  # the plan fails in the same way, whatever the verdicts
+    except PlanError:  # the plan fails in the same way for any verdicts
         return ()
 
 
 def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
-    """Return the first hold; what a new job may ask for is checked before acceptance only."""
+    """Return the first hold; the allow lists are checked before acceptance only."""
     if job.status.release is None and (hold := _held_as_new(job, layout)) is not None:
         return hold
     return next((found for check in HOLDS if (found := check(job, observed))), None)
@@ -112,10 +112,10 @@ def _held_as_new(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
 
 
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
-    """Return whether the whole job has to be read before it is prepared, because it is planned next.
+    """Return whether the whole job must be read before `prepare`, because the job is planned next.
 
-    `lacks` is the part of the API server's object that `job` lacks. While a hold remains, the worlds are not
-    read.
+    `lacks` is the part of the API server's object that is missing in `job`. While a hold remains, the worlds
+    are not read.
     """
     if observed.worlds_wait:
         return False
@@ -127,7 +127,7 @@ def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lac
 
 
 def lacking_claims(job: TrainingJob, observed: Observed) -> tuple[str, ...]:
-    """Return the names of the claims that unfinished replicas lack although they have trained."""
+    """Return the names of the missing claims of unfinished replicas that have trained."""
     return tuple(
         claim_name(job.metadata.name, index, job.metadata.uid or "")
         for index, lost in _lost(job, observed).items()
@@ -136,7 +136,7 @@ def lacking_claims(job: TrainingJob, observed: Observed) -> tuple[str, ...]:
 
 
 def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, ...]:
-    """Return the replicas that have not ended by the status; none if the job has ended."""
+    """Return the replicas that have not ended according to the status; empty if the job has ended."""
     if job.status.phase in TERMINAL:
         return ()
     ended = {replica.index for replica in job.status.replicas if replica.phase in TERMINAL}
@@ -144,7 +144,7 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
 
 
 def worlds_are_checked(job: TrainingJob, observed: Observed) -> Hold | None:
-    """The check of a large world takes seconds, and those of one namespace wait for each other."""
+    """The check of a large world takes seconds, and the checks of one namespace run one after the other."""
     del job
     return held(Reason.CHECKING_WORLDS) if observed.worlds_wait else None
 
@@ -157,17 +157,17 @@ def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
 
 
 def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
-    """Everything that the spec names exists."""
+    """Each object that the spec names exists."""
     return next((found for reference in references(job) if (found := _missing(reference, observed))), None)
 
 
 def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A TrainingJob must not give its author access to objects that they could not read before."""
+    """A TrainingJob must not give its author access to objects that the author cannot read."""
     return next((found for reference in references(job) if (found := _closed(reference, observed))), None)
 
 
 def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A resumed Job creates a new pod, so its sources must still be for jobs; worlds were copied."""
+    """A resumed Job creates a new pod, so its sources must still be for jobs; its worlds were copied."""
     for source in references(job):
         if (found := _missing(source, observed)) is not None:
             if source.kind is not ReferenceKind.CONFIG_MAP:
@@ -217,7 +217,7 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
 
 
 def _lacking(job: TrainingJob, observed: Observed) -> tuple[int, ...]:
-    """Return the unfinished replicas that lack an object; a replica whose run is lost gets none."""
+    """Return the unfinished replicas with a missing object, without those whose run is lost."""
     named = {source.name for source in references(job) if source.kind is ReferenceKind.CLAIM}
     there = {name for _, name in observed.present} | named
     lost = _lost(job, observed)
@@ -233,7 +233,7 @@ def _lost(job: TrainingJob, observed: Observed) -> Mapping[int, LostRun]:
 
 
 def resuming(job: TrainingJob, observed: Observed) -> bool:
-    """Return whether a Job is to be resumed."""
+    """Return whether the operator must resume a Job."""
     return any(to_resume(job, replica.job) for replica in unfinished(job, observed))
 
 

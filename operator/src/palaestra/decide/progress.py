@@ -1,6 +1,6 @@
-"""The trainer's last report as fields of the status, and since when it makes no progress.
+"""The trainer's last report as fields of the status, and the start of its wait for progress.
 
-If the trainer no longer reports a value, the last one stays: unknown is neither zero nor stalled.
+If the trainer no longer reports a value, the last one stays, because an unknown value is not zero.
 """
 
 from datetime import datetime
@@ -23,15 +23,15 @@ from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
 from palaestra_protocol.pod.status import CheckpointStatus, Termination, TrainerStatus
 
-EVALUATING = "evaluating"  # the trainer's phase in which it does not learn
+EVALUATING = "evaluating"  # the trainer's phase of an evaluation, in which it does not learn
 LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
 LONGEST_FAULT = 200
 
 
 def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
-    """Return the fields of a replica's status that its trainer has reported.
+    """Return the fields of a replica's status from its trainer's report.
 
-    A trainer that has not read its run directory yet reports step 0, whatever was learned before.
+    A trainer that has not read its run directory yet reports step 0, even if earlier attempts trained.
     """
     if situation.seen.pod is not None and situation.seen.pod.uid not in of_this_run(
         situation.old, situation.seen.pods
@@ -58,10 +58,10 @@ def progress(situation: ReplicaContext, phase: Phase) -> dict[str, object]:
 
 
 def last_progress(situation: ReplicaContext) -> datetime | None:
-    """Return when the step count of the current attempt last moved, or an evaluation did.
+    """Return the time of the last step of the current attempt or of its evaluation.
 
-    None if it is not known to have begun to train. A step of an environment alone is no progress, because the
-    trainer may learn nothing from it.
+    None if it is not known to have started training. A step of an environment alone is not progress, because
+    the trainer may not learn from it.
     """
     same_attempt = situation.old.pod is not None and situation.counted.pod == situation.old.pod
     known = situation.old.last_progress if same_attempt else None
@@ -77,7 +77,7 @@ def last_progress(situation: ReplicaContext) -> datetime | None:
 
 
 def standstill(situation: ReplicaContext) -> Wait | None:
-    """Return the wait for the next step, of learning or of an evaluation; None if it does not train.
+    """Return the wait for the next step of learning or of an evaluation; None if the trainer does not train.
 
     The wait began when an environment stepped last, by the age that the trainer reports. The time of that
     step is by the trainer's own clock, so it is compared only with its earlier reports.
@@ -98,7 +98,7 @@ def _step(report: TrainerStatus | Termination) -> int | None:
 
 
 def _spent(situation: ReplicaContext, polled: TrainerStatus) -> dict[str, object]:
-    """Return what the run has spent so far; {} if the trainer's release does not report it."""
+    """Return the time, faults and lost steps of the run; {} if the trainer's release does not report them."""
     if not polled.goodput:
         return {}
     before = situation.old.goodput or Goodput()
@@ -137,7 +137,7 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 
 
 def _figure(new: float | None, old: float | None) -> float | None:
-    """Return the new figure, rounded to four decimals; the old one if there is no new one."""
+    """Return the new value, rounded to four decimals; the old value if the new one is None."""
     return old if new is None else round(new, 4)
 
 

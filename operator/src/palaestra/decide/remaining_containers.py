@@ -1,7 +1,7 @@
-"""Checks for a pod whose trainer has ended while containers of others keep the pod alive.
+"""Checks for a pod whose trainer has ended while foreign containers keep the pod alive.
 
-A mesh or an agent may add a container beside the trainer. Such a pod does not end, or ends as failed, for
-any result of the trainer. The operator waits a minute for the other containers and then ends the pod.
+A service mesh or an agent may add a container to the pod. Then the pod does not end, or ends as failed, even
+if the trainer succeeded. The operator waits a minute for these foreign containers and then ends the pod.
 """
 
 from palaestra.api.reasons import Reason
@@ -19,7 +19,7 @@ OUTLIVED_S = 60  # a proxy that ends with the main process needs seconds
 
 
 def kept_alive(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended, and containers of others keep its pod alive."""
+    """The trainer has ended, and foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None:
         return None
@@ -29,7 +29,7 @@ def kept_alive(situation: ReplicaContext) -> Finding | None:
 
 
 def trainer_is_done(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended for good, and containers of others keep its pod alive or made it fail."""
+    """The trainer has ended for good, and foreign containers keep its pod alive or made it fail."""
     pod, job = situation.seen.pod, situation.seen.job
     if pod is None or job is None or job.end is not None:
         return None
@@ -42,7 +42,7 @@ def trainer_is_done(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
-    """The trainer has ended and is to be retried, and containers of others keep its pod alive."""
+    """The trainer has ended and must be retried, and foreign containers keep its pod alive."""
     pod = _outlived(situation)
     if pod is None or exit_code(pod) in {ExitCode.DONE, *GIVEN_UP}:
         return None
@@ -50,7 +50,7 @@ def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
 
 
 def _outlived(situation: ReplicaContext) -> PodView | None:
-    """Return the pod, if only containers of others keep it alive and nobody has deleted it."""
+    """Return the pod if only foreign containers keep it alive and it is not being deleted."""
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or pod.gone_by is not None or exit_code(pod) is None or not pod.keeping:
         return None

@@ -22,11 +22,11 @@ class ReplicaContext:
     Attributes:
         old: its status so far.
         seen: the observation.
-        counted: its attempts and restarts by now.
+        counted: its attempts and restarts, including this observation.
         times: the clocks; the wall clock in UTC and whole seconds.
-        active_left_s: seconds of the job's active time that are left; None: it has no deadline, or its
-            active time does not run now.
-        hold: the cause that keeps its objects from being created; None: there is none.
+        active_left_s: remaining seconds of the job's active time; None: it has no deadline, or its active
+            time does not run now.
+        hold: the cause that keeps its objects from being created, or None.
     """
 
     job: TrainingJob
@@ -49,21 +49,21 @@ class ReplicaContext:
         return pod if pod is not None and not pod.ended else None
 
     def waited_s(self, wait: Wait) -> float:
-        """Return how long a wait has gone on."""
+        """Return the seconds since a wait began."""
         return self.times.clock_s - self.times.since_s(self.seen.index, wait)
 
     def left_s(self, wait: Wait) -> float:
-        """Return how much longer a wait may go on; 0 or less: it is over."""
+        """Return the remaining seconds of a wait; 0 or less: it is over."""
         return wait.seconds - self.waited_s(wait)
 
     def start_deadline_s(self, container: str) -> int:
-        """Return how long a container may take to start; for trainer and master, the longest of all."""
+        """Return the start deadline of a container in seconds; for trainer and master, the longest of all."""
         deadlines = {_container(group, i): group.start_deadline_seconds for group, i in _members(self.job)}
         return deadlines.get(container, max(deadlines.values()))
 
     @property
     def fresh(self) -> bool:
-        """Return whether the trainer has answered lately."""
+        """Return whether the trainer's last response is at most `FRESH_S` old."""
         polled = self.seen.polled
         return polled is not None and self.times.clock_s - polled.at_s <= FRESH_S
 
@@ -80,7 +80,7 @@ class ReplicaContext:
         return polled is not None and polled.status.phase != STARTING
 
 
-FRESH_S = 45  # an older answer does not describe the current state
+FRESH_S = 45  # an older response does not describe the current state
 STARTING = "starting"  # the trainer's phase until all its simulators are up
 
 
@@ -91,8 +91,8 @@ class Finding:
     Attributes:
         explanation: the reason and its message.
         left_s: seconds until it holds; 0 or less: it holds now.
-        wait: the wait to keep until the next reconcile; None: there is none.
-        phase: the phase of the replica; None: by the state of its trainer's container.
+        wait: the wait to keep until the next reconcile, or None.
+        phase: the phase of the replica; None: it follows from the state of its trainer's container.
     """
 
     explanation: Explanation

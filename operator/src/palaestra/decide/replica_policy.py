@@ -1,9 +1,9 @@
-"""The ordered list of checks by which a replica that has not ended is judged.
+"""The ordered list of checks on a replica that has not ended.
 
 `make golden` writes the list into docs/explain/judging.md. Each reconcile runs all checks, because a
-check may also return how long it still waits. The class of a check that holds decides what follows:
+check may also return the time after which it will hold. The class of a check that holds sets the consequence:
 
-- ended: the first one that holds is how the replica ended, and the others are ignored.
+- ended: the replica has ended for the reason of the first one that holds; the others are ignored.
 - final: the first one that holds stops the replica for good, by a mark on its Job.
 - counted: the operator replaces the pod, or its Job does, at most `backoffLimit` times.
 - waiting: the status shows its reason; nothing is ended or counted.
@@ -30,11 +30,11 @@ from palaestra.decide.conditions import Explanation
 from palaestra.decide.replica_context import STARTING, Check, Finding, ReplicaContext, ReplicaVerdict, after
 
 FIRST_STEP = ("first step",)  # the key of the wait for the first step
-MOMENT_S = 60  # within which a kubelet that restarted, or tries again, reports a reason again
+MOMENT_S = 60  # a kubelet that restarts or retries reports a reason again within this time
 
 
 class CheckKind(StrEnum):
-    """The class of a check: what follows if it holds."""
+    """The class of a check, which sets the consequence if it holds."""
 
     ENDED = "ended"
     FINAL = "final"
@@ -45,15 +45,15 @@ class CheckKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplicaActions:
-    """The actions and waits that follow for a replica.
+    """The actions and waits that follow from the checks on a replica.
 
     Attributes:
-        stop: why to stop it for good; None: it continues.
-        replace: why to replace its pod; None: the pod stays.
+        stop: the reason to stop it for good; None: it continues.
+        replace: the reason to replace its pod; None: the pod stays.
         left_s: seconds after which the verdict may change by time alone.
         waits: the open waits, kept until the next reconcile.
-        trouble: the cause that delays its first step, kept too; None if there is none with a name, or if the
-            first step was done.
+        trouble: the cause that delays its first step, kept too; None if no cause is known, or if the first
+            step was done.
     """
 
     stop: Explanation | None = None
@@ -64,7 +64,7 @@ class ReplicaActions:
 
 
 def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
-    """Return the verdict on a replica and what follows, by the first checks of the list that hold."""
+    """Return the verdict on a replica and its actions, by the first checks of the list that hold."""
     asked = [(kind, finding) for kind, check in JUDGED if (finding := check(situation)) is not None]
     left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
     waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
@@ -72,7 +72,7 @@ def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
     if (end := _first(holding, CheckKind.ENDED)) is not None:
         return _verdict(situation, end), ReplicaActions(waits=waits)
     stop = _first(holding, CheckKind.FINAL)
-    if stop is not None and situation.seen.job is None:  # there is no Job to stop, and none will be created
+    if stop is not None and situation.seen.job is None:  # no Job exists, and none will be created
         return ReplicaVerdict(phase=Phase.FAILED, explanation=stop.explanation), ReplicaActions()
     kind, shown = next(
         (kind, each) for kind, each in holding if kind not in {CheckKind.ENDED, CheckKind.FINAL}
@@ -91,7 +91,7 @@ def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
 
 
 def start_timeout(situation: ReplicaContext) -> Finding | None:
-    """Its first step has not come within `startTimeoutSeconds`; the reason is the cause of that wait."""
+    """It has not done its first step within `startTimeoutSeconds`; the reason is the cause of the delay."""
     if (
         situation.suspended
         or situation.hold is not None
@@ -113,7 +113,7 @@ def start_timeout(situation: ReplicaContext) -> Finding | None:
 
 
 def _trouble(situation: ReplicaContext, shown: Explanation) -> WaitingReason | None:
-    """Return the cause that delays the first step, also if the kubelet does not report it for a moment."""
+    """Return the cause that delays the first step, even if the kubelet stops reporting it for a moment."""
     if shown.reason not in _NO_TROUBLE:
         return WaitingReason(explanation=shown)
     last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
@@ -134,7 +134,7 @@ def _first(holding: Sequence[tuple[CheckKind, Finding]], kind: CheckKind) -> Fin
 
 
 def _refused(situation: ReplicaContext, shown: Finding) -> Finding:
-    """Return why a pod has to be replaced, and why the API server refuses to evict it."""
+    """Return the reason to replace a pod, with the API server's reason if it refuses the eviction."""
     if not situation.seen.denied:
         return shown
     words = one_line(
@@ -151,7 +151,7 @@ def _verdict(situation: ReplicaContext, finding: Finding) -> ReplicaVerdict:
 _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
 SHOWN = frozenset(
     {CheckKind.COUNTED, CheckKind.WAITING, CheckKind.SHOWN}
-)  # sets the reason of a replica that continues
+)  # these classes set the reason of a replica that continues
 
 JUDGED: tuple[tuple[CheckKind, Check], ...] = (
     (CheckKind.ENDED, job_end.ended_by_others),

@@ -15,14 +15,14 @@ LONGEST_NODE = 253  # characters of a node's name, as the API server bounds it
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decided:
-    """The status of a replica, and what follows for it."""
+    """The status of a replica, and the actions for it."""
 
     status: ReplicaStatus
     course: ReplicaActions = field(default_factory=ReplicaActions)
 
 
 def decided(situation: ReplicaContext) -> Decided:
-    """Return what follows for a replica that had not ended."""
+    """Return the status and actions of a replica that had not ended."""
     verdict, course = judge(situation)
     return Decided(status=_status(situation, verdict), course=course)
 
@@ -52,6 +52,6 @@ def _status(situation: ReplicaContext, verdict: ReplicaVerdict) -> ReplicaStatus
 
 
 def _node(situation: ReplicaContext) -> str | None:
-    """Return the node of the newest pod; after the pod is gone, the one that it had."""
+    """Return the node of the newest pod; after the pod is gone, its last node."""
     pod = situation.seen.pod
     return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None

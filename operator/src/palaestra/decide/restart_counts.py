@@ -2,18 +2,19 @@
 
 The status is the memory. It names the pod of the current attempt (`pod`), and every pod created after that
 one is a new attempt. Trainers record their attempts in the run directory, and report the number in /status
-and in the termination message; this module adds attempts whose pods the operator never saw.
+and in the termination message. So this module also counts attempts whose pods the operator never observed.
+
 Each replaced pod has one of four causes. The attempt's number is 1 + trainer + disruption + suspension +
 operator:
 
-- trainer: the pod failed by itself, by its own evidence or by the Job's count of failures.
-- operator: the operator replaced the pod, by the mark on its Job.
-- suspension: the operator suspended the Job while the pod ran, by the mark on the Job. If another controller
-  suspended it, the status between the two pods or the times of the Job show it.
+- trainer: the pod failed by itself, according to its own status or the Job's count of failures.
+- operator: the operator replaced the pod, according to the mark on its Job.
+- suspension: the operator suspended the Job while the pod ran, according to the mark on the Job. If another
+  controller suspended it, the status between the two pods or the times of the Job show it.
 - disruption: all others. The cluster or a person deleted the pod, or it exited with 75.
 
 A failed pod without a successor is not counted as a restart yet. The trainer counts the restarts of
-simulators within its attempt. The status holds that count (`simulatorRestarts`) beside the sum, so that only
+simulators within its attempt. The status holds that count (`simulatorRestarts`) next to the sum, so that only
 the difference is added. One write of the status updates all counts, and it fails if the job has changed since
 it was read. So nothing is counted twice.
 """
@@ -28,7 +29,8 @@ from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-MOST_UNSEEN = 100  # Attempts that a trainer's record may add to the pods seen; a pod can report any number.
+# A trainer's record may add this many attempts to the observed pods, because a pod can report any number.
+MOST_UNSEEN = 100
 
 # The Job controller creates the pod before it records the time of the resumption; both are whole seconds.
 _RESUMED_LATE = timedelta(seconds=2)
@@ -68,8 +70,9 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
 def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
     """Return the pods created after the one that the status names, oldest first.
 
-    Times are whole seconds. If the named pod is gone, a pod of the same second is newer: an older pod that is
-    still listed has failed, and the Job controller waits for seconds before it creates the next.
+    Times are whole seconds. If the named pod is gone, a pod created in the same second is newer. An older one
+    would have failed, and after a failure the Job controller waits for seconds before it creates the next
+    pod.
     """
     named = old.pod
     if named is None:
@@ -81,7 +84,7 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 
 
 def of_this_run(old: ReplicaStatus, pods: Sequence[PodView]) -> frozenset[str]:
-    """Return the uids of the pods whose reports apply: those since a lost run was given up, else all."""
+    """Return the uids of the pods whose reports count: all, or those since a lost run was given up."""
     if old.lost is not None and old.lost.restarted is not None and old.lost.pod is not None:
         pods = newer_pods(old.model_copy(update={"pod": old.lost.pod}), pods)
         return frozenset(pod.uid for pod in pods if pod.uid != old.lost.pod.uid)
@@ -138,14 +141,14 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return how many of the pods replaced since the last status failed by themselves."""
+    """Return the number of pods that were replaced since the last status and failed by themselves."""
     named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
     return sum(failed_by_itself(pod) for pod in chain[:-1])
 
 
 def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return how many of the pods replaced since the last status are known to have run a trainer."""
+    """Return the number of pods that were replaced since the last status and ran a trainer."""
     named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
     gone = old.pod is not None and not named and old.phase is Phase.RUNNING
@@ -195,7 +198,7 @@ def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodVie
     if old.pod is None:
         return 0
     named, newest = old.pod.created, newer[-1].created
-    if (paused := job.paused) is not None:  # the new pod is seen before the Job's resumption
+    if (paused := job.paused) is not None:  # the new pod is observed before the Job's resumption
         return int(named <= paused < newest)
     resumed = job.resumed
     return int(resumed is not None and named + _RESUMED_LATE < resumed <= newest + _RESUMED_LATE)

@@ -1,6 +1,6 @@
-"""When to write a status: changes that people wait for and first progress at once, else every half minute.
+"""The time of the next status write: at once for new states and first values, else every 30 seconds.
 
-The amounts that a job lacks by Kueue's message count as progress: other jobs in the queue change them often.
+The amounts in Kueue's message, which the job lacks, count as progress: other jobs change them often.
 """
 
 import re
@@ -27,9 +27,9 @@ _AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
 
 
 def as_data(status: Status) -> dict[str, Any]:
-    """Return the status as in the API server: camelCase, without absent fields and empty lists.
+    """Return the status as the API server stores it: camelCase, without absent fields and empty lists.
 
-    `kubectl describe` prints a heading for each empty list, and a reader takes an absent one for empty.
+    `kubectl describe` prints a heading for each empty list, and readers treat an absent list as empty.
     """
     data: dict[str, Any] = _without_empty(status.model_dump(mode="json", by_alias=True, exclude_none=True))
     return data
@@ -43,7 +43,7 @@ def _without_empty(data: Any) -> Any:
 
 
 def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
-    """Return the seconds after which to write a status; 0: now; None: not at all.
+    """Return the seconds after which to write a status; 0: now; None: never.
 
     Args:
         old: from the API server.
@@ -51,7 +51,7 @@ def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: f
         since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
             has not written it.
     """
-    # An API server whose definition is older adds the empty lists again.
+    # An API server with an older CRD adds the empty lists again.
     before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))
     after = _without(new, _WITH_OTHERS)
     if before == after:
@@ -74,7 +74,7 @@ def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_amounts(reported: Any) -> Any:
-    """Return a condition or replica; if it waits in a queue, without the amounts in its message."""
+    """Return a condition or replica; if it waits in a queue, the amounts in its message are removed."""
     if not isinstance(reported, Mapping) or reported.get("reason") != Reason.QUEUED:
         return reported
     return {**reported, "message": _AMOUNT.sub("", str(reported.get("message")))}
@@ -84,7 +84,7 @@ def _rest(replica: Any) -> Any:
     if not isinstance(replica, Mapping):
         return replica
     kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
-    kept |= dict.fromkeys(_FIRST & replica.keys())  # only the first value is news
+    kept |= dict.fromkeys(_FIRST & replica.keys())  # only the first value is urgent
     restarts = kept.get("restarts")
     if isinstance(restarts, Mapping):  # restarts of simulators are as frequent as faults
         kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}

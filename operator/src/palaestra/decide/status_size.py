@@ -1,9 +1,9 @@
-"""Cut a status to the size that its object may have, beginning with the least important details.
+"""Cut a status to the size that its object may have; the least important details go first.
 
-etcd refuses an object of more than 1.5 MiB, and the operator would send it again forever. Each field of a
-status has a limit of its own, but the status of a hundred replicas with 32 simulators each exceeds that size,
-and the author's spec adds to it. The removed details are only for people. No decision depends on them, and no
-event does; otherwise each reconcile would emit the event again.
+etcd refuses an object of more than 1.5 MiB, and the operator would retry the write forever. Each field of a
+status has its own limit, but the status of a hundred replicas with 32 simulators each exceeds that size, and
+the author's spec adds to it. The removed details are only for people. No decision and no event depends on
+them; otherwise each reconcile would emit the event again.
 """
 
 import json
@@ -14,8 +14,8 @@ from palaestra.api.status import Phase
 from palaestra.observe.cache_trim import SIZE, SMALL
 from palaestra.observe.json_access import part, text
 
-MOST_BYTES = 1_400_000  # of the whole object, as it is sent; etcd takes 1,572,864, with who wrote which field
-SHORT = 100  # bytes of a message as it is sent, where little else helps
+MOST_BYTES = 1_400_000  # of the whole object as sent; etcd accepts 1,572,864, including managedFields
+SHORT = 100  # bytes of a shortened message as sent
 
 Data = dict[str, Any]
 Cut = Callable[[Data], Data]
@@ -25,10 +25,10 @@ _OF_KILL = ("container", "times", "last")
 
 
 def fitted(job: Mapping[str, Any], status: Data) -> Data:
-    """Return a status from `as_data`, without the details for which its job has no room.
+    """Return a status from `as_data` without the details that do not fit into its object.
 
-    The same status gives the same result, and a second call changes nothing. If a spec leaves less than
-    450,000 bytes, the result may still be too large.
+    The same status gives the same result, and a second call changes nothing. If the spec leaves less than
+    450,000 bytes for the status, the result may still be too large.
     """
     room = MOST_BYTES - _taken(job)
     for cut in CUTS:
@@ -43,7 +43,7 @@ def _size(data: Any) -> int:
 
 
 def _taken(job: Mapping[str, Any]) -> int:
-    """Return the bytes of a job without its status; for a small job, the upper limit of a small one."""
+    """Return the bytes of a job without its status; for a small job, the upper limit of small jobs."""
     noted = text(part(job, "metadata", "annotations"), SIZE)
     return int(noted) if noted.isdecimal() else SMALL
 
@@ -82,7 +82,7 @@ def _messages(replica: Data) -> Data:
 
 
 def _memory_kills(replica: Data) -> Data:
-    """Return a replica with only the count and the time of each kill, by which a kill is recognized."""
+    """Return a replica with only the count and the time of each kill, which identify a kill."""
     kills = [{name: kill[name] for name in _OF_KILL} for kill in replica.get("memoryKills", ())]
     return {**replica, "memoryKills": kills}
 

@@ -1,4 +1,4 @@
-"""Find out which client suspended or resumed a Job: the operator, a queue, or another field manager."""
+"""Find the client that suspended or resumed a Job: the operator, a queue, or another field manager."""
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import PodReference
@@ -6,11 +6,11 @@ from palaestra.decide.restart_counts import lives
 from palaestra.observe.models import JobView, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to continue"
-SOMEBODY = "somebody else"  # where no field manager is known
+SOMEBODY = "somebody else"  # if no field manager is known
 
 
 def set_last(seen: JobView) -> bool:
-    """Return the `spec.suspend` that the operator set last on a Job, by the Job's annotation.
+    """Return the `spec.suspend` that the operator last set on a Job, according to the Job's annotation.
 
     If another client has removed the annotation, the current value counts as the operator's.
     """
@@ -18,9 +18,9 @@ def set_last(seen: JobView) -> bool:
 
 
 def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = None) -> bool:
-    """Return whether the operator has to suspend or resume a Job; if it has a queue, Kueue does.
+    """Return whether the operator must suspend or resume a Job; Kueue does it for a Job with a queue.
 
-    The Job is to be as `suspend`; None: as the spec.
+    `suspend` is the wanted value; None: the value in the spec.
 
     The spec is compared with the value that the operator set last, not with the current one. Otherwise the
     operator and another client would undo each other's writes forever.
@@ -31,22 +31,22 @@ def to_set(job: TrainingJob, seen: JobView | None, *, suspend: bool | None = Non
 
 
 def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
-    """Return whether the operator has to resume a Job, which then creates a new pod."""
+    """Return whether the operator must resume a Job, which then creates a new pod."""
     return not job.spec.suspend and to_set(job, seen)
 
 
 def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) -> Suspended | None:
     """Return the mark about the current pod for the patch that suspends or resumes a Job; None: no mark.
 
-    A pod may be created before the suspension and seen after it. The patch that resumes the Job names such a
-    pod, because a suspended Job creates none.
+    A pod may be created before the suspension and observed after it. The patch that resumes the Job names
+    such a pod, because a suspended Job does not create pods.
     """
     job = seen.job
     if job is None or current is None or job.suspended == suspend:
         return None
     named = job.suspension is not None and job.suspension.pod == current.uid
     lived = seen.pod is not None and lives(seen.pod)
-    if suspend:  # again, before the next pod is created: the existing mark is right
+    if suspend:  # suspended again before the next pod is created: the existing mark is right
         return None if named and not lived else Suspended(pod=current.uid, lived=lived)
     late = job.suspend_set is True and not named
     return Suspended(pod=current.uid, lived=True) if late else None
@@ -65,14 +65,14 @@ def overruled(job: TrainingJob, seen: JobView) -> bool:
 
 
 def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
-    """Return what suspended the Job of a replica, with what resumes it."""
+    """Return the client or field that suspended the Job of a replica, with the way to resume it."""
     if seen.job is None or not overruled(job, seen.job):
         return BY_SPEC
     return f"{seen.switcher or SOMEBODY}, not by spec.suspend; it goes on when Job {seen.job.name} is resumed"
 
 
 def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
-    """Return the words for a suspension that has no effect; "" if there is none."""
+    """Return the text about a suspension that has no effect; "" if it has one."""
     if seen.job is None or not job.spec.suspend or seen.job.suspended:
         return ""
     if seen.job.queue:

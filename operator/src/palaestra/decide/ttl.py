@@ -1,4 +1,4 @@
-"""What follows the end of a job: after its time to live the TrainingJob is deleted."""
+"""The deletion of a TrainingJob when its time to live after the end has passed."""
 
 from datetime import datetime
 
@@ -8,7 +8,7 @@ from palaestra.decide.decision import Delete
 
 
 def expires(status: Status, ttl_s: int | None) -> datetime | None:
-    """Return when a job that has ended is to be deleted; None: never, or it has not ended."""
+    """Return the time at which to delete an ended job; None: never, or it has not ended."""
     if ttl_s is None or status.phase not in TERMINAL or status.completion_time is None:
         return None
     return after(status.completion_time, ttl_s)
@@ -17,7 +17,7 @@ def expires(status: Status, ttl_s: int | None) -> datetime | None:
 def expired(
     name: str, uid: str | None, at: datetime | None, status: Status, now: datetime
 ) -> tuple[Delete, ...]:
-    """Return the deletion of the TrainingJob once it is due, `at`."""
+    """Return the deletion of the TrainingJob, if its time `at` has come."""
     if at is None or at > now or uid is None:
         return ()
     return (Delete(name=name, uid=uid, after_s=seconds_between(status.completion_time or now, now)),)

@@ -23,7 +23,7 @@ from palaestra.decide.ttl import expired, expires
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.json_access import count, part, text
 
-MANAGER = "palaestra.dev/operator"  # spec.managedBy of our jobs, if they have it
+MANAGER = "palaestra.dev/operator"  # `spec.managedBy` of this operator's jobs, if they set it
 
 
 class JobRefused(TrainingJobError, ValueError):
@@ -41,7 +41,7 @@ class JobRefused(TrainingJobError, ValueError):
 
 
 def managed_here(raw: Mapping[str, Any]) -> bool:
-    """Return whether the operator runs this job: it names no other controller, and is not being deleted."""
+    """Return whether this operator runs the job: it names no other controller and is not being deleted."""
     manager = part(raw, "spec").get("managedBy")
     ours = manager is None or manager == MANAGER
     return ours and "deletionTimestamp" not in part(raw, "metadata")

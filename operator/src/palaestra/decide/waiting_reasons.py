@@ -22,7 +22,7 @@ from palaestra.plan.replica import SIMULATOR_PREFIX
 from palaestra_protocol.pod.status import SimulatorStatus, Termination
 
 LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
-CRASHES = 3  # of one sidecar, before they are called a loop
+CRASHES = 3  # of one sidecar, after which the status reports a crash loop
 PULLING = frozenset(
     {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
      "RegistryUnavailable", "SignatureValidationFailed"}
@@ -70,7 +70,7 @@ def pods_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def _not_admitted(words: str) -> Explanation:
-    """Quote the API server, and name the fields of the job that it may not have by name."""
+    """Quote the API server's message, and add the fields of the job that it does not name."""
     return explain(Reason.PODS_REFUSED, words=words, remedy=remedy_of(words))
 
 
@@ -81,11 +81,12 @@ def node_lost(situation: ReplicaContext) -> Finding | None:
         return None
     why = explain(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
     wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
-    return replace(after(situation, wait, why), phase=Phase.PENDING)  # as its node said last, it runs
+    # By the last report of its node, it runs.
+    return replace(after(situation, wait, why), phase=Phase.PENDING)
 
 
 def unschedulable(situation: ReplicaContext) -> Finding | None:
-    """No node takes the pod."""
+    """The scheduler has not found a node for the pod."""
     if situation.pod is None or not situation.pod.unschedulable:
         return None
     return found(Reason.UNSCHEDULABLE, pod=situation.pod.name, words=situation.pod.unschedulable)
@@ -99,13 +100,13 @@ def volume_not_mounted(situation: ReplicaContext) -> Finding | None:
 
 
 def image_does_not_come(situation: ReplicaContext) -> Finding | None:
-    """An image cannot be pulled; the kubelet tries again."""
+    """An image cannot be pulled; the kubelet retries."""
     stuck = first_waiting(situation.pod, PULLING)
     return None if stuck is None else of_image(stuck)
 
 
 def container_refused(situation: ReplicaContext) -> Finding | None:
-    """The node cannot create a container; the kubelet tries again."""
+    """The node cannot create a container; the kubelet retries."""
     stuck = first_waiting(situation.pod, MAKING)
     if stuck is None:
         return None
@@ -114,7 +115,7 @@ def container_refused(situation: ReplicaContext) -> Finding | None:
 
 
 def sidecar_out_of_memory(situation: ReplicaContext) -> Finding | None:
-    """A sidecar was killed for its memory; the kubelet starts it again."""
+    """A sidecar was killed because it ran out of memory; the kubelet restarts it."""
     stuck = next(
         (each for each in crashing(situation.pod) if each.simulates and killed_for_memory(each)), None
     )
@@ -122,7 +123,7 @@ def sidecar_out_of_memory(situation: ReplicaContext) -> Finding | None:
 
 
 def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
-    """A sidecar does not stay up; the kubelet starts it again and again."""
+    """A sidecar crashes again and again; the kubelet restarts it."""
     looping = next(
         (container for container in crashing(situation.pod) if container.restarts >= CRASHES), None
     )
@@ -130,7 +131,7 @@ def sidecar_crash_loops(situation: ReplicaContext) -> Finding | None:
 
 
 def simulator_not_up(situation: ReplicaContext) -> Finding | None:
-    """A simulator takes long to start; the trainer gives it up when its restart budget is spent."""
+    """A simulator is slow to start; the trainer gives it up when its restart budget is spent."""
     polled = situation.seen.polled
     if situation.pod is None or polled is None or situation.trains or not situation.fresh:
         return None
@@ -147,13 +148,13 @@ def simulator_not_up(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_filled_its_storage(situation: ReplicaContext) -> Finding | None:
-    """The newest pod was evicted for what it wrote, and no other is there yet."""
+    """The newest pod was evicted because it wrote too much, and the next does not exist yet."""
     why = None if situation.seen.pod is None else storage_eviction(situation.seen.pod)
     return None if why is None else Finding(explanation=why)
 
 
 def pod_was_taken(situation: ReplicaContext) -> Finding | None:
-    """The newest pod was interrupted, and no other is there yet."""
+    """The newest pod was interrupted, and the next does not exist yet."""
     pod = situation.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None
@@ -169,7 +170,7 @@ def pod_was_taken(situation: ReplicaContext) -> Finding | None:
 
 
 def volume_is_full(situation: ReplicaContext) -> Finding | None:
-    """The newest pod could not write to the volume, and another will try."""
+    """The newest pod could not write to its full volume; another pod will retry."""
     pod = situation.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
         return None
@@ -178,7 +179,7 @@ def volume_is_full(situation: ReplicaContext) -> Finding | None:
 
 
 def pod_failed(situation: ReplicaContext) -> Finding | None:
-    """The newest pod failed, and another will come."""
+    """The newest pod failed; another pod will retry."""
     pod = situation.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(situation, pod):
         return None
@@ -202,7 +203,7 @@ def of_image(stuck: ContainerView) -> Finding:
 
 
 def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
-    """Return why the operator replaces a pod, by the mark on its Job; None if it does not."""
+    """Return the reason for the replacement of a pod, by the mark on its Job, or None."""
     mark = situation.seen.job.replaced if situation.seen.job is not None else None
     if mark is None or mark.pod != pod.uid:
         return None
@@ -210,7 +211,7 @@ def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
 
 
 def probe_failed(situation: ReplicaContext, pod: PodView) -> Explanation:
-    """Return the reason for a trainer that the kubelet ended, because a probe failed."""
+    """Return the explanation for a trainer that the kubelet ended because a probe failed."""
     code, probe, begins = exit_code(pod), situation.seen.probe, next_pod(situation)
     how = f"exit code {code}"
     return explain(Reason.PROBE_FAILED, pod=pod.name, probe=probe, how=how, next_pod=begins)
@@ -227,7 +228,7 @@ def _not_up(
 
 
 def crashing(pod: PodView | None) -> tuple[ContainerView, ...]:
-    """Return the sidecars that do not run now, though they have before."""
+    """Return the sidecars that have ended and do not run now."""
     sidecars = pod.sidecars if pod is not None else ()
     return tuple(
         sidecar for sidecar in sidecars if sidecar.running_since is None and sidecar.exit is not None
@@ -245,7 +246,7 @@ def full_volume(word: Termination | None) -> Explanation | None:
     """Return the reason if a trainer could not write to its full volume, else None."""
     if word is None or not word.reason.startswith(FULL):
         return None
-    fact = word.reason.partition(": ")[2].partition("; ")[0]  # its remedy is ours
+    fact = word.reason.partition(": ")[2].partition("; ")[0]  # the reason has its own remedy
     return explain(Reason.STORAGE_FULL, words=fact or "no space left")
 
 
@@ -260,7 +261,7 @@ def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation
 
 
 def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
-    """Return how a pod failed, in the best words that are known."""
+    """Return the most detailed known description of a pod's failure."""
     word = situation.seen.terminations.get(pod.uid)
     trainer = pod.trainer
     if trainer is not None and killed_for_memory(trainer):
@@ -276,7 +277,7 @@ def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
     if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:
         line = _last_line(before) or before.exit.reason or "no word"
         return f"container {before.name}: exit code {before.exit.code}, {line}"
-    words = _last_line(trainer) or pod.message or pod.reason or "no word from the trainer"
+    words = _last_line(trainer) or pod.message or pod.reason or "no message from the trainer"
     return f"exit code {code}, {words}" if code is not None else words
 
 
@@ -287,7 +288,7 @@ def _failed_before(pod: PodView) -> ContainerView | None:
 
 
 def left_by(pod: PodView) -> str:
-    """Return the end of the log of a pod's trainer, or of the container that kept it from starting."""
+    """Return the end of the log of a pod's trainer, or of the init container that kept it from starting."""
     failed = _failed_before(pod)
     trainer = pod.trainer
     ends = [

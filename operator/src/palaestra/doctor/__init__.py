@@ -4,7 +4,7 @@
 - `run`: all checks in their order
 - `platform`: the cluster: version, CRD, namespace, sidecars and storage
 - `installation`: the operator: its replicas, images, leader, rights and metrics
-- `rbac`: the rights of the operator and of users
+- `rbac`: the permissions of the operator and of users
 
 No check changes anything; a check that must create an object does a dry run.
 """

@@ -11,7 +11,7 @@ class CheckStatus(StrEnum):
     """The result of a check."""
 
     RIGHT = "ok"
-    WARNING = "warning"  # it works, but may cause problems later
+    WARNING = "warning"  # the subject works, but may cause problems later
     WRONG = "wrong"
     UNKNOWN = "unknown"
 
@@ -52,20 +52,20 @@ Check = Callable[[Site], Iterator[CheckResult]]
 
 
 def right(what: str, fact: str) -> CheckResult:
-    """Return the finding that a subject is right."""
+    """Return the result for a subject without problems."""
     return CheckResult(what=what, verdict=CheckStatus.RIGHT, fact=fact)
 
 
 def wrong(what: str, fact: str, remedy: str) -> CheckResult:
-    """Return the finding that a subject is wrong."""
+    """Return the result for a subject with a problem."""
     return CheckResult(what=what, verdict=CheckStatus.WRONG, fact=fact, remedy=remedy)
 
 
 def warning(what: str, fact: str, remedy: str) -> CheckResult:
-    """Return the finding that a subject works but may cause problems later."""
+    """Return the result for a subject that works but may cause problems later."""
     return CheckResult(what=what, verdict=CheckStatus.WARNING, fact=fact, remedy=remedy)
 
 
 def unknown(what: str, fact: str, remedy: str) -> CheckResult:
-    """Return the finding that a subject could not be checked."""
+    """Return the result for a subject that could not be checked."""
     return CheckResult(what=what, verdict=CheckStatus.UNKNOWN, fact=fact, remedy=remedy)

@@ -1,4 +1,4 @@
-"""Checks of the operator: its replicas, images, leader, rights and metrics."""
+"""Checks of the operator: its replicas, images, leader, permissions and metrics."""
 
 import time
 from collections.abc import Iterator
@@ -51,7 +51,7 @@ def images(site: Site) -> Iterator[CheckResult]:
 
 
 def judged_images(container: Object) -> CheckResult:
-    """Return the finding for the images in the operator's container: a warning if one has no digest."""
+    """Return the result for the images in the operator's container: a warning if one has no digest."""
     release = Images.of_release(version("palaestra"))
     named = (
         container["image"],
@@ -70,7 +70,7 @@ def judged_images(container: Object) -> CheckResult:
 
 
 def leads(site: Site) -> Iterator[CheckResult]:
-    """Check whether an operator leads: wait for a renewal of its Lease, without comparing two clocks."""
+    """Check whether an operator leads: wait for a renewal of its Lease, because clocks cannot be compared."""
     deployment = _deployment(site)
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
         yield right("leader", "leader election is disabled")
@@ -95,9 +95,9 @@ def leads(site: Site) -> Iterator[CheckResult]:
 
 
 def operator_rights(site: Site) -> Iterator[CheckResult]:
-    """Report the rights that the operator's account lacks in the namespace of the jobs.
+    """Report the permissions that the operator's account lacks in the namespace of the jobs.
 
-    The rights for Kueue are checked if the cluster serves Kueue's Workloads.
+    The permissions for Kueue are checked if the cluster serves Kueue's Workloads.
     """
     what, deployment = "operator's rights", _deployment(site)
     name = deployment["spec"]["template"]["spec"]["serviceAccountName"] if deployment else NAME
@@ -155,7 +155,7 @@ def trainer_image(site: Site) -> str:
 
 
 def _chosen(container: Object, option: str, otherwise: str) -> str:
-    """Return the value of an option of the operator's command line; `otherwise` if it is not given."""
+    """Return the value of an option of the operator's command line; `otherwise` if it is absent."""
     given = container.get("command", ())
     return next(
         (argument.removeprefix(option) for argument in given if argument.startswith(option)), otherwise

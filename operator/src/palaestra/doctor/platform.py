@@ -16,7 +16,7 @@ from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
-# Small, and with every limit, so that no quota asks for another.
+# The values are small, and every limit is set, so that no quota requires another one.
 RESOURCES = {
     "requests": {"cpu": "10m", "memory": "32Mi"},
     "limits": {"cpu": "10m", "memory": "96Mi"},
@@ -42,7 +42,7 @@ def nodes(site: Site) -> Iterator[CheckResult]:
 
 
 def judged_version(what: str, text: str) -> CheckResult:
-    """Return whether a version such as `v1.33.2+k3s1` supports sidecar containers, as a finding."""
+    """Return the result for a version such as `v1.33.2+k3s1`: whether it supports sidecar containers."""
     if release(text) < FIRST:
         fact = f"{text} is older than 1.33, the first version with stable sidecar containers"
         return wrong(what, fact, "update to 1.33 or newer")
@@ -87,7 +87,7 @@ def namespace(site: Site) -> Iterator[CheckResult]:
 
 
 def difference(ours: Any, found: Any, path: str) -> str | None:
-    """Return the path of the first part of `ours` that differs in `found`, which may contain more."""
+    """Return the path of the first part of `ours` that differs in `found`; `found` may have more parts."""
     if isinstance(ours, Mapping) and isinstance(found, Mapping):
         pairs = [(f"{path}.{key}", value, found.get(key)) for key, value in ours.items()]
     elif isinstance(ours, list) and isinstance(found, list) and len(ours) == len(found):
@@ -120,7 +120,7 @@ def sidecars(site: Site) -> Iterator[CheckResult]:
 
 
 def judged_pod(made: Object) -> CheckResult:
-    """Return the finding for the trial pod as the API server returned it."""
+    """Return the result for the trial pod in the API server's response."""
     found = {
         container["name"]: container.get("restartPolicy")
         for container in made["spec"].get("initContainers", ())
@@ -152,7 +152,7 @@ def trial_pod(namespace: str, image: str) -> Object:
 
 
 def storage(site: Site) -> Iterator[CheckResult]:
-    """Check whether a claim that names no class gets a default storage class."""
+    """Check whether a claim without a storage class gets a default one."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [
         class_["metadata"]["name"]

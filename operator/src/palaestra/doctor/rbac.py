@@ -1,6 +1,6 @@
-"""Rights, checked with access reviews of the API server instead of by reading roles.
+"""Permissions, checked with access reviews of the API server instead of by reading roles.
 
-A test compares the table of the operator's rights with the installed role.
+A test compares the table of the operator's permissions with the installed role.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,7 @@ from palaestra.objects import Object
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Right:
-    """The right to use `verbs` on one resource, such as `pods` or `pods/log`."""
+    """The permission to use `verbs` on one resource, such as `pods` or `pods/log`."""
 
     group: str
     resource: str
@@ -38,13 +38,13 @@ class Account:
 
     @property
     def subject(self) -> Object:
-        """Return the user and groups that the account has in requests to the API server."""
+        """Return the user and groups of the account in requests to the API server."""
         groups = ["system:serviceaccounts", f"system:serviceaccounts:{self.namespace}"]
         return {"user": f"system:serviceaccount:{self.namespace}:{self.name}", "groups": groups}
 
 
 def may(group: str, resource: str, verbs: str) -> Right:
-    """Return the right to use `verbs`, separated by spaces."""
+    """Return the permission to use `verbs`, which are separated by spaces."""
     return Right(group=group, resource=resource, verbs=tuple(verbs.split()))
 
 
@@ -80,7 +80,7 @@ NECESSARY = frozenset({"look at jobs", "author jobs"})  # only some people need 
 
 
 def own_rights(site: Site) -> Iterator[CheckResult]:
-    """Report the rights that the user lacks, one finding for each task."""
+    """Report the permissions that the user lacks, with one result for each task."""
     for task, rights in TASKS:
         denied = missing(site, rights)
         what = f"to {task}"
@@ -96,7 +96,7 @@ def own_rights(site: Site) -> Iterator[CheckResult]:
 
 
 def missing(site: Site, rights: Iterable[Right], *, account: Account | None = None) -> list[str]:
-    """Return the rights that the user, or `account`, lacks in the namespace: `list pods`."""
+    """Return the permissions that the user, or `account`, lacks in the namespace, such as `list pods`."""
     return [
         text
         for needed in rights
@@ -106,7 +106,7 @@ def missing(site: Site, rights: Iterable[Right], *, account: Account | None = No
 
 
 def allowed(site: Site, attributes: Object, *, account: Account | None = None) -> bool:
-    """Return whether the user, or `account`, has the right that `attributes` describe."""
+    """Return whether the user, or `account`, has the permission in `attributes`."""
     kind, subject = (OWN_RIGHTS, {}) if account is None else (RIGHTS, account.subject)
     review = {
         "apiVersion": kind.api_version,

@@ -1,4 +1,4 @@
-"""All checks, ordered so that causes come before their consequences."""
+"""All checks, in an order in which causes come before their consequences."""
 
 from collections.abc import Iterator, Mapping
 
@@ -31,7 +31,7 @@ POINTLESS: Mapping[Check, frozenset[Check]] = {
 
 
 def examine(site: Site) -> Iterator[CheckResult]:
-    """Yield the findings of each check; after a failed check, skip those that `POINTLESS` lists for it."""
+    """Yield the results of each check; after a failed check, skip those that `POINTLESS` lists for it."""
     skipped: frozenset[Check] = frozenset()
     for what, check in CHECKS:
         if check in skipped:

@@ -1,8 +1,8 @@
-"""Log files of a limited size, which keep their first and their last part.
+"""Log files of limited size, which keep their first and last parts.
 
 The first part has the start of a run, and the last part its end. A program that prints without end would fill
-the disk, and a full disk would end the run. The cut is made in the file itself, because a second file might
-not fit on the disk. A writer therefore needs a descriptor that reads and appends.
+the disk, and a full disk would end the run. The middle is cut out of the file itself, because a second file
+might not fit on the disk. So a writer needs a descriptor that can read and append.
 """
 
 import os
@@ -20,7 +20,7 @@ _LONGEST_NOTE = 200
 class LimitedFile(RawIOBase):
     """The end of a log file, for writing; the file never has more than `first + 2 * last` bytes.
 
-    One piece that is longer than `last` is written as a whole.
+    One write that is longer than `last` is written as a whole.
     """
 
     def __init__(self, descriptor: int, first: int = FIRST, last: int = LAST) -> None:
@@ -33,9 +33,9 @@ class LimitedFile(RawIOBase):
         return True
 
     def write(self, data: Any, /) -> int:
-        """Append all of `data`, which is bytes; cut the middle out of the file first if it would be too long.
+        """Append all bytes in `data`; first cut the middle out of the file if it would be too long.
 
-        What cannot be written is lost, for example on a full disk: a log must not end the run that it is of.
+        Bytes that cannot be written, for example on a full disk, are lost: a log must not end its run.
         """
         with suppress(OSError):
             size = os.fstat(self._descriptor).st_size
@@ -45,7 +45,7 @@ class LimitedFile(RawIOBase):
         return len(data)
 
     def _cut(self, size: int) -> None:
-        """Keep whole lines at both ends, and count what was left out in earlier cuts."""
+        """Keep whole lines at both ends; the noted number of bytes includes earlier cuts."""
         start = os.pread(self._descriptor, self._first, 0).rfind(b"\n") + 1
         tail = os.pread(self._descriptor, self._last, size - self._last)
         tail = tail[tail.find(b"\n") + 1 :]

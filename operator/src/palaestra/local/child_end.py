@@ -1,7 +1,7 @@
 """Report the end of a child process, on every kernel and in every container runtime.
 
-`os.pidfd_open` would do it without a thread. But old kernels, the seccomp filters of older container runtimes
-and Pythons that were built for an old kernel lack it.
+`os.pidfd_open` would need no thread. But old kernels, Pythons that were built for an old kernel, and the
+seccomp filters of older container runtimes do not allow it.
 """
 
 import os
@@ -21,7 +21,7 @@ def end_descriptor(pid: int) -> int:
 
     def tell() -> None:
         with suppress(BrokenPipeError):  # the reader is closed
-            os.write(writer, b"\n")  # a forked process may have a copy, so that closing would not suffice
+            os.write(writer, b"\n")  # a forked process may have a copy, so closing would not suffice
         os.close(writer)
 
     when_ended(pid, tell)
@@ -29,6 +29,6 @@ def end_descriptor(pid: int) -> int:
 
 
 def _wait(pid: int, report: Callable[[], object]) -> None:
-    with suppress(ChildProcessError):  # reaped before
+    with suppress(ChildProcessError):  # already reaped
         os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     report()

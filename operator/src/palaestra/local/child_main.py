@@ -4,8 +4,9 @@
 in a terminal or notebook does not reach it. Standard input is a file with the request, and standard output a
 log file of limited size.
 
-The run ends, with a checkpoint, when the other program closes its end of a pipe, writes to it, or ends in any
-way. A copy of that end in a forked child keeps the pipe open, so the end of the process is watched too.
+The run saves a checkpoint and ends when the other program closes its end of a pipe, writes to it, or ends in
+any way. A copy of that end in a forked child would keep the pipe open, so the end of the process is watched
+too.
 """
 
 import json
@@ -29,12 +30,12 @@ from palaestra.local.run import RunOptions, run
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_sim.errors import SimError
 
-PARENT_CHECK_S = 0.5  # the kernel reports the end of a parent only to a pidfd, which not every system has
+PARENT_CHECK_S = 0.5  # the kernel reports a parent's end only through a pidfd, which some systems lack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChildRequest:
-    """The job as YAML, the options of its run, and how it ends.
+    """The job as YAML, the options of its run, and the process and descriptors that it depends on.
 
     `process` is the process with which the run ends. `control` is the descriptor of this end of the pipe, and
     `lock` that of the run directory's lock.
@@ -49,12 +50,12 @@ class ChildRequest:
     lock: int
 
     def to_json(self) -> bytes:
-        """Return it as JSON."""
+        """Return the request as JSON."""
         return json.dumps(asdict(self)).encode()
 
     @classmethod
     def from_json(cls, content: bytes) -> Self:
-        """Return what `to_json` wrote."""
+        """Return the request from the JSON of `to_json`."""
         return cls(**json.loads(content))
 
 
@@ -62,7 +63,7 @@ def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = ChildRequest.from_json(sys.stdin.buffer.read())
     sys.stdout = TextIOWrapper(BufferedWriter(LimitedFile(sys.stdout.fileno())), errors="replace")
-    if os.getppid() != request.process:  # it has ended before, and another process is the parent now
+    if os.getppid() != request.process:  # it has already ended, so another process is the parent
         return int(ExitCode.INTERRUPTED)
     Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()
     options = RunOptions(
@@ -83,7 +84,7 @@ def main() -> int:
 
 
 def _end_with(control: int, process: int) -> None:
-    """Interrupt this process once, as Ctrl-C does, when the other program wants it or has ended."""
+    """Interrupt this process once, as Ctrl-C does, when the other program requests it or has ended."""
     while os.getppid() == process and not select.select([control], [], [], PARENT_CHECK_S)[0]:
         pass
     os.kill(os.getpid(), signal.SIGTERM)

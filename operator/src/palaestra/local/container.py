@@ -1,8 +1,7 @@
 """One container as a process: started, probed, restarted with back-off, stopped within a grace period.
 
 The rules are the kubelet's. SIGTERM goes to the first process only, SIGKILL to all processes of the
-container. The wait before a restart doubles each time, and begins again after the container has run long
-enough.
+container. The wait before a restart doubles each time, and is reset after the container has run long enough.
 """
 
 import asyncio
@@ -16,7 +15,7 @@ from palaestra.local.output import Log
 from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import NOT_RUNNABLE, Process, end_marked, marked
 
-DRAIN_S = 0.5  # for output that is still in the pipe; another process may hold the pipe open for longer
+DRAIN_S = 0.5  # for output that is still in the pipe; another process may keep the pipe open longer
 TERMINATED = 128 + signal.SIGTERM
 
 
@@ -24,7 +23,7 @@ TERMINATED = 128 + signal.SIGTERM
 class BackOff:
     """The wait of a container before its next start, by the kubelet's rule with shorter times.
 
-    The wait doubles with each end from `first_s` to `most_s`; after a life of `calm_s` it starts again.
+    The wait doubles with each end from `first_s` to `most_s`; after a run longer than `calm_s` it is reset.
     """
 
     first_s: float = 0.5
@@ -32,7 +31,7 @@ class BackOff:
     calm_s: float = 60.0
 
     def wait_s(self, ends_in_a_row: int) -> float:
-        """Return the seconds to wait after that many ends in a row, 1 or more."""
+        """Return the seconds to wait after `ends_in_a_row` consecutive ends, 1 or more."""
         return float(min(self.first_s * 2 ** (ends_in_a_row - 1), self.most_s))
 
 
@@ -43,7 +42,7 @@ class Running:
         self.spec = spec
         self.log = log
         self.ends = 0
-        self.started = False  # it has passed its startup probe once, or it has none
+        self.started = False  # it has passed its startup probe once, or has no startup probe
         self._news = asyncio.Event()  # it started, or ended
         self._pod = pod
         self._env = marked(spec.env, pod.uid, spec.name)
@@ -72,7 +71,7 @@ class Running:
         return code
 
     async def keep_running(self) -> None:
-        """Run it, and restart it until it is stopped, like a native sidecar."""
+        """Run the container, and restart it until it is stopped, like a native sidecar."""
         ends_in_a_row = 0
         loop = asyncio.get_running_loop()
         while True:
@@ -88,14 +87,14 @@ class Running:
                 await asyncio.wait_for(self._stopping.wait(), self._backoff.wait_s(ends_in_a_row))
 
     async def until_started(self, tries: int) -> bool:
-        """Return whether it started within that many runs."""
+        """Return whether the container started within `tries` runs."""
         while not self.started and self.ends < tries:
             self._news.clear()
             await self._news.wait()
         return self.started
 
     async def stop(self, grace_s: float) -> None:
-        """Send SIGTERM and return when it has ended; kill it when the grace period is over."""
+        """Send SIGTERM and wait for the end; send SIGKILL when the grace period is over."""
         self._stopping.set()
         if self._process is not None:
             await self._end(self._process, grace_s)
@@ -111,7 +110,7 @@ class Running:
             os.close(writer)
 
     async def _watch(self, process: Process) -> None:
-        """Apply the startup probe, then the liveness probe; end the process when one has failed."""
+        """Run the startup probe, then the liveness probe; end the process when one fails."""
         startup, liveness = self.spec.startup, self.spec.liveness
         if startup is not None and not await probe.until_passed(startup, self._env):
             await self._end_for("startup", process)

@@ -1,8 +1,8 @@
 """The errors of a local run, each with its remedy.
 
 LocalError              one line for a person, and the exit code of `palaestra run`
-├── Refused             exit 2: found before anything was started
-├── StartFailed         exit 1: a sidecar did not come up, so the trainer was not started
+├── RunRefused          exit 2: a check failed before the start of the run
+├── StartFailed         exit 1: a sidecar did not start, so the trainer was not started
 ├── StillRunning        no exit code: a run in the background has not ended by a deadline
 └── StorageFailed       exit 1: the run directory cannot be written (full disk, no permission)
 """
@@ -16,23 +16,23 @@ KILLED = 128 + signal.SIGINT  # the exit code after a second Ctrl-C
 
 
 class LocalError(PalaestraError):
-    """A cause on this machine stops the run; the message names it and the remedy."""
+    """A problem on this machine stops the run; the message names the problem and the remedy."""
 
     exit_code = 1
 
 
 class RunRefused(LocalError, ValueError):
-    """The run cannot be started as asked; nothing was started and nothing was changed."""
+    """The run cannot be started as requested; no process was started and no file was changed."""
 
     exit_code = int(ExitCode.CONFIGURATION)
 
 
 class StartFailed(LocalError, RuntimeError):
-    """A container for which others wait did not start."""
+    """A container that others wait for did not start."""
 
 
 class StorageFailed(LocalError, OSError):
-    """A file of the run could not be written; what was there before is unharmed."""
+    """A file of the run could not be written; the old files are unchanged."""
 
 
 class StillRunning(LocalError, TimeoutError):

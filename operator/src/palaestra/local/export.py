@@ -16,7 +16,7 @@ PROGRAM = "palaestra-export"
 
 
 def export(run: Path, to: str, output: Path | None) -> int:
-    """Let the trainer's program write the policy of a run directory; return its exit code.
+    """Run the trainer's program that exports the policy of a run directory; return its exit code.
 
     Raises:
         RunRefused: the program is not installed here.
@@ -32,7 +32,7 @@ async def _run(command: list[str]) -> int:
     process = Process.start(command, env, stdout=sys.stdout.fileno(), stderr=sys.stderr.fileno())
     try:
         return await process.wait()
-    except asyncio.CancelledError:  # Ctrl-C; a file that was not complete is removed or has a hidden name
+    except asyncio.CancelledError:  # Ctrl-C; an incomplete file is removed or has a hidden name
         process.send(signal.SIGTERM)
         await process.wait()
         raise

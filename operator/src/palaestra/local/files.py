@@ -1,4 +1,4 @@
-"""Write files atomically: after a crash a file has the old content or the new, never a part of it."""
+"""Write files atomically: after a crash a file has its old or its new content, never a part of it."""
 
 import os
 import tempfile
@@ -13,7 +13,7 @@ def write(path: Path, content: bytes) -> None:
     """Create or replace `path`, with its folders.
 
     Raises:
-        StorageFailed: it cannot be written; the old content is unharmed.
+        StorageFailed: the file cannot be written; the old content is unchanged.
     """
     with storage(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def without_locks(path: Path, error: OSError) -> str:
 
 @contextmanager
 def storage(path: Path) -> Iterator[None]:
-    """Turn an OSError about `path` into one clear line.
+    """Replace an OSError about `path` by a StorageFailed with a one-line message.
 
     Raises:
         StorageFailed: the block failed with an OSError.

@@ -1,4 +1,4 @@
-"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends it too.
+"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends the run too.
 
 A signal that was ignored when the program started stays ignored; SIGTERM always ends a run.
 """
@@ -18,16 +18,16 @@ class Stoppable(Protocol):
     """A target that can be stopped and killed."""
 
     def stop(self) -> None:
-        """Begin to end."""
+        """Start the shutdown."""
 
     def kill(self) -> None:
-        """End at once."""
+        """Kill the target at once."""
 
 
 class Interrupt:
     """Counts the signals of a run and passes them to the current target.
 
-    `expired`: the deadline passed before any signal.
+    `expired`: whether the deadline passed before any signal.
     """
 
     def __init__(self) -> None:
@@ -38,11 +38,11 @@ class Interrupt:
 
     @property
     def killed(self) -> bool:
-        """Return whether a second signal came, so that the run was killed."""
+        """Return whether a second signal arrived, so that the run was killed."""
         return self.signals > 1
 
     def pass_to(self, target: Stoppable) -> None:
-        """Set the target of the next signals; one that came before is passed on now."""
+        """Set the target of the next signals; an earlier signal is passed on now."""
         self._target = target
         if self.asked.is_set():
             target.stop()

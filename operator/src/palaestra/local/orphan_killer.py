@@ -1,13 +1,14 @@
-"""End every process of a pod when the runner ends, for whatever reason.
+"""End every process of a pod when the runner ends, for any reason.
 
-This is a program of its own, one for each pod. Its standard input is a pipe whose other end only the runner
-has, so the pipe closes when the runner ends or closes the pod. It ignores the signals of a terminal.
+This is a separate program; one runs for each pod. Its standard input is a pipe whose other end only the
+runner has, so the pipe closes when the runner ends or closes the pod. It ignores the signals of a terminal.
 
 A marker in their environment identifies a pod's processes. Grandchildren inherit it through `setsid`, double
 forks and new process groups, where a parent-death signal or a process group would miss them. Between a fork
 and its exec a child still holds the pipe, so no process is missed.
 
-Standard library only and no import from this package: it is started as a file, with `python -I -S`.
+It uses only the standard library and nothing from this package, because it is started as a file, with `python
+-I -S`.
 """
 
 import contextlib
@@ -17,13 +18,13 @@ import sys
 import time
 
 MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment: <pod uid>/<container>/
-QUIET_ROUNDS = 3  # an exec that ends while /proc is being read shows up in the next round
+QUIET_ROUNDS = 3  # a process in an exec while /proc is read is found in the next round
 ROUND_S = 0.02
 DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel
 
 
 def kill_marked(prefix: str) -> int:
-    """Send SIGKILL to every process whose marker begins with `prefix`; return how many there were.
+    """Send SIGKILL to every process whose marker begins with `prefix`; return their number.
 
     `prefix` is `<pod uid>/` for a whole pod, or `<pod uid>/<container>/` for one container.
     """
@@ -33,11 +34,11 @@ def kill_marked(prefix: str) -> int:
 
 
 def _kill_if_marked(pid: int, wanted: bytes) -> bool:
-    """Kill `pid` through a handle taken before its environment was read, so no reused pid is hit.
+    """Kill `pid` through a handle opened before its environment is read, so that a reused pid is not killed.
 
-    Without such handles its pid has to stay unused for the microseconds after the environment was read.
+    Without handles, another process could get the pid in the microseconds after the environment was read.
     """
-    with contextlib.suppress(OSError):  # gone already, or another user's
+    with contextlib.suppress(OSError):  # the process has ended, or belongs to another user
         handle = _handle(pid)
         try:
             with open(f"/proc/{pid}/environ", "rb") as file:
@@ -80,7 +81,7 @@ def sweep(prefix: str) -> None:
     quiet = 0
     while quiet < QUIET_ROUNDS and time.monotonic() < deadline:
         quiet = 0 if kill_marked(prefix) else quiet + 1
-        time.sleep(ROUND_S)  # the time that the kernel needs to end the killed; /proc has no event
+        time.sleep(ROUND_S)  # the kernel needs this time to end the killed processes; /proc has no events
 
 
 def main() -> None:

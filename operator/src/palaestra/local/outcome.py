@@ -1,4 +1,4 @@
-"""The result of a replica's run, as it is written to the run directory and shown to a person."""
+"""The result of a replica's run, written to the run directory and shown to a person."""
 
 import json
 import shlex
@@ -17,11 +17,12 @@ FILE = "outcome.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOutcome:
-    """The result of a replica's run; a value that was not measured is None.
+    """The result of a replica's run; a value is None if it was not measured.
 
-    `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted`: a person
-    ended it. `saved` is the step of the newest checkpoint. `faults` counts those of all simulators and pods.
-    `trained_share` is the part of the wall clock, 0 to 1, that was spent on steps and on learning from them.
+    `exit_code` is the last trainer's, unless the run was killed or took too long. `interrupted`: whether a
+    person ended it. `saved` is the step of the newest checkpoint. `faults` is the number of faults of all
+    simulators and pods. `trained_share` is the share of the wall-clock time, 0 to 1, that was spent on steps
+    and on learning from them.
     """
 
     exit_code: int
@@ -41,7 +42,7 @@ class RunOutcome:
         return self.exit_code == 0
 
     def keep(self, run_directory: Path) -> None:
-        """Write it into the run directory.
+        """Write the result into the run directory.
 
         Raises:
             StorageFailed: it cannot be written.
@@ -71,7 +72,7 @@ class RunOutcome:
 def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
     """Return the lines to show at the end.
 
-    Values that were not measured are left out: a program of the user's own may measure nothing.
+    Values that were not measured are left out: a custom program need not measure any.
     """
     facts = {
         "success rate": _success(outcome.success_rate, run_directory),
@@ -85,10 +86,10 @@ def summary(outcome: RunOutcome, run_directory: Path) -> tuple[str, ...]:
 
 
 def uses(run_directory: Path) -> tuple[str, ...]:
-    """Return the commands to use on the results of a run.
+    """Return the commands for the results of a run.
 
-    palaestra-eval reads models of the built-in loop, which records its attempts; a program of the user's own
-    may write a model of another kind.
+    palaestra-eval reads models of the built-in loop, which records its attempts; a custom program may write a
+    model of another kind.
     """
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
@@ -100,7 +101,7 @@ def uses(run_directory: Path) -> tuple[str, ...]:
 
 
 def typed(program: str, *words: str | Path) -> str:
-    """Return a command to type in a shell: every path is one word of it, also one with a space or a quote."""
+    """Return a command for a shell: each path is one word, even if it has a space or a quote."""
     return shlex.join([_place_of(program), *map(str, words)])
 
 

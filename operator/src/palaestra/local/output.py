@@ -1,7 +1,8 @@
 """Write the output of containers to files, and show some of it.
 
-Every line goes to `logs/<container>.log`, a file of limited size (`limited`). Those of some containers are
-also shown, after the container's name. The trainer may draw on the person's terminal (`terminal`) instead.
+Every line goes to `logs/<container>.log`, a file of limited size (`bounded_log`). The lines of some
+containers are also shown, after the container's name. The trainer may draw on the person's terminal
+(`terminal`) instead.
 """
 
 import asyncio
@@ -16,7 +17,7 @@ from palaestra.local.errors import StorageFailed
 from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]
-KEPT_LINES = 20  # enough to see why a program ended, without opening the file
+KEPT_LINES = 20  # enough to see the reason of a program's end, without opening the file
 CHUNK = 65536
 
 
@@ -43,7 +44,7 @@ class Log:
         self._limited = LimitedFile(self._file.fileno())
 
     def begin(self, terminal: int | None = None) -> int:
-        """Return a descriptor for the output of a program; the caller closes it after the start.
+        """Return a descriptor for the output of a program; the caller closes it after the program's start.
 
         With `terminal`, it is a pseudo terminal, and the output is copied to `terminal`.
         """
@@ -56,17 +57,17 @@ class Log:
         return writer
 
     async def finished(self, deadline_s: float) -> None:
-        """Return when the programs have closed their ends, at the latest after `deadline_s`."""
+        """Wait at most `deadline_s` until the programs have closed their ends."""
         if self._open:
             await asyncio.wait(self._open, timeout=deadline_s)
 
     def note(self, text: str) -> None:
-        """Write a line of the runner's own, such as the end of a program."""
+        """Write a line of the runner itself, such as one about the end of a program."""
         self._write(f"--- {text}")
 
     @property
     def last_lines(self) -> tuple[str, ...]:
-        """Return the end of the output, at most twenty lines."""
+        """Return the last lines of the output, at most twenty."""
         return tuple(self._tail)
 
     def close(self) -> None:
@@ -76,17 +77,17 @@ class Log:
     def _read(self, reader: int, terminal: int | None, done: "asyncio.Future[None]") -> None:
         try:
             data = os.read(reader, CHUNK)
-        except BlockingIOError:  # nothing to read after all
+        except BlockingIOError:  # no bytes to read
             return
         except OSError:  # EIO: every program has closed its end of the terminal
             data = b""
         if terminal is not None:
-            resize(reader, terminal)  # the person may have changed the window since
+            resize(reader, terminal)  # the person may have resized the window
             os.write(terminal, data or RESTORED)
         *lines, rest = (self._rest + data).split(b"\n")
         if not data and rest:
             lines, rest = [rest], b""
-        self._rest = rest[max(rest.rfind(b"\r"), len(rest) - CHUNK, 0) :]  # drop what was drawn over
+        self._rest = rest[max(rest.rfind(b"\r"), len(rest) - CHUNK, 0) :]  # drop text that was overwritten
         for line in lines:
             self._line(as_seen(line.decode(errors="replace")))
         if not data:
@@ -106,7 +107,7 @@ class Log:
 
 
 def say(text: str) -> None:
-    """Show a line to the person at once; if nobody reads any more, as after `| head`, lines are dropped."""
+    """Show a line to the person at once; lines are dropped if the reader has ended, as after `| head`."""
     try:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()

@@ -1,9 +1,9 @@
-"""One attempt of a replica: a pod's containers, from the first start to the last end.
+"""One attempt of a replica: a pod's containers, from the start of the first to the end of the last.
 
 The order is that of KEP-753. The init containers start one after another; the successor of a sidecar waits
-for its startup probe. Then the main container runs, whose end is the end of the pod. Then the sidecars stop
-in reverse order, within the rest of one grace period. `stop` begins this shutdown early. The main container
-stops first, so that it can still use its simulators while it writes the last checkpoint.
+for the sidecar's startup probe. Then the main container runs; its end is the end of the pod. Then the
+sidecars stop in reverse order, within the rest of one grace period. `stop` begins this shutdown early. The
+main container stops first, so that it can still use its simulators while it writes the last checkpoint.
 """
 
 import asyncio
@@ -19,13 +19,13 @@ from palaestra.local.output import Log, Show
 from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import OrphanKiller
 
-LONG_S = 10.0  # for the start of a container; importing PyTorch takes several seconds
-TRIES = 3  # runs of a sidecar for which others wait, after which the pod has failed
+LONG_S = 10.0  # for the start of a container; the import of PyTorch takes several seconds
+TRIES = 3  # runs of a sidecar that others wait for, after which the pod has failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kubelet:
-    """The settings of this machine for a pod: its output, and its patience.
+    """The settings of this machine for a pod: its output and its deadlines.
 
     `show` is called with a line for each container that has not started within `long_s`.
     """
@@ -35,7 +35,7 @@ class Kubelet:
     start_deadline_s: float = 60.0
     show: Show | None = None
     long_s: float = LONG_S
-    terminal: int | None = None  # of a person, for the main container to draw on
+    terminal: int | None = None  # the person's terminal, on which the main container may draw
 
 
 class _Stopped(Exception):
@@ -43,7 +43,7 @@ class _Stopped(Exception):
 
 
 class RunningPod:
-    """A pod that runs, or is about to."""
+    """A pod that runs or will run."""
 
     def __init__(self, pod: Pod, kubelet: Kubelet) -> None:
         self._pod = pod
@@ -59,18 +59,18 @@ class RunningPod:
         self._stop.set()
 
     def kill(self) -> None:
-        """End every process at once."""
+        """Kill every process at once."""
         self._stop.set()
         if self._watchdog is not None:
             self._watchdog.close()
 
     async def run(self) -> int | None:
-        """Return the main container's exit code; None if the pod was stopped before that container started.
+        """Run the pod and return the main container's exit code; None if it was stopped before that.
 
-        No process of the pod is left when this returns, or raises.
+        When this returns or raises, no process of the pod is left.
 
         Raises:
-            StartFailed: a sidecar for which others wait did not start.
+            StartFailed: a sidecar that others wait for did not start.
         """
         self._watchdog = OrphanKiller(self._pod.uid)
         try:
@@ -126,7 +126,7 @@ class RunningPod:
 
     @contextmanager
     def _reported(self, running: Running) -> Iterator[None]:
-        """If the block takes long, show that a container has not started, and since when.
+        """If the block takes long, show that a container has not started, with the time.
 
         A main container counts as started once it has written a line; it reports its own waits.
         """

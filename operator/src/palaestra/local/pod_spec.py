@@ -1,8 +1,8 @@
-"""Read a planned pod like a kubelet: containers in order, commands, environment, probes, volumes.
+"""Read a planned pod as a kubelet does: containers in order, commands, environment, probes, volumes.
 
 Only settings that apply to a process on this machine are read; images, resources, security contexts and
-scheduling are ignored. A setting without which a program cannot run is refused: a value from an object of the
-cluster, and a second main container.
+scheduling are ignored. Two settings are refused, because a program cannot run without them: a value from an
+object of the cluster, and a second main container.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ class Container:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pod:
-    """One pod; `init` in the order of their start, `main` is the container whose end ends the pod."""
+    """One pod: `init` has the init containers in the order of their start; the end of `main` ends the pod."""
 
     uid: str
     init: tuple[Container, ...]
@@ -58,10 +58,10 @@ class Pod:
 
 
 def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
-    """Return the pod that a Job's template describes, for its attempt with `uid`.
+    """Return the pod of a Job's template, for the attempt with `uid`.
 
     Raises:
-        RunRefused: it needs something that only a cluster has.
+        RunRefused: it needs a feature or an object that only a cluster has.
     """
     spec = template["spec"]
     main, *others = spec["containers"]
@@ -99,13 +99,13 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
     if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
         return uid
     raise RunRefused(
-        f"env {entry['name']} of container {container}: its value lies in a cluster; "
+        f"env {entry['name']} of container {container}: its value is in a cluster; "
         "give it as `value` to run the job here"
     )
 
 
 def _read(text: str) -> str:
-    """Return a text as the kubelet passes it to a container: $$ becomes $. Plans use no variables."""
+    """Return a text as the kubelet passes it to a container: $$ becomes $. Plans do not use variables."""
     return text.replace("$$", "$")
 
 

@@ -1,8 +1,9 @@
-"""Free ports, chosen all at once and held for as long as the run needs them.
+"""Free ports, all chosen at the same time and held while the run needs them.
 
 If a free port were released after the choice, another program could take it before the container listens. So
-each port stays bound here, without listening. The kernel gives a bound port neither to a program that asks
-for any port nor to an outgoing connection. SO_REUSEADDR, which containers set too, lets them listen on it.
+each port stays bound here, without listening. The kernel does not assign a bound port to a program that
+requests any port, nor to an outgoing connection. Containers can still listen on it, because they set
+SO_REUSEADDR too.
 """
 
 import socket
@@ -22,11 +23,11 @@ class HeldPorts:
         self._sockets = ExitStack()
 
     def any(self) -> int:
-        """Return a free port, held."""
+        """Hold and return a free port."""
         return self._bind(0)
 
     def this(self, port: int) -> int:
-        """Return `port`, held.
+        """Hold and return `port`.
 
         Raises:
             RunRefused: another program has it.
@@ -46,7 +47,7 @@ class HeldPorts:
         return int(held.getsockname()[1])
 
     def close(self) -> None:
-        """Give all of them back."""
+        """Release all ports."""
         self._sockets.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Checks before anything is started, each with its remedy."""
+"""Checks before the start of a run; each problem has its remedy."""
 
 import fcntl
 import importlib.util
@@ -53,7 +53,7 @@ def check(request: PreflightRequest) -> None:
 
 
 def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
-    """The system has Linux' /proc, by which the runner finds the processes that a container leaves behind."""
+    """The system has Linux' /proc, in which the runner finds the processes that a container leaves behind."""
     del request
     try:
         ENVIRONMENT.read_bytes()
@@ -71,16 +71,16 @@ def ros_is_installed(request: PreflightRequest) -> Iterator[str]:
 
 
 def no_module_is_shadowed(request: PreflightRequest) -> Iterator[str]:
-    """No module on PYTHONPATH has the name of one that the ROS master or the trainer needs."""
+    """No module on PYTHONPATH has the name of a module that the ROS master or the trainer needs."""
     own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
     for python_path in {os.environ.get(PYTHON_PATH, ""), *own}:
         yield from shadows(python_path or "")
 
 
 def nothing_is_put_off(request: PreflightRequest) -> Iterator[str]:
-    """The job is not suspended, because no operator is here to resume it."""
+    """The job is not suspended, because a local run has no operator to resume it."""
     if request.job.spec.suspend:
-        yield "spec.suspend: is true, which puts the training off; set it to false to train now"
+        yield "spec.suspend: is true, so the job would not train; set it to false to train now"
 
 
 def programs_exist(request: PreflightRequest) -> Iterator[str]:
@@ -97,7 +97,7 @@ def programs_exist(request: PreflightRequest) -> Iterator[str]:
 
 
 def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
-    """Each world in a file is correct; it is read here too, although the sidecar generates it."""
+    """Each world in a file is correct; it is read here too, although the sidecar reads it again."""
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
             field = f"spec.simulators[{index}].world"
@@ -108,7 +108,7 @@ def worlds_are_right(request: PreflightRequest) -> Iterator[str]:
 def initial_policy_is_there(request: PreflightRequest) -> Iterator[str]:
     """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes.
 
-    It may be gone once every replica has a checkpoint, because they resume from that.
+    It may be missing once every replica has a checkpoint, because they resume from their checkpoints.
     """
     initial = request.job.spec.trainer.initial_policy
     if initial is None:
@@ -139,9 +139,9 @@ def space_is_left(request: PreflightRequest) -> Iterator[str]:
 
 
 def locks_work(request: PreflightRequest) -> Iterator[str]:
-    """The file system of the runs has locks; a file without a name is locked, so nothing is left behind."""
+    """The file system of the runs has locks; the check locks a file without a name, which leaves no file."""
     folder = _existing(request.runs)
-    with suppress(OSError), TemporaryFile(dir=folder) as file:  # not writable: `space_is_left` reports it
+    with suppress(OSError), TemporaryFile(dir=folder) as file:  # if not writable, `space_is_left` reports it
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -162,7 +162,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def _existing(path: Path) -> Path:
-    """Return the lowest existing folder on the way to a path."""
+    """Return a path if it exists, else its nearest existing parent."""
     return next(parent for parent in (path, *path.parents) if parent.exists())
 
 

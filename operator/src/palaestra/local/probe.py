@@ -1,4 +1,4 @@
-"""Probe whether a container has started or is alive, by a command or by HTTP."""
+"""Check by a command or by HTTP whether a container has started or is alive."""
 
 import asyncio
 import signal
@@ -21,7 +21,7 @@ async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Try until one succeeds; return False if the threshold of failures is reached first."""
+    """Try until one try succeeds; return False if the failure threshold is reached first."""
     await asyncio.sleep(probe.initial_delay_s)
     for failures in range(probe.failure_threshold):
         if failures:
@@ -32,7 +32,7 @@ async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
-    """Return after as many failed tries in a row as the threshold."""
+    """Return after as many consecutive failed tries as the threshold."""
     await asyncio.sleep(probe.initial_delay_s)
     failures = 0
     while failures < probe.failure_threshold:
@@ -50,7 +50,7 @@ async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 def _answers(url: str, timeout_s: float) -> bool:
-    """Return whether a GET is answered with a status from 200 to 399."""
+    """Return whether the response to a GET has a status from 200 to 399."""
     try:
         with DIRECT.open(url, timeout=timeout_s) as answer:
             return bool(answer.status < HTTPStatus.BAD_REQUEST)  # the kubelet's own rule

@@ -1,7 +1,7 @@
 """Start programs, each in a session of its own, and wait for them without blocking.
 
-The only module that starts processes of a pod. A terminal's Ctrl-C reaches the runner alone, because no
-process that it starts is in its process group.
+Only this module starts processes of a pod. A terminal's Ctrl-C reaches the runner alone, because the started
+processes are not in its process group.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ class Process:
 
     @classmethod
     def start(cls, command: Sequence[str], env: Mapping[str, str], *, stdout: int, stderr: int) -> Self:
-        """Start `command` with exactly `env`; the descriptors stay the caller's.
+        """Start `command` with exactly `env`; the caller still has to close the descriptors.
 
         Raises:
             OSError: the program cannot be run.
@@ -67,7 +67,7 @@ class Process:
             self._started.send_signal(number)
 
     def _report(self) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed, so nothing waits for the end
+        with contextlib.suppress(RuntimeError):  # the loop is closed, so no task waits for the end
             self._loop.call_soon_threadsafe(self._reap)
 
     def _reap(self) -> None:
@@ -92,19 +92,19 @@ class OrphanKiller:
             os.close(reader)
 
     def close(self) -> None:
-        """Begin to kill all remaining processes of the pod; may be called twice."""
+        """Start to kill all remaining processes of the pod; a second call has no effect."""
         if self._writer >= 0:
             os.close(self._writer)
             self._writer = -1
 
     async def closed(self) -> None:
-        """Return when no process of the pod is left."""
+        """Wait until no process of the pod is left."""
         self.close()
         await asyncio.to_thread(self._process.wait)
 
 
 def marked(env: Mapping[str, str], pod_uid: str, container: str) -> dict[str, str]:
-    """Return the environment of a container: this machine's, overridden by `env`, and the marker.
+    """Return the environment of a container: this machine's environment, overridden by `env`, and the marker.
 
     The programs of this installation come first on the PATH, as in an image.
     """

@@ -16,12 +16,12 @@ ANSWER_S = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunProgress:
-    """The newest figures of a run; a value that is not known is None.
+    """The newest values of a run; an unknown value is None.
 
     Attributes:
-        phase: `starting`, then what the trainer does, in one word; at last `ended`.
+        phase: `starting`, then the trainer's phase, finally `ended`.
         step: environment steps learned from, over all attempts.
-        target: steps at which the run ends; 0 before the trainer has answered.
+        target: steps at which the run ends; 0 before the trainer's first response.
         steps_per_second: recently.
         success_rate: of the last evaluation, 0 to 1.
         mean_return: of recent training episodes.
@@ -38,16 +38,16 @@ class RunProgress:
 
 
 class ProgressReader:
-    """Reads the progress of one run, from its start on."""
+    """Reads the progress of one run, beginning with its start."""
 
     def __init__(self, directory: Path) -> None:
-        """Remember what an earlier run left in the directory; its address may be another program's by now."""
+        """Record the file of an earlier run in the directory; another program may have its address by now."""
         self._file = directory / "training.yaml"
         self._stale = self._written()
         self._last = RunProgress()
 
     def progress(self) -> RunProgress:
-        """Return the newest figures; the last ones while the trainer does not answer."""
+        """Return the newest values; the last known ones while the trainer does not respond."""
         if (status := self._status()) is not None:
             self._last = RunProgress(
                 phase=status.phase,

@@ -1,4 +1,4 @@
-"""One replica on this machine, from its planned Job to its outcome: pod after pod, by the Job's rules."""
+"""One replica on this machine, from its planned Job to its outcome: pods in turn, by the Job's rules."""
 
 import asyncio
 import contextlib
@@ -33,7 +33,7 @@ class Setting:
     """The folder of a replica, its output, and its deadline.
 
     `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal on which the
-    trainer may draw; None without one. `deadline_s` is for all pods together; None: no deadline.
+    trainer may draw, or None. `deadline_s` is for all pods together; None: no deadline.
     """
 
     directory: Path
@@ -45,7 +45,7 @@ class Setting:
 
 
 async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
-    """Run pods until the Job is complete, failed, interrupted or too late; return the outcome.
+    """Run pods until the Job is complete, failed, interrupted or past its deadline; return the outcome.
 
     Raises:
         LocalError: a pod could not be started, or its files could not be written.
@@ -62,13 +62,13 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> RunOutcome:
                 return _ended_early(outcome, interrupt)
             if not tries.another(verdict(planned.job, outcome.exit_code), outcome.steps or 0):
                 return outcome
-            say(f"trainer ended with {meaning(outcome.exit_code)}; again in {tries.wait_s:g} s")
+            say(f"trainer ended with {meaning(outcome.exit_code)}; the next pod starts in {tries.wait_s:g} s")
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(interrupt.asked.wait(), tries.wait_s)
 
 
 def meaning(exit_code: int) -> str:
-    """Return an exit code in words."""
+    """Return the text about an exit code."""
     try:
         return f"exit code {exit_code} ({ExitCode(exit_code).name.lower().replace('_', ' ')})"
     except ValueError:
@@ -76,7 +76,7 @@ def meaning(exit_code: int) -> str:
 
 
 async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt) -> int | None:
-    """Return the trainer's exit code; None if it was never started."""
+    """Run one pod and return the trainer's exit code; None if the trainer was not started."""
     if interrupt.asked.is_set():
         return None
     template = planned.job["spec"]["template"]
@@ -107,9 +107,9 @@ def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str,
 
 
 def _ended_early(outcome: RunOutcome, interrupt: Interrupt) -> RunOutcome:
-    """Return the outcome of a run that was ended early; a run that is complete anyway stays complete.
+    """Return the outcome of a run that was ended early; a complete run stays complete.
 
-    A trainer that was asked to end exits with 75 after it has saved. No other exit code becomes 75.
+    An interrupted trainer saves a checkpoint and exits with 75. No other exit code is changed to 75.
     """
     if outcome.finished:
         return outcome
@@ -124,7 +124,7 @@ def _ended_early(outcome: RunOutcome, interrupt: Interrupt) -> RunOutcome:
 def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int) -> RunOutcome:
     """Return the outcome from the trainer's report, in summary.json or in its termination message.
 
-    An exit code 0 of the built-in loop without a report is not its own: a library has ended the process.
+    If the built-in loop exits with 0 but without a report, a library has ended its process.
     """
     word, summary = _json(_termination(directory)), _json(directory / "summary.json")
     said = {**word, **summary}

@@ -1,8 +1,8 @@
-"""The Job controller of this machine: decide after the end of a pod whether the replica gets another.
+"""The Job controller of this machine: after the end of a pod, decide whether the replica gets another pod.
 
-`verdict` applies the planned Job's podFailurePolicy like Kubernetes: the first matching rule decides, and a
-failure that matches none counts against `backoffLimit`. In Kubernetes, ignored failures have no limit; here,
-as in the operator, they have one if the pods make no progress.
+`verdict` applies the planned Job's podFailurePolicy as Kubernetes does: the first matching rule decides, and
+a failure without a matching rule counts against `backoffLimit`. In Kubernetes, ignored failures have no
+limit; here, as in the operator, they have a limit if the pods make no progress.
 """
 
 from collections.abc import Mapping
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-IDLE_PODS = 5  # ignored pods in a row without progress, after which a replica has failed
-FIRST_WAIT_S = 1.0  # before the next pod; it doubles, as in Kubernetes, where it begins at 10 s
+IDLE_PODS = 5  # consecutive ignored pod failures without progress before the replica fails
+FIRST_WAIT_S = 1.0  # before the next pod; it doubles, as in Kubernetes, where the first wait is 10 s
 MOST_WAIT_S = 60.0
 
 
@@ -51,7 +51,7 @@ class Tries:
     step: int = 0
 
     def another(self, meaning: RetryVerdict, step: int) -> bool:
-        """Note the end of a pod that reached `step`; return whether the replica gets another pod."""
+        """Record the end of a pod that reached `step`; return whether the replica gets another pod."""
         self.idle = 0 if step > self.step else self.idle + 1
         self.step = max(step, self.step)
         match meaning:

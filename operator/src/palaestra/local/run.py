@@ -1,8 +1,8 @@
 """`palaestra run`: a TrainingJob file becomes a trained policy on this machine.
 
-Nothing is started and no file is written before every check has passed. Replicas run one after another,
-because each needs a whole small machine. `--replica` selects one, so that two terminals can run two at a
-time.
+No process is started and no file is written before every check has passed. Replicas run one after another,
+because each needs a whole small machine. `--replica` selects one, so that two terminals can run two replicas
+at the same time.
 """
 
 import asyncio
@@ -22,15 +22,15 @@ from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, 
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode
 
-SHOWN_LINES = 5  # of the trainer's log, if it failed without a termination message
+SHOWN_LINES = 5  # of the trainer's log, if the trainer failed without a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
     """The options of the command line.
 
-    `lock` is the descriptor of the run directory's lock, which the process that started this one has taken
-    for it; None: not taken.
+    `lock` is the descriptor of the run directory's lock, which the parent process has already taken for this
+    process; None: not taken.
     """
 
     runs: Path
@@ -43,7 +43,7 @@ class RunOptions:
 
 
 def run(job: TrainingJob, options: RunOptions) -> int:
-    """Run a job's replicas and return the exit code: 0, or that of the first unfinished replica.
+    """Run a job's replicas and return 0, or the exit code of the first unfinished replica.
 
     Raises:
         LocalError: it cannot be run here; the message has one line for each reason.
@@ -63,7 +63,7 @@ def run(job: TrainingJob, options: RunOptions) -> int:
 
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: RunOptions) -> None:
-    """Do all checks that need no file to be written; raises the same errors as `run`."""
+    """Run all checks that do not write files; raises the same errors as `run`."""
     planned = plan(job, layout(directory, options, Ports()), replicas=chosen)
     for replica in planned.replicas.values():
         read_pod(replica.job["spec"]["template"], uid="")
@@ -77,7 +77,7 @@ def layout(directory: Path, options: RunOptions, ports: Ports) -> LocalLayout:
 
 
 def chosen_ports(held: HeldPorts, job: TrainingJob, options: RunOptions) -> Ports:
-    """Return free ports for one replica, all chosen before the first is used.
+    """Return free ports for one replica; all are chosen before the first one is used.
 
     Raises:
         RunRefused: the port that the person chose is in use.
@@ -156,7 +156,7 @@ def _tell(outcome: RunOutcome, path: Path) -> None:
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
     elif outcome.reason == DEADLINE_EXCEEDED:
-        say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds is over; raise it to go on")
+        say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds has passed; raise it to continue")
     elif not outcome.finished:
         what = "interrupted, and failed" if outcome.interrupted else "failed"
         log = path / "logs" / "trainer.log"

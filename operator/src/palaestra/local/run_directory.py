@@ -7,7 +7,7 @@
     <dir>/<job name>/<replica>.old-<n>/   what --fresh or a correction has set aside; no run is ever deleted
 
 The uid of a job on a laptop is derived from this path. So it is the same for every `palaestra run` of one
-directory, and different for two directories, without a file that could be lost.
+directory, and different for two directories, and is not stored in a file that could be lost.
 """
 
 import fcntl
@@ -42,7 +42,7 @@ Record = Mapping[str, Any]
 def _mutable() -> Iterator[str]:
     """Yield the fields that may differ between two runs of one directory.
 
-    They change when training ends or stops, or the number of replicas, but never what one replica learns.
+    They affect the end of the training or the number of replicas, but never the learning of one replica.
     """
     yield from ("spec.backoffLimit", "spec.replicas")
     for path, model in walk(TrainingJob):
@@ -60,7 +60,7 @@ def job_directory(runs: Path, job: str) -> Path:
 
 
 def uid_of(directory: Path) -> str:
-    """Return the uid of the job whose runs are in `directory`; the same path, the same uid."""
+    """Return the uid of the job whose runs are in `directory`; the same path has the same uid."""
     return str(uuid.uuid5(uuid.NAMESPACE_URL, directory.absolute().as_uri()))
 
 
@@ -114,9 +114,8 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        RunRefused: they differ in fields that a run cannot change, and this is no correction; one line for
-        each
-            field.
+        RunRefused: they differ in fields that a run cannot change, and the job is not a correction; one line
+            for each field.
     """
     changes = _changes(directory, record)
     if changes and not _learned_nothing(directory):
@@ -127,27 +126,27 @@ def refuse_another_job(directory: Path, record: Record) -> None:
 
 
 def is_correction(directory: Path, record: Record) -> bool:
-    """Return whether a job differs from that of a run which ended at step 0 because its job was wrong.
+    """Return whether a job corrects the job of a run that ended at step 0 because its job was wrong.
 
-    The directory has to be set aside then: the trainer has kept the wrong hyperparameters there.
+    Then the directory must be set aside, because the trainer has stored the wrong hyperparameters in it.
     """
     return bool(_changes(directory, record)) and _learned_nothing(directory)
 
 
 def is_prolonged(directory: Path, record: Record) -> bool:
-    """Return whether a job has more steps than the run in the directory was to train."""
+    """Return whether a job has more steps than the record of the run in the directory."""
     before = _before(directory)
     return before is not None and _raised(dict(_flat(before)).get(STEPS), dict(_flat(record)).get(STEPS))
 
 
 def _changes(directory: Path, record: Record) -> tuple[str, ...]:
-    """Return the changed fields that a run cannot change; () without a run in the directory."""
+    """Return the changed fields that must not change during a run; () without a run in the directory."""
     before = _before(directory)
     return () if before is None else tuple(changed_fields(before, record))
 
 
 def _before(directory: Path) -> Record | None:
-    """Return the record of the run in the directory; None: there is no run."""
+    """Return the record of the run in the directory; None without a run."""
     try:
         return _completed(yaml.safe_load((directory / RECORD).read_bytes()))
     except FileNotFoundError:
@@ -161,7 +160,7 @@ def _raised(was: Any, is_now: Any) -> bool:
 def _learned_nothing(directory: Path) -> bool:
     """Return whether the trainer refused the job of a run at step 0, and the run has no checkpoint.
 
-    A program of the user's own that reports no step may have trained.
+    A custom program that does not report its step may have trained.
     """
     outcome, checkpoints = RunOutcome.of(directory), directory / "checkpoints"
     return (
@@ -173,7 +172,7 @@ def _learned_nothing(directory: Path) -> bool:
 
 
 def changed_fields(before: Record, now: Record) -> Iterator[str]:
-    """Yield `field: was x, is y` for every field that differs and may not."""
+    """Yield `field: was x, is y` for every field that differs and must not."""
     old, new = dict(_flat(before)), dict(_flat(now))
     for field in sorted(old.keys() | new.keys()):
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
@@ -206,7 +205,7 @@ def prepare(directory: Path, record: Record) -> None:
 
 
 def set_aside(directory: Path) -> Path | None:
-    """Move a run directory out of the way; return its new path, or None if there was none.
+    """Rename a run directory; return its new path, or None if it did not exist.
 
     Raises:
         StorageFailed: it cannot be moved.

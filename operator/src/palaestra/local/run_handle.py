@@ -1,7 +1,7 @@
 """`palaestra.run`: a TrainingJob trains in the background of a Python program.
 
-The run is a process of its own (`bound`), so it takes over neither signals nor the terminal, and several runs
-at the same time do not meet. All of it ends with this process, also after SIGKILL.
+The run is a separate process (`child_main`), so it does not take over signals or the terminal, and several
+runs at the same time do not affect each other. All its processes end with this process, even after SIGKILL.
 """
 
 import os
@@ -28,19 +28,19 @@ from palaestra.local.run import RunOptions, check
 from palaestra.plan import identified
 
 STOP_S = 90.0  # A pod has 60 s for its last checkpoint; the rest is for its processes.
-_RUNNING: set["RunHandle"] = set()  # a run lives on if the program drops its handle
+_RUNNING: set["RunHandle"] = set()  # a run continues if the program drops its handle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The end of a run; a value that was not measured is None.
+    """The end of a run; a value is None if it was not measured.
 
     Attributes:
         exit_code: that of `palaestra run`.
         succeeded: whether the training is complete.
-        reason: why it ended; empty if nothing was reported.
+        reason: the reason for the end; empty if no reason was reported.
         directory: the run directory.
-        policy: the best policy by evaluation, `model.zip`; None if there is none yet.
+        policy: the best policy by evaluation, `model.zip`; None if it does not exist yet.
         steps: environment steps that were learned from.
         success_rate: of the policy, 0 to 1.
         steps_per_second: over the whole run.
@@ -59,13 +59,13 @@ class Result:
 
 
 class RunHandle:
-    """One replica that trains in the background; as a context, it is stopped with the block.
+    """One replica that trains in the background; as a context manager, it is stopped at the end of the block.
 
     Safe to use from several threads.
 
     Attributes:
         directory: the run directory.
-        log: the file with what `palaestra run` would print; logs/ in the run directory has all else.
+        log: the file with the output of `palaestra run`; logs/ in the run directory has all other output.
     """
 
     def __init__(self, directory: Path, request: ChildRequest, control: int) -> None:
@@ -91,12 +91,12 @@ class RunHandle:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop it if it has not ended."""
+        """Stop the run if it has not ended."""
         self.stop()
 
     @property
     def progress(self) -> RunProgress:
-        """Return the newest figures; after the end those of the result."""
+        """Return the newest values; after the end, those of the result."""
         newest = self._watch.progress()
         if not self.ended:
             return newest
@@ -112,7 +112,7 @@ class RunHandle:
 
     @property
     def ended(self) -> bool:
-        """Return whether it has ended."""
+        """Return whether the run has ended."""
         return self.wait(0.0)
 
     def fileno(self) -> int:
@@ -120,7 +120,7 @@ class RunHandle:
         return self._end
 
     def wait(self, deadline_s: float) -> bool:
-        """Return whether it ended within `deadline_s`."""
+        """Wait at most `deadline_s`, and return whether the run has ended."""
         try:
             self._process.wait(deadline_s)
         except subprocess.TimeoutExpired:
@@ -132,7 +132,7 @@ class RunHandle:
         """Wait for the end and return the result.
 
         Raises:
-            StillRunning: it has not ended after `deadline_s`; it goes on.
+            StillRunning: the run has not ended after `deadline_s`; it continues.
         """
         if not self.wait(deadline_s):
             raise StillRunning(
@@ -141,9 +141,9 @@ class RunHandle:
         return self._result()
 
     def interrupt(self) -> None:
-        """Ask it to save a checkpoint and to end; return at once. The same job resumes from there."""
+        """Request a checkpoint and the end of the run; return at once. The same job resumes from there."""
         if not self.ended:
-            with suppress(BrokenPipeError, ValueError):  # it has ended meanwhile
+            with suppress(BrokenPipeError, ValueError):  # it has ended in the meantime
                 self._control.write(b"\n")
 
     def stop(self, deadline_s: float = STOP_S) -> Result:
@@ -154,13 +154,13 @@ class RunHandle:
         return self._result()
 
     def kill(self) -> None:
-        """End it at once; the same job resumes from the newest checkpoint."""
+        """Kill the run at once; the same job resumes from the newest checkpoint."""
         self._process.kill()
         self._process.wait()
         self._let_go()
 
     def _let_go(self) -> None:
-        with suppress(KeyError):  # another thread has let go
+        with suppress(KeyError):  # another thread has already done this
             _RUNNING.remove(self)
             self._control.close()
             os.close(self._end)
@@ -169,7 +169,7 @@ class RunHandle:
         code = self._process.returncode
         code = KILLED if code < 0 else code
         outcome = RunOutcome.of(self.directory)
-        if outcome is None or outcome.exit_code != code:  # it wrote none; an earlier run may have
+        if outcome is None or outcome.exit_code != code:  # this run did not write it; an earlier run may have
             last = self.log.read_text(errors="replace").splitlines()[-1:]
             outcome = RunOutcome(exit_code=code, reason="".join(last))
         policy = self.directory / "model.zip"
@@ -191,18 +191,18 @@ def run(
 ) -> RunHandle:
     """Train a job on this machine, in the background, and return its handle.
 
-    The run is that of `palaestra run`: it resumes from its newest checkpoint, and does nothing if it is
-    complete. A job with more `trainer.steps` prolongs it. It saves a checkpoint and ends when this process
-    ends.
+    The run works like `palaestra run`: it resumes from its newest checkpoint, and ends at once if it is
+    complete. A job with more `trainer.steps` prolongs it. When this process ends, the run saves a checkpoint
+    and ends.
 
     Args:
         job: the path of a file, YAML text, plain data or the model.
         runs: folder of all runs; the run directory is `<runs>/<job>/<replica>`.
         replica: its number; None only if the job has one replica.
-        fresh: start from the beginning; an existing run is moved aside.
+        fresh: start at step 0; an existing run is set aside.
 
     Raises:
-        SpecErrors: the job is wrong; lists every mistake.
+        SpecErrors: the job is wrong; the error lists every problem.
         LocalError: it cannot be run here, or another process runs it.
         PlanError: it cannot be run on one machine.
         WorldError: one of its worlds is wrong.
@@ -221,7 +221,7 @@ def run(
 
 
 def _emptied(log: Path) -> BinaryIO:
-    """Return a log file without content, as `LimitedFile` needs it."""
+    """Empty a log file, and open it as `LimitedFile` needs it."""
     log.write_bytes(b"")
     return log.open("a+b")
 
@@ -230,7 +230,7 @@ def _replica(job: TrainingJob, replica: int | None) -> int:
     """Return the number of the replica to run.
 
     Raises:
-        RunRefused: there is no such replica, or none was chosen of several.
+        RunRefused: the replica does not exist, or the job has several and none was chosen.
     """
     count = job.spec.replicas
     if replica is None and count > 1:

@@ -1,6 +1,6 @@
-"""The simulators of this machine: the program that each driver starts, and whether it is installed.
+"""The simulators of this machine: the program of each driver, and whether it is installed.
 
-The operator's package imports no simulator, so a library of one is only looked for.
+The operator's package does not import simulators, so it only checks that their libraries exist.
 """
 
 import importlib.util
@@ -15,13 +15,13 @@ PROGRAMS: Mapping[Driver, str] = {
     Driver.MUJOCO: "palaestra-mujoco",
     Driver.WEBOTS: "webots",
 }
-# Its program is installed with the stub's, its library is an extra.
+# The program is installed with the stub's, but its library is an extra.
 _LIBRARIES = {"palaestra-mujoco": "mujoco"}
 _EXTRA = "install palaestra-sim[mujoco] (`make setup` does)"
 
 
 def lack(program: str) -> str | None:
-    """Return why a program cannot be started on this machine, with the remedy; None if it can."""
+    """Return the reason that prevents a program's start on this machine, with the remedy, or None."""
     library = _LIBRARIES.get(program)
     if shutil.which(program, path=program_path()) is None:
         return f"{program} is not a program on this machine; {'install it' if library is None else _EXTRA}"

@@ -13,12 +13,12 @@ import termios
 import tty
 
 _CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-_])")
-RESTORED = b"\x1b[0m\x1b[?25h"  # no color, and a visible cursor; a killed program restores neither
+RESTORED = b"\x1b[0m\x1b[?25h"  # no color, and a visible cursor; a killed program does not restore them
 _NO_SIZE = struct.pack("HHHH", 24, 80, 0, 0)
 
 
 def open_like(terminal: int) -> tuple[int, int]:
-    """Return (ours, theirs): the two ends of a pseudo terminal of the size of `terminal`."""
+    """Return (ours, theirs): the two ends of a pseudo terminal with the size of `terminal`."""
     ours, theirs = os.openpty()
     tty.setraw(theirs)  # line ends stay unchanged; the person's terminal converts them
     resize(ours, terminal)
@@ -35,5 +35,5 @@ def resize(ours: int, terminal: int) -> None:
 
 
 def as_seen(line: str) -> str:
-    """Return the text of a line that stays visible, without what was drawn over."""
+    """Return the visible text of a line, without overwritten text."""
     return _CONTROL.sub("", line.rstrip("\r").rpartition("\r")[2])

@@ -10,10 +10,10 @@ from palaestra.local.pod_spec import Pod
 
 
 def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
-    """Create every volume at the path where the pod mounts it; an emptyDir is emptied for each pod.
+    """Create every volume at its mount path in the pod; an emptyDir is emptied for each pod.
 
     Raises:
-        StorageFailed: one of them cannot be written.
+        StorageFailed: a volume cannot be written.
     """
     for volume in volumes:
         target = Path(pod.mounts[volume["name"]])

@@ -1,6 +1,6 @@
-"""What the simulators of this machine make of a world: each is asked by its own `--check`.
+"""Check a world with the simulators of this machine: each runs with `--check`.
 
-The operator's package knows no simulator, so the answer comes from the simulator itself.
+The operator's package does not know simulators, so the result comes from the simulator itself.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ _TIMED_OUT: Final = 124
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldCheckResult:
-    """The answer of one simulator.
+    """The result of one simulator.
 
     Attributes:
-        driver: as in a TrainingJob.
-        starts: whether it can start the world, with the options.
-        text: its own words.
+        driver: the driver, as in a TrainingJob.
+        starts: whether the simulator can start the world with the options.
+        text: the simulator's output.
     """
 
     driver: str
@@ -39,9 +39,9 @@ class WorldCheckResult:
 
 
 def check_world(world: Path, options: Sequence[str] = ()) -> tuple[WorldCheckResult, ...]:
-    """Return the answer of each simulator that can check a world; without an answer it cannot start it.
+    """Return the result of each simulator that can check a world; one that does not respond cannot start it.
 
-    The stub is always asked, others if they are installed; each gets the options of its start.
+    The stub always runs, others run if they are installed; each gets the options of its start.
     """
     asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
     return tuple(asyncio.run(_ask(driver, world, options)) for driver in asked)
@@ -56,7 +56,7 @@ async def _ask(driver: Driver, world: Path, options: Sequence[str]) -> WorldChec
     if code == NOT_RUNNABLE:
         text = f"{program} is not installed on this machine"
     elif code == _TIMED_OUT:
-        text = f"{program} did not answer within {_DEADLINE_S:.0f} s"
+        text = f"{program} did not respond within {_DEADLINE_S:.0f} s"
     return WorldCheckResult(driver=driver.value, starts=code == 0, text=text)
 
 

@@ -1,7 +1,7 @@
 """The observation of a TrainingJob in a cluster: raw JSON in, checked values out.
 
-Pure and total: for any answer of an API server or a pod it returns an `Observed` and raises nothing. A value
-that cannot be read counts as absent.
+Pure and total: for any response of an API server or a pod it returns an `Observed` and raises no exception.
+An unreadable value counts as absent.
 
     observed = observe(job, Objects(jobs=..., pods=..., ...))
     if not complete(job, observed):  # of palaestra.decide

@@ -1,7 +1,7 @@
 """Trim an object for a cache to the fields that observation reads.
 
-Most of an object is its pod template and its managedFields, but two hundred jobs with their pods have to fit
-into little memory. The observation of trimmed objects equals that of whole ones.
+Most of an object is its pod template and its managedFields, but two hundred jobs with their pods must fit
+into little memory. The observation of trimmed objects equals that of whole objects.
 """
 
 import json
@@ -25,14 +25,14 @@ _POD_STATUS = (
 )  # fmt: skip
 _ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET, RESTART_LOST_RUNS)
 
-SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole one without its status
-SMALL = 65_536  # bytes, up to which a cached TrainingJob has no such annotation
+SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole job without status
+SMALL = 65_536  # bytes; a cached TrainingJob up to this size has no such annotation
 
 
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of an object that are read while nothing of it is planned.
+    """Return the fields of an object that are needed except for a plan.
 
-    Objects of other kinds are returned whole, without managedFields.
+    Objects of unknown kinds are returned whole, without managedFields.
     """
     kind = raw.get("kind")
     kept = {name: raw[name] for name in ("apiVersion", "kind") if name in raw}
@@ -49,12 +49,12 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def whole(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an object whole, without managedFields."""
+    """Return a whole object, but without managedFields."""
     return {**raw, "metadata": _metadata(raw)}
 
 
 def _measured(job: Mapping[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
-    """Return the trimmed job; if the job is large, with its size, all annotations included."""
+    """Return the trimmed job; a large job gets an annotation with its size, including all annotations."""
     metadata = job.get("metadata")
     given = {**metadata, "managedFields": None} if isinstance(metadata, Mapping) else None
     size = len(json.dumps({**job, "metadata": given, "status": None}))

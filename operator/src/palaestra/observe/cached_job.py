@@ -1,8 +1,8 @@
-"""A TrainingJob as a cache keeps it: small, whatever its author wrote into it.
+"""A TrainingJob in a cache: a small copy, for any content of its fields.
 
 Only the plan needs the removed parts, and it reads the object from the API server. An annotation on the copy
-names the removed parts, so that no plan is made from the copy. The object's own annotations are not kept, so
-no user can set this one.
+names the removed parts, so that the copy is never planned. The copy does not have the object's own
+annotations, so users cannot set this one.
 """
 
 import hashlib
@@ -14,8 +14,8 @@ from typing import Any
 from palaestra.observe.json_access import part, parts
 
 LACKS = "palaestra.dev/lacks"  # annotation of a cached copy
-LONGEST_TEXT = 256  # characters of an inline world that is kept unchanged
-MOST_CHARACTERS = 32_768  # of a cached copy, its status aside; that of a usual job has 4,000
+LONGEST_TEXT = 256  # most characters of an inline world that is kept unchanged
+MOST_CHARACTERS = 32_768  # of a cached copy without its status; a usual job has 4,000
 
 # Fields that may be large: lists and maps of texts. No decision needs them once the objects exist.
 _LARGE_OF_SPEC = frozenset({"imagePullSecrets", "rosMaster"})
@@ -26,7 +26,7 @@ _LARGE_OF_METADATA = frozenset({"labels", "ownerReferences"})
 
 
 class Lacking(StrEnum):
-    """The parts that a cached copy lacks."""
+    """The parts that are missing in a cached copy."""
 
     TEXTS = "texts"
     """The inline worlds, replaced by digests."""
@@ -36,7 +36,7 @@ class Lacking(StrEnum):
 
 
 def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a TrainingJob with digests of its worlds, and if it is still large, without its large fields.
+    """Return a TrainingJob with digests of its worlds, and, if it is still large, without its large fields.
 
     The result is a TrainingJob too, and valid if the whole one is.
     """
@@ -50,7 +50,7 @@ def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def lacking(job: Mapping[str, Any]) -> Lacking | None:
-    """Return the parts that a cached copy lacks; None if it is whole."""
+    """Return the missing parts of a cached copy; None if it is whole."""
     mark = part(job, "metadata", "annotations").get(LACKS)
     return Lacking(mark) if mark in tuple(Lacking) else None
 

@@ -1,4 +1,4 @@
-"""The batch/v1 Job of a replica, as the API server shows it."""
+"""The batch/v1 Job of a replica, from the API server's JSON."""
 
 import re
 
@@ -14,7 +14,8 @@ REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the
 _REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
 _SUSPENDED = re.compile(r"(\S{1,253}) (lived|ended)")
 
-# Set before the last pod has ended; a pod on a lost node never ends.
+# Kubernetes sets the last two before the last pod has ended. They are needed, because a pod on a lost node
+# never ends.
 _ENDS = (
     ("Complete", JobEnd.COMPLETE),
     ("Failed", JobEnd.FAILED),
@@ -24,7 +25,7 @@ _ENDS = (
 
 
 def job_view(raw: Raw) -> JobView:
-    """Return the Job; an absent value is empty."""
+    """Return the view of a Job; absent values are empty."""
     metadata, status = part(raw, "metadata"), part(raw, "status")
     named, end = next(((kind, end) for kind, end in _ENDS if holds(raw, kind)), ("", None))
     ending = condition(raw, named)
@@ -64,13 +65,13 @@ def _suspend_set(annotations: dict[str, object]) -> bool | None:
 
 
 def _suspension(annotations: dict[str, object]) -> Suspended | None:
-    """Return the mark of the pod that a suspension ended; None if there is no valid mark."""
+    """Return the mark of the pod that a suspension ended; None without a valid mark."""
     mark = _SUSPENDED.fullmatch(text(annotations, SUSPENDED, 300))
     return None if mark is None else Suspended(pod=mark[1], lived=mark[2] == "lived")
 
 
 def _replaced(annotations: dict[str, object]) -> Replaced | None:
-    """Return the mark of the pods that were replaced; None if there is no valid mark."""
+    """Return the mark of the replaced pods; None without a valid mark."""
     mark = _REPLACED.fullmatch(text(annotations, REPLACED, 1400))
     if mark is None:
         return None

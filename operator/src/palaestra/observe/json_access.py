@@ -7,19 +7,19 @@ from typing import Any
 from palaestra.api.text import one_line
 
 MOST_TEXT = 600
-MOST_ITEMS = 128  # containers or conditions of a pod; a pod of ours has 34 containers at most
-MOST_COUNT = 2_000_000_000  # as the status' counts are bounded
+MOST_ITEMS = 128  # containers or conditions of a pod; a planned pod has at most 34 containers
+MOST_COUNT = 2_000_000_000  # the limit of the counts in a status
 
 
 def part(raw: Any, *path: str) -> dict[str, Any]:
-    """Return the object at `path` below `raw`; empty if there is none."""
+    """Return the object at `path` below `raw`, or an empty object."""
     for name in path:
         raw = raw.get(name) if isinstance(raw, dict) else None
     return raw if isinstance(raw, dict) else {}
 
 
 def parts(raw: Any, *path: str) -> Iterator[dict[str, Any]]:
-    """Yield the objects in the list at `path` below `raw`, 128 of them at most."""
+    """Yield the objects in the list at `path` below `raw`, at most 128."""
     *above, last = path
     items = part(raw, *above).get(last)
     if isinstance(items, list):
@@ -27,13 +27,13 @@ def parts(raw: Any, *path: str) -> Iterator[dict[str, Any]]:
 
 
 def text(raw: Any, name: str, most: int = MOST_TEXT) -> str:
-    """Return the text of a field on one line, cut to `most` characters; "" if there is none."""
+    """Return the text of a field on one line, cut to `most` characters; "" without text."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return one_line(value, most) if isinstance(value, str) else ""
 
 
 def count(raw: Any, name: str) -> int:
-    """Return a whole number from 0 to 2·10⁹; 0 if there is none."""
+    """Return the whole number of a field, from 0 to 2·10⁹; 0 without a number."""
     value = raw.get(name) if isinstance(raw, dict) else None
     if not isinstance(value, int) or isinstance(value, bool):
         return 0
@@ -41,13 +41,13 @@ def count(raw: Any, name: str) -> int:
 
 
 def time(raw: Any, name: str) -> datetime | None:
-    """Return a time in UTC; None if there is none."""
+    """Return the time of a field in UTC; None without a valid time."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return as_time(value) if isinstance(value, str) else None
 
 
 def as_time(value: str) -> datetime | None:
-    """Return the time that RFC 3339 text names, in UTC and whole seconds; None for anything else."""
+    """Return the time in an RFC 3339 text, in UTC and whole seconds; None for any other text."""
     try:
         read = datetime.fromisoformat(value)
         at = read.astimezone(UTC) if read.tzinfo else read.replace(tzinfo=UTC)
@@ -63,7 +63,7 @@ def owners(raw: Any) -> frozenset[str]:
 
 
 def condition(raw: Any, kind: str) -> dict[str, Any]:
-    """Return the condition of this type in the status of `raw`; empty if there is none."""
+    """Return the condition of this type in the status of `raw`, or an empty object."""
     return next(
         (condition for condition in parts(raw, "status", "conditions") if condition.get("type") == kind), {}
     )

@@ -1,4 +1,4 @@
-"""Kueue's Workload of a Job: why the Job is not admitted."""
+"""Kueue's Workloads of a Job: the reason for which the Job is not admitted."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,9 +13,9 @@ _READY = "Ready"  # the state of an admission check that lets a Workload pass
 
 
 def why_not_admitted(workloads: Iterable[Raw]) -> str:
-    """Return why Kueue has not admitted a Job, by the Workloads that Kueue created for it, on one line.
+    """Return Kueue's reason not to admit a Job, on one line, from the Workloads that Kueue created for it.
 
-    The words are Kueue's if it has any; "" if it has admitted the Job, or gives no reason yet.
+    The reason is Kueue's own message, if any; "" if Kueue has admitted the Job, or reports no reason yet.
     """
     newest = max(workloads, key=lambda raw: text(part(raw, "metadata"), "creationTimestamp"), default=None)
     if newest is None:

@@ -3,11 +3,11 @@
 from palaestra.observe.json_access import part, parts, text
 from palaestra.observe.models import Raw
 
-MOST_NAME = 128  # of a field manager, as the API server bounds it
+MOST_NAME = 128  # the API server's limit for a field manager's name
 
 
 def suspends(raw: Raw) -> str:
-    """Return the field manager that set a Job's `spec.suspend` last; "" if the object does not name it."""
+    """Return the field manager that last set a Job's `spec.suspend`; "" if the object does not name it."""
     entries = [
         (text(entry, "time"), text(entry, "manager", MOST_NAME))
         for entry in parts(raw, "metadata", "managedFields")

@@ -1,7 +1,7 @@
-"""The observation of a TrainingJob's objects, as values: the interface between reading and deciding.
+"""The observation of a TrainingJob's objects, as values: the interface between `observe` and `decide`.
 
-All values were checked when they were read (`palaestra.observe.json_access`): sizes are bounded, times are
-valid, and a pod's report is valid by our protocol or absent.
+All values were checked when they were read (`palaestra.observe.json_access`): sizes are limited, times are
+valid, and a pod's report is valid in the protocol or absent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from palaestra.plan.pod import GRACE_S
 from palaestra.plan.replica import ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
-SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # beginnings of the names of the plan's sidecars
+SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # the starts of the names of the plan's sidecars
 
 Raw = Mapping[str, Any]  # an object as untrusted JSON
 
@@ -42,7 +42,7 @@ class ReferencedObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polled:
-    """A trainer's answer, and its time on this process's monotonic clock."""
+    """A trainer's response, and its time on this process's monotonic clock."""
 
     status: TrainerStatus
     at_s: float
@@ -50,20 +50,20 @@ class Polled:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objects:
-    """Everything that is read for one TrainingJob, as raw JSON.
+    """All objects that were read for one TrainingJob, as raw JSON.
 
     Attributes:
-        jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
-            a Job of another owner that has one of our names is among `jobs` too.
+        jobs, pods, claims, config_maps, policies: objects in its namespace with its label palaestra.dev/job;
+            `jobs` also has Jobs of other owners with a name that the TrainingJob needs.
         events: FailedCreate events about those Jobs, warnings about pods that wait for volumes, and events
             about trainers that the kubelet ended.
-        unadmitted: by a Job's uid, why Kueue has not admitted it; absent if that was not requested.
-        unasked: uids of Jobs and pods that lack something, and about which the operator sends no request.
-        polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
-        denied: by replica, the message with which the API server last refused one of its objects; None: an
+        unadmitted: by a Job's uid, Kueue's reason not to admit it; absent if the reason was not requested.
+        unasked: uids of incomplete Jobs and pods about which the operator sends no request.
+        polled: the last responses of trainers by pod UID; a pod that was not reached is absent.
+        denied: by replica, the API server's message of the last refusal of one of its objects; None: an
             object of the whole job. A replica without a refusal is absent.
-        switchers: by a Job's uid, the field manager that set its `spec.suspend`, if it is not as the operator
-            set it.
+        switchers: by a Job's uid, the field manager that set its `spec.suspend`, if it differs from the
+            operator's value.
     """
 
     jobs: Sequence[Raw] = ()
@@ -89,7 +89,7 @@ class ContainerKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContainerExit:
-    """How a container ended; `message` is its termination message, as the pod wrote it."""
+    """The end of a container; `message` is its termination message, as the pod wrote it."""
 
     code: int
     reason: str = ""
@@ -104,10 +104,10 @@ class ContainerView:
     Attributes:
         running_since: None if it does not run now.
         started: its startup probe has passed, or it has none and runs.
-        waiting, waiting_message: why it does not run yet, in the kubelet's words; "" if it does not wait.
-        exit: how it ended, if it has; for a sidecar that runs again, how it ended last.
-        restarts: by the kubelet.
-        memory_limit: from its spec; "" if there is none.
+        waiting, waiting_message: the kubelet's reason, and its message, if the container waits; else "".
+        exit: its end, if it has ended; for a restarted sidecar, its last end.
+        restarts: the number of restarts by the kubelet.
+        memory_limit: the limit in its spec; "" without a limit.
     """
 
     name: str
@@ -138,17 +138,17 @@ class PodView:
 
     Attributes:
         version: its resourceVersion.
-        started: when a kubelet accepted it.
+        started: the time at which a kubelet accepted it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
-        reason, message: the pod's own, for example after an eviction; mostly "".
-        ready: by the kubelet; False if it is not, or unknown.
-        mounted: its volumes are mounted: it has begun to pull images, or is past that.
+        reason, message: the pod's own reason and message, for example after an eviction; usually "".
+        ready: whether the kubelet reports it as ready; False if that is unknown.
+        mounted: whether its volumes are mounted: it pulls images, or has pulled them.
         unschedulable: the scheduler's message; "" if it was scheduled.
-        disruption: why the cluster interrupted it (condition DisruptionTarget); "" if it did not.
+        disruption: the cluster's reason to interrupt it (condition DisruptionTarget); "" if it did not.
         gone_by: the end of its grace period after a deletion; None if it was not deleted. It is a time of the
-            API server, so it is not compared with our clocks.
+            API server, so it is not compared with the operator's clocks.
         grace_s: seconds between its deletion and `gone_by`.
-        containers: in the order in which they start.
+        containers: in the order of their start.
         claims: names of the PersistentVolumeClaims that it mounts.
     """
 
@@ -179,13 +179,13 @@ class PodView:
     def trainer(self) -> ContainerView | None:
         """Return the trainer's container; None if the pod has none.
 
-        A mesh or an agent may add containers to a pod, also before the trainer.
+        A service mesh or an agent may add containers to a pod, even before the trainer.
         """
         return next((container for container in self._main if container.name == TRAINER), None)
 
     @property
     def keeping(self) -> tuple[str, ...]:
-        """Return the containers of others that keep the pod from ending with its trainer."""
+        """Return the foreign containers that keep the pod from ending with its trainer."""
         return tuple(
             container.name
             for container in self._main
@@ -198,12 +198,12 @@ class PodView:
 
     @property
     def sidecars(self) -> tuple[ContainerView, ...]:
-        """Return the native sidecars: the ROS master, those of the simulators, and those of others."""
+        """Return the native sidecars: the ROS master, the simulators' sidecars, and foreign sidecars."""
         return tuple(container for container in self.containers if container.kind is ContainerKind.SIDECAR)
 
 
 class JobEnd(StrEnum):
-    """How a batch/v1 Job ended."""
+    """The end of a batch/v1 Job."""
 
     COMPLETE = "Complete"
     FAILED = "Failed"
@@ -214,7 +214,7 @@ class Replaced:
     """The mark on a Job whose pod the operator replaces.
 
     Attributes:
-        times: pods that were replaced this way, including this one.
+        times: number of pods that were replaced this way, including this one.
         pod: uid of the last one.
         reason, message: why.
     """
@@ -231,7 +231,7 @@ class Suspended:
 
     Attributes:
         pod: uid of the current attempt's pod at that time.
-        lived: the suspension ended it; False if it had ended, or was being deleted, before.
+        lived: whether the suspension ended it; False if it had ended or was being deleted before.
     """
 
     pod: str
@@ -245,19 +245,20 @@ class JobView:
     Attributes:
         version: its resourceVersion.
         suspended: `spec.suspend`.
-        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: it has
-            none, as a Job that the operator created for a queue.
-        suspension: our mark of the pod that our last suspension ended; None: it has none.
-        paused: since when it is suspended, by the Job controller; None: it is not.
-        resumed: when it was resumed last, by the Job controller; None: it never was suspended or still is.
-        stopped: reason and message of our stop mark; None: it has none.
-        replaced: our mark of the pods that we replaced; None: it has none.
-        failures: pods that failed and count against backoffLimit.
+        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: the Job has no
+            annotation, for example because the operator created it for a queue.
+        suspension: the operator's mark of the pod that its last suspension ended, or None.
+        paused: the time of its suspension by the Job controller's clock; None: it is not suspended.
+        resumed: the time of its last resumption by the Job controller's clock; None: it was never suspended
+            or still is.
+        stopped: reason and message of the operator's stop mark, or None.
+        replaced: the operator's mark of the pods that it replaced, or None.
+        failures: number of pods that failed and count against backoffLimit.
         end, end_reason, end_message: from its conditions; None and "" until it ends.
-        settings: fields of its spec that others may change; one that it lacks is absent.
+        settings: fields of its spec that other clients may change; a missing field is absent.
         deleting: it is being deleted.
         volumes: names of the ConfigMaps and claims that its pods mount.
-        queue: its Kueue queue, from the spec or a namespace's default; "": it has none.
+        queue: its Kueue queue, from the spec or a namespace's default, or "".
     """
 
     name: str
@@ -282,7 +283,7 @@ class JobView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForeignJob:
-    """A Job of another owner that has one of our names; `deleting`: it is being deleted."""
+    """A Job of another owner that has a name of the operator's Jobs; `deleting`: it is being deleted."""
 
     name: str
     deleting: bool
@@ -301,24 +302,25 @@ class ReplicaObserved:
     """The observation of one replica.
 
     Attributes:
-        pods: those of its Job, and the one that the status names; oldest first.
+        pods: the pods of its Job, and the pod that the status names; oldest first.
         in_the_way: names of all other unfinished pods with the replica's labels. Their reports are ignored,
             but they may write to its volume.
         former: unfinished pods of an earlier TrainingJob of the same name that mount the `existingClaim` of
             this replica.
-        polled: the answer of the newest pod's trainer; None: unknown.
+        polled: the response of the newest pod's trainer; None: unknown.
         terminations: valid termination messages of trainers, by pod UID.
-        refused: why no pod could be created, if that is newer than the newest pod.
-        denied: why an object of the replica could not be created; "": it could.
-        unmounted: why the newest pod's volumes are not mounted, in the cluster's words; "": they are, or no
-            event has a reason.
+        refused: the last refusal of a pod, if it is newer than the newest pod.
+        denied: the reason for which an object of the replica could not be created, or "".
+        unmounted: the cluster's message about the newest pod's volumes that are not mounted; "": they are
+            mounted, or no event has a reason.
         probe: the failed probe, "liveness" or "startup", for which the kubelet ended the newest pod's
-            trainer; "": none, or no event reports it.
-        unadmitted: why Kueue has not admitted the Job; "": it has, or gives no reason; None: not asked yet.
-        unasked: its pod, the pod's volumes or Kueue's admission are missing, and the operator sends no
-            request about it.
-        switcher: the field manager that set the Job's `spec.suspend`, if it is not as the operator set it;
-            "": it is, or the manager is unknown.
+            trainer; "": no probe failed, or no event reports it.
+        unadmitted: Kueue's reason not to admit the Job; "": Kueue has admitted it, or reports no reason;
+            None: not requested yet.
+        unasked: whether its pod, the pod's volumes or Kueue's admission are missing, and the operator sends
+            no request about it.
+        switcher: the field manager that set the Job's `spec.suspend`, if it differs from the operator's
+            value; "": it does not differ, or the manager is unknown.
     """
 
     index: int
@@ -359,12 +361,12 @@ class Observed:
         replicas: one for each replica of the spec, by index.
         present: kind and name of the existing ConfigMaps, claims and NetworkPolicies.
         edited: name and generation of each NetworkPolicy whose spec was changed since its creation.
-        sources: the objects of `references(job)`; None: there is no such object. For a Secret the metadata is
-            enough.
+        sources: the objects of `references(job)`; None: the object does not exist. For a Secret the metadata
+            is enough.
         kueue: whether the cluster has Kueue.
         verdicts: the known results of the checks of the job's worlds; None: the plan checks them itself.
-        worlds_wait: the job's worlds wait for their check, or are being checked; its sources were not
-            requested.
+        worlds_wait: whether the job's worlds wait for their check or are being checked; then its sources were
+            not requested.
     """
 
     replicas: tuple[ReplicaObserved, ...]

@@ -1,4 +1,4 @@
-"""Sort the objects of a job by replica, and make values of them."""
+"""Sort the objects of a job by replica, and convert them to values."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator
@@ -25,12 +25,12 @@ from palaestra.plan.replica import REPLICA_LABEL, TRAINER, UID_LABEL
 from palaestra_protocol.pod.status import ProtocolError, Termination
 
 UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's events, and a controller's
-KILLING = "Killing"  # a kubelet's event: why it ends a container
+KILLING = "Killing"  # a kubelet's event with the reason for which it ends a container
 _PROBE = re.compile(rf"Container {TRAINER} failed (liveness|startup) probe\b")
 
 
 def observe(job: TrainingJob, objects: Objects) -> Observed:
-    """Return the observation of the job from `objects`; their content is not trusted."""
+    """Return the observation of the job from `objects`, whose content is untrusted."""
     return Observed(
         replicas=tuple(_replica(job, index, objects) for index in range(job.spec.replicas)),
         present=frozenset(
@@ -48,7 +48,7 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
 
 
 def _edited(job: TrainingJob, objects: Objects) -> Iterator[tuple[str, int]]:
-    """Yield name and generation of the job's policies that were changed; the first generation is 1."""
+    """Yield name and generation of the job's changed network policies; the first generation is 1."""
     for raw in objects.policies:
         metadata = part(raw, "metadata")
         generation = count(metadata, "generation")
@@ -90,8 +90,8 @@ def _pods(
 ) -> tuple[tuple[PodView, ...], tuple[PodView, ...]]:
     """Return the pods of a replica, oldest first, and other pods with its labels.
 
-    Every user who can create pods can give them our labels, but only those that its Job owns are the
-    replica's. Of an earlier Job, only the pod that the status names is known.
+    Every user who can create pods can give them the operator's labels, but only pods that its Job owns belong
+    to the replica. Of an earlier Job, only the pod that the status names is known.
     """
     known = {
         replica.pod.uid
@@ -114,7 +114,8 @@ def _pods(
 def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]:
     """Yield the pods of an earlier TrainingJob of this name that may still write to a replica's claim.
 
-    The claims that the earlier job created have its uid in their names, so only an `existingClaim` is shared.
+    Claims that the operator created for the earlier job have that job's uid in their names, so only an
+    `existingClaim` is shared.
     """
     shared = job.spec.storage.existing_claim
     if shared is None:
@@ -128,7 +129,7 @@ def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]
 
 
 def _last_word(pod: PodView) -> Termination | None:
-    """Return the trainer's last word, its termination message; None if a pod wrote something else."""
+    """Return the trainer's termination message; None if the pod wrote another text."""
     trainer = pod.trainer
     if trainer is None or trainer.exit is None:
         return None
@@ -139,7 +140,7 @@ def _last_word(pod: PodView) -> Termination | None:
 
 
 def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFailure | None:
-    """Return the last refusal of a pod, unless a pod was created since."""
+    """Return the last refusal of a pod, unless a pod was created after it."""
     last = _last_event(objects, job.uid, {"FailedCreate"})
     if last is None or (newest is not None and newest.created >= _when(last)):
         return None
@@ -147,7 +148,7 @@ def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFa
 
 
 def _unmounted(newest: PodView, objects: Objects) -> str:
-    """Return why the volumes of a pod on a node are not mounted; "" if they are, or no event has a reason."""
+    """Return the reason for a pod's missing volumes; "" if they are mounted, or no event has a reason."""
     waits = newest.phase == "Pending" and not newest.mounted
     last = _last_event(objects, newest.uid, UNMOUNTED) if waits else None
     return text(last, "message")
@@ -161,7 +162,7 @@ def _probe(newest: PodView, objects: Objects) -> str:
 
 
 def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
-    """Return the last event about what the object with this uid lacks, with only the fields read here."""
+    """Return the last event that explains an incomplete object, with only the fields read here."""
     found = (raw for raw in events if _is_read(raw))
     last = max(found, key=_when, default=None)
     if last is None:
@@ -174,7 +175,7 @@ def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
 def _is_read(event: Raw) -> bool:
     """Return whether an event is one of those that this module reads.
 
-    A kubelet also writes that it ends the other containers, after the trainer.
+    A kubelet also writes events when it ends the other containers, after the trainer.
     """
     reason = text(event, "reason")
     return reason in {"FailedCreate", *UNMOUNTED} or (

@@ -1,4 +1,4 @@
-"""One pod, as the API server shows it."""
+"""One pod, from the API server's JSON."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -8,15 +8,15 @@ from palaestra.observe.models import ContainerExit, ContainerKind, ContainerView
 from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import ExitCode
 
-MOST_MESSAGE = 4096  # of a termination message: Kubernetes cuts it there
-BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # stands for a time that cannot be read
+MOST_MESSAGE = 4096  # of a termination message, Kubernetes' limit
+BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # the value for an unreadable time
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
-BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes of a trainer
+BY_SIGNAL = frozenset({ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes of a trainer after a signal
 
 
 def pod_view(raw: Raw) -> PodView:
-    """Return the pod; an absent value is empty."""
+    """Return the view of a pod; absent values are empty."""
     status, metadata = part(raw, "status"), part(raw, "metadata")
     scheduled = condition(raw, "PodScheduled")
     return PodView(
@@ -50,7 +50,7 @@ def dropped(view: PodView) -> tuple[str, ...]:
 
 
 def was_signalled(raw: Raw) -> bool:
-    """Return whether a signal ended the trainer of a pod, and nothing in the pod shows the cause."""
+    """Return whether a signal ended the trainer of a pod, and the pod does not show the cause."""
     view = pod_view(raw)
     ended = view.trainer.exit if view.phase == "Failed" and view.trainer is not None else None
     shown = view.disruption or view.reason or view.gone_by is not None

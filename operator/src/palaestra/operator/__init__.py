@@ -1,24 +1,24 @@
 """The running operator: the control loop, its observations and its writes.
 
 - `controller`: one reconcile: observe, plan, decide, act, one status write, events
-- `observer`: everything that the operator observes of one TrainingJob
+- `observer`: the complete observation of one TrainingJob
 - `caches`, `informer`: the watched objects
 - `foreign_jobs`, `kueue_workloads`, `pod_events`, `suspend_managers`: facts that no watch reports
-- `rate_limited_lookup`: how often they are read
+- `rate_limited_lookup`: the rate at which they are read
 - `bounded_cache`, `reconcile_state`, `rejected_creations`: facts of earlier reconciles, in memory
-- `world_verdicts`: verdicts on worlds; `fair_queue`: whose worlds are checked next
+- `world_verdicts`: verdicts on worlds; `fair_queue`: the next job whose worlds are checked
 - `world_check_process`, `world_check_main`: the process that checks large worlds
-- `crd_check`: the cluster's definition of TrainingJobs, compared with this release's
+- `crd_check`: the cluster's CustomResourceDefinition, compared with this release's
 - `poller`: the trainers' own reports, over the pod network
-- `poll_schedule`: which trainer to poll next, so that silent pods delay no others
+- `poll_schedule`: the next trainer to poll, chosen so that silent pods do not delay the others
 - `poll_targets`: the pods to poll
-- `preconditions`: reads before a write, because a cache may lag
+- `preconditions`: reads before a write, because a cache may be behind
 - `executor`, `status_writer`, `fenced_client`: every write to the cluster; none while another operator leads
-- `unused_claims`: the claims of jobs that are gone, if nothing was ever in them
+- `unused_claims`: claims of deleted jobs that were never bound
 - `workers`: threads that take keys from the queue
 - `metric_definitions`: every metric by name, as data; `metrics`, `waiting_metric`: their values
 - `health`, `logs`, `options`, `run`: the process
 
-`palaestra.plan` and `palaestra.decide`, which are pure, make the decisions; `palaestra.cluster` connects to
+The decisions are in `palaestra.plan` and `palaestra.decide`, which are pure; `palaestra.cluster` connects to
 the API server.
 """

@@ -1,9 +1,9 @@
 """Bounded memory for facts that no watch reports, by TrainingJob.
 
-One policy applies to all of them. Each reconcile replaces the values of the one before, and the values of a
-deleted or recreated TrainingJob are dropped, so memory holds only existing things. If it is full, it accepts
-no new value until another one is dropped. Eviction of the oldest would be worse: with thousands of jobs in
-turn, each would evict another one, and no value would stay.
+One policy applies to all of them. Each reconcile replaces the values of the previous one, and the values of a
+deleted or recreated TrainingJob are dropped, so the memory holds only facts about existing objects. If it is
+full, it accepts no new value until another one is dropped. Eviction of the oldest would be worse: with
+thousands of jobs in turn, each would evict another one, and no value would stay.
 """
 
 import threading
@@ -12,14 +12,14 @@ from typing import Generic, TypeVar
 
 from palaestra.objects import Key
 
-REMEMBERED = 4000  # objects, of all jobs together, with a message each
+REMEMBERED = 4000  # objects of all jobs together; each has one message
 
 Item = TypeVar("Item", bound=Hashable)
 Value = TypeVar("Value")
 
 
 class BoundedCache(Generic[Item, Value]):
-    """Values by TrainingJob and item; safe to use from several threads, each job from one at a time."""
+    """Values by TrainingJob and item; safe for several threads, if each job is used by one at a time."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -38,7 +38,7 @@ class BoundedCache(Generic[Item, Value]):
     def keep(self, key: Key, uid: str, values: Mapping[Item, Value]) -> Mapping[Item, Value]:
         """Replace the values of a TrainingJob by `values`; return those for which there is room.
 
-        An item that is already there keeps its place.
+        An existing item keeps its place.
         """
         with self._lock:
             before = self.known(key, uid)

@@ -1,7 +1,7 @@
 """The operator's caches, one for each kind of object, with trimmed objects.
 
-They hold TrainingJobs, and of other kinds only objects with the label palaestra.dev/job. So the operator's
-memory does not grow with other workloads of the cluster.
+They hold TrainingJobs, and objects of other kinds only if they have the label palaestra.dev/job. So the
+operator's memory does not grow with other workloads of the cluster.
 """
 
 import time
@@ -32,7 +32,7 @@ CHILDREN = (JOBS, PODS, CLAIMS, CONFIG_MAPS.only_metadata(), NETWORK_POLICIES)
 
 
 class Caches:
-    """The objects of some namespaces, or of all, as they were a moment ago.
+    """The objects of some or all namespaces; the caches may be slightly behind the cluster.
 
     Args:
         api: the cluster.
@@ -72,7 +72,7 @@ class Caches:
         self._jobs.stop(deadline_s)
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Return whether everything was read once, `deadline_s` from now at the latest."""
+        """Wait at most `deadline_s`, and return whether all objects were read once."""
         ends = time.monotonic() + deadline_s
         return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._all())
 
@@ -85,7 +85,7 @@ class Caches:
         return self._jobs.keys()
 
     def training_job(self, key: Key) -> Object | None:
-        """Return a TrainingJob, None if there is none or it is being deleted."""
+        """Return a TrainingJob; None if it does not exist or is being deleted."""
         found = self._jobs.get(*key)
         return None if found is None or "deletionTimestamp" in found["metadata"] else found
 
@@ -104,7 +104,7 @@ class Caches:
         return tuple((namespace, reason) for (namespace, _), reasons in waiting for reason in reasons)
 
     def trainers(self) -> Collection[PollTarget]:
-        """Return the trainers that run now."""
+        """Return the running trainers."""
         return self._trainers.targets()
 
     def _all(self) -> tuple[Informer, ...]:

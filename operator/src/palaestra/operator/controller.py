@@ -1,8 +1,8 @@
-"""The control loop: compare the cluster with the job, and bring it one step closer.
+"""The control loop: compare the cluster with the job, and change it one step toward the job.
 
 Level-triggered: a reconcile gets the key of a job, not the change. It reads everything from the cluster, so
 the operator can be killed between any two writes and restarted. `palaestra.decide`, which is pure, decides on
-actions and status; no object is built here.
+actions and status; this module builds no objects.
 """
 
 import time
@@ -42,20 +42,20 @@ log = structlog.get_logger(__name__)
 
 
 def now(record: ReconcileRecord) -> Times:
-    """Return the current time by both clocks; `record` is that of the last reconcile."""
+    """Return the current time by both clocks; `record` is from the last reconcile."""
     return Times(now=datetime.now(UTC), clock_s=time.monotonic(), record=record)
 
 
 class Controller:
-    """Reconciles TrainingJobs, each by one worker at a time.
+    """Reconciles TrainingJobs; only one worker at a time may reconcile a job.
 
     Args:
         caches: the watched objects.
         looking: observes a job.
-        acting: carries out actions.
+        acting: executes actions.
         reporting: writes status and events.
-        layout: of this release in this cluster.
-        times: returns the clocks at a reconcile, for the record of the last one.
+        layout: the layout of this release in this cluster.
+        times: returns the clocks at a reconcile, given the record of the last one.
     """
 
     def __init__(
@@ -74,18 +74,18 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = ReconcileRecords()
-        self._terminating: set[Key] = set()  # jobs for which this was logged
+        self._terminating: set[Key] = set()  # jobs whose terminating namespace was logged
 
     def begin_anew(self) -> None:
-        """Begin every wait again, because another operator may have led meanwhile."""
+        """Restart every wait, because another operator may have led in the meantime."""
         self._records.clear()
 
     def reconcile(self, key: Key) -> float | None:
         """Reconcile one TrainingJob; return the seconds after which the decision may change by time alone.
 
         Raises:
-            ApiError: retry later; actions that were done stay done. In a namespace that is being deleted
-                nothing is retried, because each change in it triggers a reconcile anyway.
+            ApiError: a request failed, so retry later; completed actions stay. It is not raised for a
+                namespace that is being deleted, because each change in it triggers a reconcile anyway.
             Outdated: the cache is behind.
             NotLeading: another operator may lead.
         """
@@ -126,14 +126,14 @@ class Controller:
         return _Look(decision=decision, seen=seen, prepared=prepared)
 
     def _decide_anew(self, stored: Object, look: "_Look", times: Times) -> "_Look":
-        """Return the decision after the status has accepted the job, which has no objects to observe yet."""
+        """Return the decision after the status has accepted the job; no object of the job exists yet."""
         if look.seen is None or look.prepared is None:
             raise AssertionError("unreachable: a refused job is not accepted")
         decision = decide(accept(stored), look.seen.observed, look.prepared, times)
         return replace(look, decision=decision, just_accepted=True)
 
     def _carry_out(self, raw: Object, look: "_Look", times: Times) -> StatusWrite:
-        """Carry out the actions, then write the status and the events."""
+        """Execute the actions, then write the status and the events."""
         key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
         self._records.keep(key, raw["metadata"]["uid"], decision.record)
         denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
@@ -143,7 +143,7 @@ class Controller:
         return written
 
     def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
-        """Return a job and its observation; the whole job is read if it has to be planned.
+        """Return a job and its observation; the whole job is read if it must be planned.
 
         Raises:
             JobRefused: the operator cannot run the job as it is.
@@ -170,15 +170,16 @@ class _Look:
 
     @property
     def again_s(self) -> float | None:
-        """Return the seconds until a fact that no watch reports has to be read again."""
+        """Return the seconds until a fact that no watch reports must be read again."""
         return None if self.seen is None else self.seen.again_s
 
 
 def _just_accepted(before: Object, stored: Object) -> bool:
     """Return whether the written status accepts its job, so that all its objects can be created at once.
 
-    A job that was not accepted has never had a pod, so no read has to confirm that. With an `existingClaim`,
-    a pod of an earlier job may still write there, so that job needs the reads of the next reconcile.
+    A job that was not accepted has never had a pod, so this needs no read to confirm it. With an
+    `existingClaim`, a pod of an earlier job may still write to the claim, so that job needs the reads of the
+    next reconcile.
     """
     accepted = part(stored, "status").get("release") and not part(before, "status").get("release")
     return bool(accepted) and part(stored, "spec", "storage").get("existingClaim") is None

@@ -1,14 +1,14 @@
-"""Compare the cluster's definition of TrainingJobs with the fields that this release writes.
+"""Compare the cluster's CustomResourceDefinition with the fields that this release writes.
 
-With `crds.install: false` an administrator applies the definition, and may forget to. Then the API server
-drops new fields of a status without an error. No decision depends on them, but people miss them. It refuses a
-status with a condition of a new type. So the operator leaves out such conditions until it has read that the
-definition has them; those that a status has already stay.
+With `crds.install: false` an administrator applies the definition, and may forget an update. Then the API
+server drops new fields of a status without an error. No decision depends on them, but people miss them. The
+API server also refuses a status with a condition of a new type. So the operator leaves out such conditions
+until it has read that the definition allows them; existing ones of a status stay.
 
 Columns and selectable fields are not compared, because no written value is lost without them.
 
-The operator has no right to read CustomResourceDefinitions, so it reads the OpenAPI document, which every
-account may read. If that fails, the operator still works.
+The operator has no permission to read CustomResourceDefinitions, so it reads the OpenAPI document, which
+every account may read. If that fails, the operator still works.
 """
 
 import threading
@@ -25,7 +25,7 @@ from palaestra.cluster import Api, ApiError
 from palaestra.observe.json_access import part, parts, text
 
 READ_S = 5.0
-FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
+FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it is applied
 MOST_SHOWN = 20
 _NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # a definition may lack them
 
@@ -33,14 +33,14 @@ log = structlog.get_logger(__name__)
 
 
 class CrdCheck:
-    """The definition of TrainingJobs in a cluster, compared with this release's.
+    """The CustomResourceDefinition in a cluster, compared with this release's.
 
     Args:
         api: the cluster.
         changed: called when the definition accepts more fields of a status than before.
 
     Attributes:
-        outdated: whether it lacks something; None: it could not be read yet.
+        outdated: whether fields are missing in it; None: it could not be read yet.
     """
 
     def __init__(self, api: Api, changed: Callable[[], None]) -> None:
@@ -51,7 +51,7 @@ class CrdCheck:
         self.outdated: bool | None = None
 
     def follow(self, stopping: threading.Event, every_s: float) -> None:
-        """Compare at once, then in a thread of its own until nothing is lacking."""
+        """Compare at once, then repeatedly in a thread of its own until no field is missing."""
         self._try_look()
         threading.Thread(
             target=self._follow, args=(stopping, every_s), name="definition", daemon=True
@@ -78,9 +78,9 @@ class CrdCheck:
             )
 
     def accepted(self, stored: Any, status: dict[str, Any]) -> dict[str, Any]:
-        """Return a status without conditions whose type the definition does not have.
+        """Return a status without the conditions whose types the definition does not allow.
 
-        Until the definition was read, the types are those in the `stored` status.
+        Until the definition was read, only the types in the `stored` status are allowed.
         """
         if self._knows_new:
             return status
@@ -98,7 +98,7 @@ class CrdCheck:
     def _try_look(self) -> None:
         try:
             self.look()
-        except Exception:  # a document of an unforeseen shape must not end the operator
+        except Exception:  # an unexpected document must not end the operator
             log.exception("definition not compared")
 
 

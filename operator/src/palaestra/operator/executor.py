@@ -1,7 +1,7 @@
-"""Carry out actions: create missing objects, stop, replace, suspend, resume, delete.
+"""Execute actions: create missing objects, stop, replace, suspend, resume, delete.
 
 An action can be repeated safely: names are deterministic, so the API server refuses a second object of the
-same name. If an action fails, those of other replicas are still done.
+same name. If an action fails, the actions for other replicas are still executed.
 """
 
 from http import HTTPStatus
@@ -22,12 +22,12 @@ log = structlog.get_logger(__name__)
 
 
 class Executor:
-    """Carries out actions.
+    """Executes actions.
 
     Args:
         api: for reads that must not come from a cache.
         writer: for writes.
-        strangers: remembers Jobs of other owners that have our names.
+        strangers: remembers Jobs of other owners that have names of this operator's Jobs.
         denials: remembers refused creations.
     """
 
@@ -40,15 +40,15 @@ class Executor:
         self._denials = denials
 
     def carry_out(self, raw: Object, actions: tuple[Action, ...], *, confirmed: bool = False) -> Denied:
-        """Do `actions` for a TrainingJob, in order, and return the refusals; empty if all were done.
+        """Execute `actions` for a TrainingJob, in order, and return the refusals; empty if all succeeded.
 
-        `confirmed`: they follow from what was just written, so no read has to confirm them.
+        `confirmed`: they follow from the status just written, so they need no read to confirm them.
 
-        After a refusal nothing more is done for that replica, and nothing more is created at all if it
-        was about the whole job: no pod runs without its network policy.
+        After a refusal, no other action for that replica is executed. If the refusal is about the whole job,
+        no other object is created, because no pod may run without its network policy.
 
         Raises:
-            Outdated: the cluster is not as it was when this was decided; some of it may be done.
+            Outdated: the cluster has changed since the decision; some of the actions may be done.
             NotLeading: another operator may lead.
         """
         if not confirmed:
@@ -112,22 +112,22 @@ class Executor:
         log.info("applied", job=key, kind=kind, name=name)
 
     def _see_owner(self, key: Key, uid: str, obj: Object) -> None:
-        """Check that an existing Job is owned by the TrainingJob; the cache has not received it yet.
+        """Check that the TrainingJob owns an existing Job, which the cache has not received yet.
 
         Raises:
-            AlreadyExists: another object owns it, or it is gone by now.
+            AlreadyExists: another object owns it, or it no longer exists.
         """
         name = obj["metadata"]["name"]
         found = self._strangers.meet(key, uid, name)
         if found is None or not owners(found) & owners(obj):
-            words = f"Job {name} is there already, and is not this job's; delete it"
+            words = f"Job {name} already exists, and another object owns it; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _see_config_map(self, namespace: str, obj: Object) -> None:
-        """Check that an existing ConfigMap is the TrainingJob's own, has the planned content, is immutable.
+        """Check that an existing ConfigMap is immutable, as planned, and owned by the TrainingJob.
 
         Raises:
-            AlreadyExists: it is not; pods would train with its content.
+            AlreadyExists: one of these is false; otherwise pods would train with a wrong content.
         """
         name = obj["metadata"]["name"]
         found = self._api.get(CONFIG_MAPS, namespace, name)
@@ -137,7 +137,7 @@ class Executor:
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _patch(self, key: Key, action: Stop | Replace | SetSuspend) -> None:
-        """Patch a Job, if its uid and version are those of the decision."""
+        """Patch a Job, if its uid and version have not changed since the decision."""
         metadata = {**action.patch.get("metadata", {}), "uid": action.basis.uid}
         patch = {**action.patch, "metadata": metadata}
         self._writer.merge(JOBS, key[0], action.job, patch, action.basis.version)
@@ -146,7 +146,7 @@ class Executor:
         """Mark the Job, then evict the pod if it still runs.
 
         Raises:
-            ApiError: the mark was not written, or a disruption budget allows no eviction now.
+            ApiError: the mark was not written, or a disruption budget does not allow an eviction now.
         """
         if not action.marked:
             self._patch(key, action)
@@ -156,7 +156,7 @@ class Executor:
 
 
 def _wrong_with(found: Object, planned: Object) -> str:
-    """Return how an existing ConfigMap differs from the planned one; "" if it does not."""
+    """Return the difference between an existing ConfigMap and the planned one; "" if they agree."""
     if found.get("data") != planned["data"]:
         return "with other content"
     if not owners(found) & owners(planned):

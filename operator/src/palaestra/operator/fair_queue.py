@@ -1,6 +1,6 @@
-"""Whose worlds are checked next: one job of a namespace at a time, and the namespaces in turn.
+"""The order of the checks of worlds: one job of a namespace at a time, and the namespaces in turn.
 
-So the jobs of a namespace wait for each other, and not those of other namespaces for them.
+So a job waits only for other jobs of its namespace, not for those of other namespaces.
 """
 
 import threading
@@ -13,29 +13,29 @@ from palaestra.plan import GivenWorld
 
 @dataclass(slots=True, kw_only=True)
 class Turn:
-    """The turn of a job; `worlds` is None until its reconcile has handed them over, as they are not kept."""
+    """The turn of a job; `worlds` is None until its reconcile hands them over, as they are not stored."""
 
     key: Key
     worlds: Sequence[GivenWorld] | None = None
 
 
 class FairQueue:
-    """A line of jobs for each namespace; safe to use from several threads."""
+    """A queue of jobs for each namespace; safe to use from several threads."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._lines: dict[str, dict[Key, None]] = {}  # by namespace, that of the next turn first
+        self._lines: dict[str, dict[Key, None]] = {}  # by namespace; the namespace of the next turn is first
         self._turns: dict[Key, Turn] = {}
         self._closed = False
 
     def waits(self, key: Key) -> bool:
-        """Return whether the worlds of a job wait, or are being checked; False if they are asked for."""
+        """Return whether the worlds of a job wait or are being checked; False if they must be handed over."""
         with self._changed:
             turn = self._turns.get(key)
             return turn.worlds is not None if turn is not None else key in self._lines.get(key[0], ())
 
     def hand_over(self, key: Key, worlds: Sequence[GivenWorld]) -> None:
-        """Pass the worlds of a job that must be checked, and have it wait if it is not its turn."""
+        """Pass the unchecked worlds of a job; the job is queued if it is not its turn."""
         with self._changed:
             turn = self._turns.get(key)
             if turn is not None and turn.worlds is None:
@@ -47,7 +47,7 @@ class FairQueue:
             self._changed.notify_all()
 
     def next(self) -> Turn | None:
-        """Begin the next turn, then call `end`; waits for one, and returns None after `close`."""
+        """Wait for the next turn, begin it and return it; None after `close`. Call `end` after the turn."""
         with self._changed:
             while not self._closed:
                 busy = {key[0] for key in self._turns}
@@ -58,7 +58,7 @@ class FairQueue:
             return None
 
     def handed(self, turn: Turn, deadline_s: float) -> Sequence[GivenWorld]:
-        """Return the worlds of a turn; none if they were not handed over in time."""
+        """Return the worlds of a turn; empty if they were not handed over in time."""
         with self._changed:
             self._changed.wait_for(lambda: turn.worlds is not None or self._closed, deadline_s)
             return turn.worlds or ()

@@ -1,7 +1,7 @@
-"""Every write to the cluster goes through this module, which refuses it while another operator leads.
+"""All writes to the cluster; each is refused while another operator leads.
 
-It also refuses a write that was decided in an earlier tenure: while a thread was delayed between decision and
-write, another operator may have led.
+A write that was decided in an earlier tenure is refused too: while its thread was delayed between decision
+and write, another operator may have led.
 """
 
 import threading
@@ -15,13 +15,13 @@ from palaestra.objects import Object
 
 
 class NotLeading(PalaestraError):
-    """Another operator may lead by now, so nothing is written; the leader reconciles the job."""
+    """Another operator may lead now, so the write is refused; the leader reconciles the job."""
 
 
 class FencedClient:
     """Writes to the cluster while this operator leads.
 
-    Each method raises NotLeading if it does not lead, and ApiError if the API server refuses.
+    Each method raises NotLeading if this operator does not lead, and ApiError if the API server refuses.
 
     Args:
         api: the cluster.
@@ -34,7 +34,7 @@ class FencedClient:
         self._look = threading.local()
 
     def begin(self) -> None:
-        """Begin a reconcile: later writes of this thread must be decided on reads after this call."""
+        """Begin a reconcile: this thread must base later writes on reads after this call."""
         self._look.term = self._term()
 
     def create(self, obj: Object) -> Object:
@@ -48,22 +48,22 @@ class FencedClient:
         return self._api.apply(obj)
 
     def merge(self, resource: Resource, namespace: str, name: str, patch: Object, version: str) -> Object:
-        """Change the fields in `patch` of an object that still has this version."""
+        """Change the fields in `patch` of an object, if it still has this version."""
         self._check()
         return self._api.merge(resource, namespace, name, patch, resource_version=version)
 
     def delete(self, resource: Resource, namespace: str, name: str, *, uid: str, version: str) -> None:
-        """Delete the object with this uid and version, but no later one of its name."""
+        """Delete the object with this uid and version, but not a later object of its name."""
         self._check()
         self._api.delete(resource, namespace, name, uid=uid, resource_version=version)
 
     def evict(self, namespace: str, name: str, uid: str) -> None:
-        """Evict the pod with this uid, but no later one of its name."""
+        """Evict the pod with this uid, but not a later pod of its name."""
         self._check()
         self._api.evict(namespace, name, uid=uid)
 
     def status(self, job: Object, patch: Object) -> Object:
-        """Change the status of a TrainingJob that still has the version of `job`; return it as stored."""
+        """Change the status of a TrainingJob, if it still has the version of `job`; return it as stored."""
         self._check()
         metadata = job["metadata"]
         return self._api.merge(
@@ -78,11 +78,13 @@ class FencedClient:
     def _check(self) -> None:
         term = self._term()
         if term is None or term != getattr(self._look, "term", term):
-            raise NotLeading("the Lease may have passed on since this was decided; it is not written")
+            raise NotLeading(
+                "another operator may have taken the Lease since the decision; the write is refused"
+            )
 
 
 def difference(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the merge patch (RFC 7386) that makes `old` into `new`; empty: they are equal."""
+    """Return the merge patch (RFC 7386) that changes `old` to `new`; empty if they are equal."""
     before: Mapping[str, Any] = old if isinstance(old, Mapping) else {}
     patch: dict[str, Any] = {key: None for key in before if key not in new}
     for key, value in new.items():

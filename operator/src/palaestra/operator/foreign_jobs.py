@@ -1,7 +1,7 @@
-"""Strangers: Jobs with one of our names that belong to an earlier TrainingJob or to another owner.
+"""Foreign Jobs: they have a name that a TrainingJob needs, but belong to an earlier one or to another owner.
 
-No cache has them, because they need not have our label. The operator finds one if a Job cannot be created
-because its name is taken. It reads that Job again every few seconds until it is gone.
+They are not cached, because they may lack the label of the operator's objects. The operator finds one if a
+Job cannot be created because its name is taken. It reads that Job again every few seconds until it is gone.
 """
 
 import time
@@ -17,7 +17,7 @@ RECHECK_S = 10.0
 
 
 class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
-    """The time of the last read and the object of each stranger, by TrainingJob and name.
+    """The time of the last read and the object of each foreign Job, by TrainingJob and name.
 
     Args:
         api: the cluster.
@@ -30,7 +30,7 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
         self._clock = clock
 
     def meet(self, key: Key, uid: str, name: str) -> Object | None:
-        """Return and remember the Job whose name a TrainingJob needs; None: it is gone."""
+        """Return and remember the Job whose name a TrainingJob needs; None if it is gone."""
         others = {other: met for other, met in self.known(key, uid).items() if other != name}
         try:
             found = trimmed(self._api.get(JOBS, key[0], name))
@@ -41,9 +41,9 @@ class ForeignJobs(BoundedCache[str, tuple[float, Object]]):
         return found
 
     def among(self, key: Key, uid: str, cached: Collection[str]) -> list[Object]:
-        """Return the strangers whose names a TrainingJob needs, as of ten seconds ago at most.
+        """Return the foreign Jobs whose names a TrainingJob needs, as read at most ten seconds ago.
 
-        `cached` are the names of the Jobs in the cache, which are not strangers.
+        `cached` are the names of the Jobs in the cache, which are not foreign.
         """
         met = {name: met for name, met in self.known(key, uid).items() if name not in cached}
         self.keep(key, uid, met)

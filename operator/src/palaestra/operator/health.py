@@ -1,6 +1,6 @@
 """The operator's HTTP server: liveness, readiness and metrics.
 
-Every client that reaches the pod may send requests, so they only read.
+Every client that reaches the pod may send requests, so the server is read-only.
 """
 
 from collections.abc import Callable
@@ -11,20 +11,20 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from palaestra.errors import PalaestraError
 from palaestra_protocol.http import Address, Response, Server, probe_response
 
-Trouble = Callable[[], str | None]  # returns the problem in a sentence; None: there is none
+Trouble = Callable[[], str | None]  # returns the problem in a sentence, or None
 
 
 def serving(address: Address, *, healthy: Trouble, ready: Trouble, metrics: Callable[[], bytes]) -> Server:
-    """Return a server that answers /healthz, /readyz and /metrics from now on.
+    """Start and return a server for /healthz, /readyz and /metrics.
 
     Args:
-        address: where to listen; port 0 takes a free one.
-        healthy: returns a problem that only a restart solves.
-        ready: returns what the operator still waits for.
+        address: the address to listen on; port 0 selects a free port.
+        healthy: returns a problem that only a restart solves, or None.
+        ready: returns the text about missing lists, or None.
         metrics: returns the text of the metrics.
 
     Raises:
-        PalaestraError: the address cannot be listened on.
+        PalaestraError: the server cannot listen on the address.
     """
     routes = {
         ("GET", "/healthz"): lambda _: probe_response(healthy()),

@@ -1,6 +1,6 @@
-"""One kind of objects, watched in some namespaces or in all of them.
+"""The objects of one kind, watched in some namespaces or in all of them.
 
-If the operator watches only some namespaces, each has a reflector of its own, because no list spans several.
+If the operator watches only some namespaces, each has its own reflector, because a list cannot span several.
 """
 
 import time
@@ -12,7 +12,7 @@ from palaestra.objects import Key, Object
 
 
 class Informer:
-    """The objects of one kind, as they were a moment ago.
+    """The objects of one kind; they may be slightly behind the cluster.
 
     Args:
         api: the cluster.
@@ -45,12 +45,12 @@ class Informer:
         return all(reflector.synced for reflector in self._reflectors)
 
     def start(self) -> None:
-        """Start the watches; once."""
+        """Start the watches; call it once."""
         for reflector in self._reflectors:
             reflector.start()
 
     def stop(self, deadline_s: float) -> None:
-        """End the watches, and wait for them until `deadline_s`."""
+        """Stop the watches, and wait at most `deadline_s` for them."""
         for reflector in self._reflectors:
             reflector.stop(0.0)
         ends = time.monotonic() + deadline_s
@@ -58,17 +58,17 @@ class Informer:
             reflector.stop(max(0.0, ends - time.monotonic()))
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Return whether everything was read once, `deadline_s` from now at the latest."""
+        """Wait at most `deadline_s`, and return whether all objects were read once."""
         ends = time.monotonic() + deadline_s
         return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._reflectors)
 
     def get(self, namespace: str, name: str) -> Object | None:
-        """Return an object, None if there is none."""
+        """Return an object; None if it does not exist."""
         found = (reflector.store.get(namespace, name) for reflector in self._reflectors)
         return next((obj for obj in found if obj is not None), None)
 
     def holds(self, namespace: str, name: str) -> bool:
-        """Return whether there is such an object, without reading it."""
+        """Return whether an object exists, without decoding it."""
         return any(reflector.store.holds(namespace, name) for reflector in self._reflectors)
 
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:

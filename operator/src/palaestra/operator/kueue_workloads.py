@@ -1,8 +1,8 @@
-"""Why Kueue has not admitted a Job: the message of its Workload, which authors of jobs may be unable to read.
+"""Kueue's reason not to admit a Job: the message of its Workload, which a job's author may be unable to read.
 
 A Workload is as large as a pod's template, and Kueue changes it often. So the operator does not watch
-Workloads; it lists that of a waiting Job (`palaestra.operator.rate_limited_lookup`). Thousands of Jobs may
-wait for days, so their requests and their memory are separate from those for Jobs whose pods are refused.
+Workloads; it lists the one of each waiting Job (`palaestra.operator.rate_limited_lookup`). Thousands of Jobs
+may wait for days, so their requests and their memory are separate from those for Jobs whose pods are refused.
 """
 
 import time
@@ -32,10 +32,10 @@ class KueueWorkloads(RateLimitedLookup[str, str]):
         self._api = api
 
     def of(self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]) -> Answers[str, str]:
-        """Return the answers about those of a TrainingJob's `jobs` that wait in a queue.
+        """Return the messages for those of a TrainingJob's `jobs` that wait in a queue.
 
         Raises:
-            ApiError: a Workload had to be read, and there was no answer.
+            ApiError: the read of a Workload failed.
         """
         return self.about(key, uid, [job["metadata"]["uid"] for job in podless(jobs, pods) if _waits(job)])
 

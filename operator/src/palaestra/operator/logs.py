@@ -1,4 +1,4 @@
-"""The format of the log: one JSON object a line on standard error, a constant message, values as fields."""
+"""The format of the log: one JSON object a line on standard error; messages are constant, values fields."""
 
 import logging
 import sys
@@ -12,7 +12,7 @@ _JSON = structlog.processors.JSONRenderer(default=str)
 
 
 def configure_logs() -> None:
-    """Write every line to standard error from now on, with its level and the time in UTC."""
+    """Set up the log: each line goes to standard error with its level and the time in UTC."""
     structlog.configure(
         wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
         processors=[

@@ -25,7 +25,7 @@ from palaestra_protocol.metrics import Family, Values
 
 Counted = TypeVar("Counted", Counter, Histogram)
 
-# Otherwise each counter has a second, unused series.
+# Without this, each counter has a second, unused series.
 disable_created_metrics()
 
 
@@ -44,13 +44,13 @@ class Metrics:
         ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
-        """Count a request; `code` is 0 without an answer, `seconds` is the time until the answer's head."""
+        """Count a request; `code` is 0 without a response, `seconds` the time until the response's head."""
         self._requests.labels(verb, resource, str(code)).inc()
         if verb != "watch":
             self._request_seconds.labels(verb).observe(seconds)
 
     def waited(self, seconds: float) -> None:
-        """Count how long a key waited in the queue."""
+        """Record the seconds that a key waited in the queue."""
         self._queued.observe(seconds)
 
     def written(self, job: Object, status: Object) -> None:
@@ -102,7 +102,7 @@ class Metrics:
 
 
 class _Now(Collector):
-    """Gauges that are read at each scrape, so that a deleted job leaves none behind."""
+    """Gauges that are read at each scrape, so that a deleted job leaves no series behind."""
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ class _Now(Collector):
         self._outdated = outdated
 
     def collect(self) -> Iterator[Metric]:
-        """Yield each family; only the leader exports those of jobs, so that each job is counted once."""
+        """Yield each family; only the leader exports the gauges of jobs, so that each job is counted once."""
         leads = self._leads()
         yield metric_definitions.JOBS.metric(_by_phase(self._phases()) if leads else {})
         yield metric_definitions.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
@@ -138,14 +138,14 @@ def _from_zero(made: Counted, family: Family) -> Counted:
 
 
 def _by_phase(jobs: Iterable[tuple[str, str]]) -> Values:
-    """Return how many jobs of each namespace are in each phase."""
+    """Return the number of jobs by namespace and phase."""
     counted = Count(jobs)
     namespaces = sorted({namespace for namespace, _ in counted})
     return {(namespace, phase): counted[namespace, phase] for namespace in namespaces for phase in Phase}
 
 
 def _has_run(status: Object) -> bool:
-    """Return whether a job was running before, by its phase and by the starts of its trainers."""
+    """Return whether a job was running before, by its phase and its replicas' attempts."""
     begun = (replica.get("attempt", 0) > 1 or "target" in replica for replica in status.get("replicas", ()))
     return status.get("phase") == Phase.RUNNING or any(begun)
 

@@ -3,8 +3,8 @@
 Some facts are needed too rarely for a watch. The operator requests them only while a job waits for them:
 
 - the objects to which the job refers by name, and whether the cluster has Kueue;
-- why its pods cannot be created, and why Kueue does not admit it;
-- a Job of another owner that has one of our names.
+- the reasons for which its pods cannot be created, or Kueue does not admit it;
+- a Job of another owner that has a name of the job's own Jobs.
 """
 
 import time
@@ -45,9 +45,9 @@ from palaestra.operator.suspend_managers import SuspendManagers
 from palaestra.operator.world_verdicts import WorldChecker
 from palaestra.plan import GivenWorld
 
-RECHECK_S = 10.0  # while something may be missing
+RECHECK_S = 10.0  # while an object may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 10.0  # for which an answer about Kueue is reused
+KUEUE_S = 10.0  # for which the result of a request about Kueue is reused
 
 _READ = {
     ReferenceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -58,7 +58,7 @@ _READ = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """The observation of a TrainingJob; `again_s`: seconds until unwatched facts have to be read again."""
+    """The observation of a TrainingJob; `again_s`: seconds until unwatched facts must be read again."""
 
     observed: Observed
     again_s: float | None
@@ -70,9 +70,9 @@ class JobObserver:
     Args:
         api: the cluster.
         caches: the watched objects.
-        strangers: Jobs of other owners that have our names.
+        strangers: Jobs of other owners that have names of this operator's Jobs.
         denials: refused creations.
-        polled: returns the answers of the trainers, by the pod's uid.
+        polled: returns the responses of the trainers, by the pod's uid.
         checking: checks the worlds of jobs.
     """
 
@@ -100,7 +100,7 @@ class JobObserver:
         """Return the observation of a job.
 
         Raises:
-            ApiError: a request was necessary, and got no answer.
+            ApiError: a request was necessary, and failed.
         """
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
@@ -129,19 +129,19 @@ class JobObserver:
         )
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
-        """Return the observation of a job's copy, completed with all objects to which the whole job refers.
+        """Return the observation of a cached job, completed with all objects to which the whole job refers.
 
         Raises:
-            ApiError: there was no answer.
+            ApiError: a request failed.
         """
         observed, asked_s = self._asked(job, seen.observed)
         return replace(seen, observed=observed, again_s=earliest(seen.again_s, asked_s))
 
     def whole(self, raw: Raw) -> Raw:
-        """Return the whole TrainingJob of a cached copy, from the API server.
+        """Return the whole TrainingJob for a cached copy, from the API server.
 
         Raises:
-            ApiError: there was no answer.
+            ApiError: a request failed.
             Outdated: it has changed since the copy was made.
         """
         metadata = raw["metadata"]
@@ -160,7 +160,7 @@ class JobObserver:
             part.forget(key)
 
     def with_verdicts(self, job: TrainingJob, seen: Seen, worlds: Sequence[GivenWorld]) -> Seen:
-        """Return the observation of a job completed with the verdicts on its worlds, as far as known."""
+        """Return the observation of a job completed with the known verdicts on its worlds."""
         key = (job.metadata.namespace, job.metadata.name)
         if seen.observed.worlds_wait:
             return seen
@@ -168,9 +168,9 @@ class JobObserver:
         return replace(seen, observed=replace(seen.observed, verdicts=verdicts))
 
     def _with_claims(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
-        """Return the observation with the claims of trained replicas that only the cluster has.
+        """Return the observation with the claims of trained replicas that are not in the caches.
 
-        A claim that somebody restored may not have our labels.
+        A claim that a person restored may lack the operator's labels.
         """
         lacking, namespace = lacking_claims(job, observed), job.metadata.namespace
         claims = [ReferencedObject(kind=ReferenceKind.CLAIM, name=name) for name in lacking]
@@ -201,7 +201,7 @@ class JobObserver:
         except Forbidden:
             if source.kind is not ReferenceKind.SECRET:
                 raise
-            return {}  # no role for Secrets is bound here: the same as a Secret without the label
+            return {}  # no role for Secrets is bound here: treat it as a Secret without the label
 
     def _has_kueue(self) -> bool:
         at, found = self._kueue
@@ -212,5 +212,5 @@ class JobObserver:
 
 
 def earliest(*seconds: float | None) -> float | None:
-    """Return the shortest of several waits; None: there is none."""
+    """Return the shortest of several waits; None if all are None."""
     return min((second for second in seconds if second is not None), default=None)

@@ -19,7 +19,7 @@ class OperatorOptions:
     """The options of the command line.
 
     Attributes:
-        images: the release's own, for jobs that name none.
+        images: the release's own images, for jobs that do not name images.
         operator_namespace: the namespace of the operator and its Lease; its pods may connect to trainers.
         monitoring_namespace: the namespace whose pods may scrape trainers and simulators.
         namespaces: the namespaces whose jobs this operator runs; empty: all of them.
@@ -28,12 +28,12 @@ class OperatorOptions:
         leader_elect: whether to wait for the Lease.
         metrics_address: host and port of /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
-        host_users: whether training pods have the users of their nodes; if not, each has a user namespace.
-        allowed: what jobs may ask for beyond their own pods.
-        resources: of containers of jobs that mention none.
-        fixed_user: whether training pods name their user; if not, the cluster chooses one.
-        kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
-        context: of the kubeconfig; None: its current one.
+        host_users: whether training pods use the user IDs of their nodes; if not, each has a user namespace.
+        allowed: the settings beyond their own pods that jobs may have.
+        resources: resources of containers for which a job does not set any.
+        fixed_user: whether training pods set their user ID; if not, the cluster chooses one.
+        kubeconfig: the kubeconfig file; None: kubectl's default, or the pod's own service account.
+        context: the context of the kubeconfig; None: its current context.
     """
 
     images: Images
@@ -57,7 +57,7 @@ def address(text: str) -> Address:
     """Return the address `0.0.0.0:8080`; its host may be a name.
 
     Raises:
-        PalaestraError: the text is no address.
+        PalaestraError: the text is not an address.
     """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or int(port) > MOST_PORT:

@@ -1,8 +1,8 @@
-"""Why the pods of a Job cannot be created, cannot start or were ended: a quota, a volume, a failed probe.
+"""Reasons for which pods of a Job cannot be created, cannot start or were ended: a quota, volume or probe.
 
 Only events report this, and a watch of all events in a cluster is expensive. So the operator lists them
-(`palaestra.operator.rate_limited_lookup`) if a Job that should have a pod has none, or if a pod waits for its
-volumes. It also does so if a signal ended a trainer and the pod does not show why.
+(`palaestra.operator.rate_limited_lookup`) if a Job has no pod although it should, or if a pod waits for its
+volumes. It also lists them if a signal ended a trainer and the pod does not show the cause.
 """
 
 import time
@@ -15,11 +15,11 @@ from palaestra.observe import last_hindrance, was_signalled
 from palaestra.observe.json_access import holds, owners
 from palaestra.operator.rate_limited_lookup import Answers, RateLimitedLookup
 
-Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events with the reason
+Lacking = tuple[str, str]  # uid of a Job or pod, and a selector for the events with the reason
 
 
 class PodEvents(RateLimitedLookup[Lacking, Object]):
-    """The last event about each Job without a pod, pod without its volumes, and trainer ended by a signal.
+    """The last event about each Job without a pod, pod without its volumes, or trainer ended by a signal.
 
     Args:
         api: the cluster.
@@ -33,10 +33,10 @@ class PodEvents(RateLimitedLookup[Lacking, Object]):
     def of(
         self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]
     ) -> Answers[Lacking, Object]:
-        """Return the answers about those of a TrainingJob's `jobs` and `pods` that lack something.
+        """Return the events about those of a TrainingJob's `jobs` and `pods` that need an explanation.
 
         Raises:
-            ApiError: events had to be read, and there was no answer.
+            ApiError: the read of events failed.
         """
         return self.about(key, uid, list(_lacking(jobs, pods)))
 
@@ -56,7 +56,7 @@ def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
 
 
 def is_suspended(job: Object) -> bool:
-    """Return whether a Job is suspended, so that it creates no pods."""
+    """Return whether a Job is suspended; a suspended Job does not create pods."""
     return (job.get("spec") or {}).get("suspend") is True
 
 
@@ -73,7 +73,7 @@ def _lacking(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Lacking
 
 
 def _newest_of(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
-    """Yield the newest pod of each Job that has not ended; the status keeps the end of an older pod."""
+    """Yield the newest pod of each Job that has not ended; the status already has the end of an older pod."""
     for job in jobs:
         if holds(job, "Complete") or holds(job, "Failed"):
             continue
@@ -84,7 +84,7 @@ def _newest_of(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Objec
 
 
 def _wants_volumes(pod: Object) -> bool:
-    """Return whether a pod is on a node that has started no container, so its volumes may be missing."""
+    """Return whether a pod's node has not started a container of it yet, so its volumes may be missing."""
     waits = (pod.get("status") or {}).get("phase") == "Pending" and not holds(
         pod, "PodReadyToStartContainers"
     )

@@ -1,8 +1,9 @@
-"""Decide which trainer to poll next, and when; no clock, no sockets.
+"""Choose the next trainer to poll, and its time; no clock, no sockets.
 
 Each trainer has its own next time, so no trainer waits for the slowest one. The open requests share a limited
-number of places, and two rules keep a pod from taking those of others. Prompt trainers, new trainers and slow
-trainers have separate places. Among the trainers that wait for a place, the namespaces take turns.
+number of slots (`PLACES`), and two rules keep a pod from taking the slots of other pods. Prompt trainers, new
+trainers and slow trainers have separate slots. Among the trainers that wait for a slot, the namespaces take
+turns.
 """
 
 import heapq
@@ -13,14 +14,14 @@ from enum import Enum
 
 from palaestra.objects import Key
 
-FIRST_S = 1.0  # within which a new trainer is polled for the first time
+FIRST_S = 1.0  # a new trainer is polled for the first time within this time
 
 
 class PollStatus(Enum):
     """The result of the last request to a trainer."""
 
-    PROMPT = "prompt"  # it ended soon, with any result: a refused connection delays no other
-    NEW = "new"  # there was no request yet
+    PROMPT = "prompt"  # it ended soon, with any result: a refused connection does not delay others
+    NEW = "new"  # no request was sent yet
     SLOW = "slow"
 
 
@@ -28,7 +29,7 @@ PLACES = {
     PollStatus.PROMPT: 40,
     PollStatus.NEW: 16,
     PollStatus.SLOW: 8,
-}  # 64 answers of 64 KiB: 4 MiB at most
+}  # 64 responses of 64 KiB: 4 MiB at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +44,7 @@ class PollTarget:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PollState:
-    """The state of a target: the time and result of its last request, and whether an answer was refused."""
+    """The state of a target: time and result of its last request, whether a response was refused."""
 
     target: PollTarget
     standing: PollStatus = PollStatus.NEW
@@ -53,7 +54,7 @@ class PollState:
 
 @dataclass(slots=True)
 class _Turns:
-    """Entries that wait for a place: one of each namespace in turn, the longest waiting first."""
+    """Entries that wait for a slot: the namespaces take turns, and in each the longest waiting is first."""
 
     waiting: OrderedDict[str, deque[PollState]] = field(default_factory=OrderedDict)
 
@@ -71,12 +72,12 @@ class _Turns:
 
 
 class PollSchedule:
-    """Decides which targets to poll now. Times are seconds of a monotonic clock.
+    """Chooses the targets to poll now. Times are seconds of a monotonic clock.
 
     Args:
-        period_s: at most so many seconds between two requests to a trainer, while there are free places.
+        period_s: longest time in seconds between two requests to a trainer, while slots are free.
         prompt_s: seconds after which a request counts as slow.
-        spread: returns a random number from 0 to 1, so that a thousand trainers are not polled at once.
+        spread: returns a random number from 0 to 1, which spreads the requests to a thousand trainers.
     """
 
     def __init__(self, period_s: float, prompt_s: float, spread: Callable[[], float]) -> None:
@@ -90,7 +91,7 @@ class PollSchedule:
         self._free = dict(PLACES)
 
     def follow(self, targets: Collection[PollTarget], now_s: float) -> list[PollTarget]:
-        """Poll these targets from now on; return those that are dropped."""
+        """Replace the targets to poll; return the dropped ones."""
         wanted = {target.uid: target for target in targets}
         gone = [entry.target for uid, entry in self._entries.items() if wanted.get(uid) != entry.target]
         for target in gone:
@@ -102,7 +103,7 @@ class PollSchedule:
         return gone
 
     def due(self, now_s: float) -> Iterator[PollState]:
-        """Yield the targets to poll now; each occupies a place until `done`."""
+        """Yield the targets to poll now; each occupies a slot until `done`."""
         while self._times and self._times[0][0] <= now_s:
             entry = heapq.heappop(self._times)[-1]
             if self.follows(entry):
@@ -115,7 +116,7 @@ class PollSchedule:
                     yield found
 
     def done(self, entry: PollState, now_s: float) -> bool:
-        """Free the place of a request; return whether its target is still to be polled."""
+        """Free the slot of a request; return whether its target must still be polled."""
         self._free[entry.standing] += 1
         if not self.follows(entry):
             return False
@@ -126,11 +127,11 @@ class PollSchedule:
         return True
 
     def follows(self, entry: PollState) -> bool:
-        """Return whether a target is still to be polled."""
+        """Return whether a target must still be polled."""
         return self._entries.get(entry.target.uid) is entry
 
     def next_s(self) -> float | None:
-        """Return when the next target is due; None: there is none. A place may become free earlier."""
+        """Return the time at which the next target is due, or None. A slot may become free earlier."""
         return self._times[0][0] if self._times else None
 
     def _at(self, entry: PollState, due_s: float) -> None:

@@ -1,7 +1,7 @@
-"""The trainers to poll, updated by each event, so that no caller has to read all pods.
+"""The trainers to poll, updated by each event, so that callers need not read all pods.
 
-Labels alone do not make a pod a trainer: its Job must be known, and be owned by the same TrainingJob. Only
-the address and the owners of a pod are kept.
+Labels alone do not make a pod a trainer: its Job must be known, and the same TrainingJob must own the Job.
+Only the address and the owners of a pod are stored.
 """
 
 import ipaddress
@@ -22,7 +22,7 @@ class _Job:
 
 
 class PollTargets:
-    """The running trainers by the events of the caches; safe to read from any thread."""
+    """The running trainers, from the events of the caches; safe to read from any thread."""
 
     def __init__(self) -> None:
         self._training_jobs: dict[Key, str] = {}
@@ -84,7 +84,7 @@ def _trains(pod: Object) -> bool:
 
 
 def _address(pod: Object) -> str | None:
-    """Return a pod's IP address; None: it has none. A name is not resolved."""
+    """Return a pod's IP address, or None. A host name is not resolved."""
     try:
         return str(ipaddress.ip_address(text(part(pod, "status"), "podIP")))
     except ValueError:

@@ -1,8 +1,8 @@
-"""Poll the status of running trainers over the pod network, and trust none of the answers.
+"""Poll the status of running trainers over the pod network; the responses are untrusted.
 
-A pod runs programs that its author chose. So a whole answer has a deadline and a maximum size, and is parsed
-strictly. A missing or wrong answer means "unknown", never "stalled". Each answer is used as soon as it
-arrives; `schedule` decides which trainer to poll next. The results are in memory only, so a restarted
+A pod runs programs that its author chose. So a whole response has a deadline and a maximum size, and is
+parsed strictly. A missing or wrong response means "unknown", never "stalled". Each response is used as soon
+as it arrives; `poll_schedule` chooses the next trainer. The results are in memory only, so a restarted
 operator polls all trainers again.
 """
 
@@ -22,10 +22,10 @@ from palaestra.operator.poll_schedule import PollSchedule, PollState, PollStatus
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
-DEADLINE_S = 3.0  # of one whole answer
+DEADLINE_S = 3.0  # of one whole response
 PROMPT_SHARE = 1 / 3  # of the deadline; trainers answer in milliseconds
 FOLLOW_S = 1.0  # between updates of the list of trainers
-MOST_BYTES = 65_536  # of one answer, with room for the longest faults of 32 simulators
+MOST_BYTES = 65_536  # of one response, with room for the longest faults of 32 simulators
 MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 
@@ -36,10 +36,10 @@ class Poller:
     """Polls each target once a period, many at the same time, in one thread.
 
     Args:
-        targets: returns the trainers that run now.
-        changed: called with the key of a job whose trainer gave another answer than before.
+        targets: returns the running trainers.
+        changed: called with the key of a job whose trainer's response has changed.
         period_s: seconds between two requests to a trainer.
-        deadline_s: seconds that one whole answer may take; a third of it for the first request.
+        deadline_s: seconds that one whole response may take; for the first request a third of it.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Poller:
         self._thread.join(deadline_s)
 
     def known(self) -> Mapping[str, Polled]:
-        """Return the newest answers by the pod's uid; a pod without an answer last time is absent."""
+        """Return the newest responses by the pod's uid; a pod whose last request failed is absent."""
         return MappingProxyType(self._known)
 
     def _run(self) -> None:
@@ -117,22 +117,22 @@ class Poller:
         except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as error:
             log.debug("unreachable", job=target.key, pod=target.uid, error=type(error).__name__)
         except ProtocolError as error:
-            if not entry.refused:  # once for each pod, so that bad answers do not fill the log
+            if not entry.refused:  # once for each pod, so that bad responses do not fill the log
                 log.warning("answer refused", job=target.key, pod=target.uid, error=str(error))
             entry.refused = True
-        except Exception:  # the answer of one pod must not end the polling of all others
+        except Exception:  # the response of one pod must not end the polling of all others
             if not entry.refused:
-                log.exception("answer not read", job=target.key, pod=target.uid)
+                log.exception("response not read", job=target.key, pod=target.uid)
             entry.refused = True
         return None
 
 
 async def _get_status(target: PollTarget) -> bytes:
-    """Return the body of a trainer's answer.
+    """Return the body of a trainer's response.
 
     Raises:
         OSError: the trainer cannot be reached.
-        ProtocolError: the answer is malformed or too long.
+        ProtocolError: the response is malformed or too long.
     """
     reader, writer = await asyncio.open_connection(target.host, target.port, limit=MOST_HEAD_BYTES)
     try:
@@ -141,7 +141,7 @@ async def _get_status(target: PollTarget) -> bytes:
         head = await reader.readuntil(b"\r\n\r\n")
         version, _, status = head.partition(b"\r\n")[0].partition(b" ")
         if not version.startswith(b"HTTP/1.") or not status.startswith(b"200"):
-            raise ProtocolError("head: the answer is not 200 of HTTP")
+            raise ProtocolError("head: the response is not HTTP 200")
         return await _read_all(reader)
     finally:
         writer.transport.abort()  # no need to wait until the pod closes

@@ -1,7 +1,7 @@
-"""Confirm by reads that the cluster is still as it was at the decision, because a cache may lag.
+"""Confirm by reads that the cluster has not changed since the decision, because a cache may be behind.
 
-If it has changed, the actions are not done, and the next reconcile decides again. A change between the read
-and the write fails on a precondition of the write: the uid and the resourceVersion of the object.
+If it has changed, the actions are not executed, and the next reconcile decides again. After a change between
+the read and the write, the write fails on its precondition: the uid and the resourceVersion of the object.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,13 +21,13 @@ class Outdated(PalaestraError):
 
 
 def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
-    """Check that the TrainingJob is unchanged, and before a Job is created or stopped its pods too.
+    """Check that the TrainingJob is unchanged; before a Job is created or stopped, check its pods too.
 
-    So an ended replica is never trained again, and no replica has two pods. A replica that has started since
-    is not stopped, nor is its pod replaced, for a cause that has passed.
+    So an ended replica is never trained again, and no replica has two pods. If a replica has started since
+    the decision, it is not stopped and its pod is not replaced, because the cause has passed.
 
     Raises:
-        Outdated: one of them has changed.
+        Outdated: the TrainingJob or a pod has changed.
     """
     if not actions:
         return
@@ -53,7 +53,7 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
 
 
 def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
-    """Return whether a pod may still write to the volume of one of these Jobs, given by replica.
+    """Return whether a pod may still write to the volume of one of `jobs`, which has the Jobs by replica.
 
     A pod of an earlier TrainingJob of the same name can do so only if both mount the same claim.
     """
@@ -66,7 +66,7 @@ def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
 
 
 def _is_news(pod: Object, stop: Stop | Replace, raw: Object) -> bool:
-    """Return whether a pod of the replica to be stopped is new or has changed.
+    """Return whether a pod is new or has changed, and belongs to the replica to be stopped.
 
     A pod whose labels were edited no longer belongs to the replica, as in `observe`. Otherwise it would
     prevent the stop of the replica forever.

@@ -1,9 +1,9 @@
-"""Ask the API server about objects that lack something: rarely, in turns, and about a limited number.
+"""Look up facts about incomplete objects in the API server: rarely, in turns, and for a limited number.
 
-A watch would be expensive, and the answers are rarely needed. The first request about an object is sent after
-it has lacked something for some seconds, the next ones at growing pauses. All objects of one
-`RateLimitedLookup` share a few requests a second and a limited memory, so that thousands of them in a
-namespace delay no others.
+An incomplete object lacks a pod, a volume, an admission or a cause. A watch for the facts would be expensive,
+and they are rarely needed. The first request about an object is sent after it was incomplete for some
+seconds, the next ones after growing pauses. All objects of one `RateLimitedLookup` share a few requests a
+second and a limited memory, so that thousands of them in a namespace do not delay others.
 """
 
 import threading
@@ -16,7 +16,7 @@ from palaestra.objects import Key
 from palaestra.operator.bounded_cache import BoundedCache, Item
 
 PATIENCE_S = 5.0  # before the first request about an object
-RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the one before
+RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the previous one
 LONGEST_PAUSE_S = 300.0
 RATE = 4.0  # requests a second for all objects together; with one saved token, at most 5 in any second
 
@@ -26,12 +26,12 @@ Ask = Callable[[str, Item], Fact | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers(Generic[Item, Fact]):
-    """The answers about objects that lack something.
+    """The facts about incomplete objects.
 
     Attributes:
-        facts: the last answer about each; an object without one is absent.
-        unasked: objects for which there is no room; the operator sends no request about them.
-        again_s: seconds until the next reconcile has to ask again; None: nothing is lacking.
+        facts: the last fact about each; an object without a fact is absent.
+        unasked: objects for which the memory has no room; the operator sends no request about them.
+        again_s: seconds until the next reconcile must send a request; None: no object is incomplete.
     """
 
     facts: Mapping[Item, Fact]
@@ -41,7 +41,7 @@ class Answers(Generic[Item, Fact]):
 
 @dataclass(slots=True)
 class _Lack(Generic[Fact]):
-    """An object that lacks something: when to ask next, and the last answer."""
+    """An incomplete object: the time of the next request, and the last fact."""
 
     due: float
     pause_s: float = RECHECK_S
@@ -50,10 +50,10 @@ class _Lack(Generic[Fact]):
 
 
 class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
-    """The answers about objects that lack something, by TrainingJob and object.
+    """The facts about incomplete objects, by TrainingJob and object.
 
     Args:
-        ask: returns the answer about an object of a namespace; None: there is none.
+        ask: requests and returns the fact about an object of a namespace, or None.
         clock: a monotonic clock, in seconds.
     """
 
@@ -64,10 +64,10 @@ class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
         self._turns = _Turns(clock())
 
     def about(self, key: Key, uid: str, lacking: Collection[Item]) -> Answers[Item, Fact]:
-        """Return the answers about those objects of a TrainingJob that lack something.
+        """Return the facts about `lacking`, the incomplete objects of a TrainingJob.
 
         Raises:
-            ApiError: a request got no answer; the next one follows after a pause.
+            ApiError: a request failed; the next one follows after a pause.
         """
         known = self.known(key, uid)
         due = self._clock() + PATIENCE_S
@@ -84,7 +84,7 @@ class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
         )
 
     def _is_due(self, lack: _Lack[Fact]) -> bool:
-        """Return whether to ask now; if so, start the pause after that."""
+        """Return whether to send a request now; if so, start the pause after it."""
         now = self._clock()
         if now < lack.due:
             return False
@@ -97,7 +97,7 @@ class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
 
 
 class _Turns:
-    """Limits the rate: one token, and a queue of moments for objects that must wait."""
+    """Limits the rate: one token, and a queue of times for objects that must wait."""
 
     def __init__(self, now: float) -> None:
         self._lock = threading.Lock()
@@ -105,7 +105,7 @@ class _Turns:
         self._end = now  # of the queue
 
     def wait_s(self, now: float, *, queued: bool) -> float:
-        """Return the seconds to wait for a turn; 0: the turn is now."""
+        """Return the seconds until a turn; 0: the turn is now."""
         with self._lock:
             self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
             self._filled = now

@@ -17,7 +17,7 @@ class ReconcileRecords:
         self._known: dict[Key, tuple[str, ReconcileRecord]] = {}
 
     def of(self, key: Key, uid: str) -> ReconcileRecord:
-        """Return the record of the job with this uid; an empty one if there is none."""
+        """Return the record of the job with this uid, or an empty record."""
         with self._lock:
             known_uid, record = self._known.get(key, (uid, ReconcileRecord()))
         return record if known_uid == uid else ReconcileRecord()

@@ -1,7 +1,7 @@
 """Assemble the operator, run it until a signal, and stop it within two seconds.
 
-Only this module knows all parts. Reflectors watch the cluster from the start, so that a new leader begins at
-once. Workers begin when the caches are complete and this operator leads.
+Only this module knows all parts. Reflectors watch the cluster from the start, so that a new leader can work
+at once. Workers start when the caches are complete and this operator leads.
 """
 
 import signal
@@ -38,10 +38,10 @@ from palaestra.plan.layout import USER
 
 log = structlog.get_logger(__name__)
 
-# The two seconds in which the operator stops: for work in progress, for the Lease, for the rest.
+# Deadlines within the two seconds in which the operator stops: for work in progress, the Lease, the rest.
 FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
 SYNC_S = 1.0
-SETTLES_S = 0.1  # until related changes, such as all objects of one job, are in the caches
+SETTLES_S = 0.1  # after which related changes, such as all objects of one job, are in the caches
 FAILED = 1
 
 
@@ -50,7 +50,7 @@ class Operator:
 
     Args:
         api: the cluster.
-        options: of the command line.
+        options: the options of the command line.
         metrics: its metrics.
     """
 
@@ -117,7 +117,7 @@ class Operator:
         self._queue.add_after(key, SETTLES_S)
 
     def _stand(self) -> None:
-        """Lead, or stand for election; call it after the caches are complete, so that a leader can work."""
+        """Lead, or join the leader election; call it after the caches are complete."""
         if self._options.leader_elect:
             self._leadership.start(self._lead, self._gate.clear, self._look_at_all)
         else:
@@ -172,14 +172,14 @@ def run(options: OperatorOptions, metrics: Metrics | None = None) -> int:
     """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a thread failed.
 
     Raises:
-        PalaestraError: no API server is named, or the metrics' address is taken.
+        PalaestraError: no API server is configured, or the address of the metrics is in use.
     """
     configure_logs()
     stopping = threading.Event()
     broken: list[str] = []
 
     def break_down(failed: threading.ExceptHookArgs) -> None:
-        """Stop the operator if a thread fails, because a restart is better than half an operator."""
+        """Stop the operator if a thread fails, because a restart is better than an incomplete operator."""
         broken.append(failed.thread.name if failed.thread else "")
         log.critical("thread failed", thread=broken[-1], exc_info=failed.exc_value)
         stopping.set()

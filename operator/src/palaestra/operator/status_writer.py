@@ -1,7 +1,7 @@
 """Report the state of a job: one status write if it changed, then events.
 
 Events are written after the status, because an event about a change that was not written would be wrong.
-Progress alone is written rarely; conditions and phases at once.
+Progress alone is written rarely; conditions and phases are written at once.
 """
 
 import threading
@@ -27,7 +27,7 @@ class StatusWrite:
 
     Attributes:
         stored: the TrainingJob that the API server returned; None: no status was written.
-        again_s: seconds until delayed progress has to be written; None: no progress was delayed.
+        again_s: seconds until delayed progress must be written; None: no progress was delayed.
     """
 
     stored: Object | None = None
@@ -40,8 +40,9 @@ class StatusWriter:
     Args:
         writer: for the status.
         recorder: for the events.
-        written: called with each TrainingJob before the write, and with the written status.
-        accepted: returns the part of a status that the cluster's definition has, given the stored one.
+        written: called after each write with the old TrainingJob and the written status.
+        accepted: returns the part of a status that the cluster's definition allows; its first argument is the
+            stored status.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class StatusWriter:
         Raises:
             Conflict: the job has changed since the decision.
             Outdated: the job is gone.
-            NamespaceTerminating: the status was written, but no event can be written any more.
+            NamespaceTerminating: the status was written, but events can no longer be written.
             NotLeading: another operator may lead.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
@@ -100,7 +101,8 @@ class StatusWriter:
             self._count(raw, status)
         with self._lock:
             self._written[key] = clock_s
-            # An older definition prunes new fields, so the same patch would change nothing again.
+            # A cluster with an older definition prunes new fields, so the same patch would have no effect
+            # again.
             self._futile.pop(key, None)
             if not changed:
                 self._futile[key] = (version, patch)

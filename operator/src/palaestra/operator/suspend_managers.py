@@ -1,7 +1,7 @@
-"""The field manager that suspended or resumed a Job of ours, if it was not the operator.
+"""The field manager that suspended or resumed a Job of the operator, if it was not the operator itself.
 
-The caches have no managedFields, which are half of an object. So a Job whose `suspend` is not as the operator
-set it is read once for each change of its spec.
+The caches do not store managedFields, which are half of an object. So if the `suspend` of a Job differs from
+the operator's last value, the Job is read once for each change of its spec.
 """
 
 from collections.abc import Sequence
@@ -28,10 +28,10 @@ class SuspendManagers(BoundedCache[Change, str]):
         self._api = api
 
     def of(self, key: Key, uid: str, job: TrainingJob, jobs: Sequence[Raw]) -> dict[str, str]:
-        """Return the field manager for the uid of each Job that is not as the operator set it.
+        """Return the field manager by the uid of each Job whose `suspend` differs from the operator's value.
 
         Raises:
-            ApiError: a Job had to be read, and there was no answer.
+            ApiError: the read of a Job failed.
         """
         ours = ((raw, job_view(raw)) for raw in jobs if uid in owners(raw))
         differ = [(view.uid, raw) for raw, view in ours if overruled(job, view)]
@@ -45,5 +45,5 @@ class SuspendManagers(BoundedCache[Change, str]):
         metadata = raw["metadata"]
         try:
             return suspends(self._api.get(JOBS.only_metadata(), metadata["namespace"], metadata["name"]))
-        except NotFound:  # the cache hears of it soon
+        except NotFound:  # the cache receives the deletion soon
             return ""

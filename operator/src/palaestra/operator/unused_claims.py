@@ -1,8 +1,8 @@
-"""Delete the claims of TrainingJobs that are gone, if no volume was ever bound to them.
+"""Delete the claims of deleted TrainingJobs, if no volume was ever bound to them.
 
-A claim outlives its TrainingJob because it holds the run. A claim that was never bound holds nothing, but
-counts in quotas for ever. It has no owner, so the garbage collector leaves it. An owner until it is bound was
-rejected: if no operator removed the owner in time, the run would be deleted with the job.
+A claim outlives its TrainingJob because it holds the run. A claim that was never bound is empty, but counts
+in quotas forever. It has no owner, so the garbage collector does not delete it. A temporary owner, until the
+claim is bound, was rejected: if no operator removed the owner in time, the run would be deleted with the job.
 """
 
 import structlog
@@ -36,7 +36,7 @@ class UnusedClaims:
         """Delete the unused claims of earlier TrainingJobs of this name.
 
         Raises:
-            ApiError: a request failed, or a claim has changed meanwhile; reconcile again.
+            ApiError: a request failed, or a claim has changed in the meantime; reconcile again.
             NotLeading: another operator may lead.
         """
         job = self._caches.training_job(key)
@@ -49,7 +49,7 @@ class UnusedClaims:
                 self._delete(key, metadata["name"], metadata["uid"], metadata["resourceVersion"])
 
     def _uid(self, key: Key) -> str | None:
-        """Return the uid of the TrainingJob as the API server has it now; None: there is none."""
+        """Return the uid of the TrainingJob in the API server; None if it does not exist."""
         try:
             return str(self._api.get(TRAINING_JOBS.only_metadata(), *key)["metadata"]["uid"])
         except NotFound:

@@ -9,7 +9,7 @@ _WORDS = frozenset(reason.value for reason in WAITING)
 
 
 def waits(job: Object) -> tuple[str, ...]:
-    """Return the reason of each replica that waits, or that runs without a step so far."""
+    """Return the reason of each replica that waits, or that runs but has not done a step yet."""
     return tuple(
         text(replica, "reason")
         for replica in parts(job, "status", "replicas")

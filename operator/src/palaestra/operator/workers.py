@@ -1,6 +1,6 @@
 """Threads that take keys from the queue and reconcile them, each key in one thread at a time.
 
-One bad object never delays another. An error is logged with its key, counted, and retried at growing pauses,
+One bad object never delays another. After an error the key is logged, counted, and retried at growing pauses,
 while the other keys continue.
 """
 
@@ -16,8 +16,8 @@ from palaestra.objects import Key
 from palaestra.operator.fenced_client import NotLeading
 from palaestra.operator.preconditions import Outdated
 
-IDLE_S = 1.0  # between two checks whether to stop
-REPEATS = 4  # conflicts in a row before the first log line; then each power of two is logged
+IDLE_S = 1.0  # between two checks of the stop condition
+REPEATS = 4  # consecutive conflicts before the first log line; after that, each power of two is logged
 IN_DOUBT_S = 1.0  # between two tries of a key while a lease is in doubt
 STUCK_S = 300.0  # on one key; every call has a deadline, so no reconcile takes this long
 
@@ -32,9 +32,9 @@ class Workers:
     Args:
         queue: of keys.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
-        gate: no work begins while it is not set.
+        gate: no reconcile starts while it is not set.
         seconds: the histogram of durations, by `result`.
-        count: how many threads.
+        count: number of threads.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Workers:
                 thread.join(max(0.0, ends - time.monotonic()))
 
     def trouble(self) -> str | None:
-        """Return the problem of a thread that only a restart solves; None: there is none."""
+        """Return the problem of a thread that only a restart solves, or None."""
         now = time.monotonic()
         for thread in self._threads:
             if now - self._began.get(thread.name, now) > STUCK_S:
@@ -94,10 +94,10 @@ class Workers:
         """Reconcile one key, and return the result."""
         try:
             again_s = self._reconcile(key)
-        except (Conflict, Outdated) as error:  # another client wrote; the cache receives it soon
+        except (Conflict, Outdated) as error:  # another client wrote; the cache receives the change soon
             self._retry_conflict(key, error)
             return "conflict"
-        except NotLeading:  # another leader reconciles all jobs; but the lease may only be renewed late
+        except NotLeading:  # another leader reconciles all jobs; or this operator only renewed its Lease late
             self._queue.add_after(key, IN_DOUBT_S)
             return "conflict"
         except ApiError as error:
@@ -112,7 +112,7 @@ class Workers:
         return "done"
 
     def _retry_conflict(self, key: Key, error: Exception) -> None:
-        """Retry later; a single conflict is not logged, and a repeated one is logged less and less often."""
+        """Retry later; single conflicts are not logged, and repeated ones less and less often."""
         again_s = self._retry(key)
         times = self._queue.failures(key)
         if times >= REPEATS and times & (times - 1) == 0:

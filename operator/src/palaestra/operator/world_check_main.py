@@ -1,7 +1,8 @@
-"""The program that checks worlds: a process with a budget of time and memory, which it gives to itself.
+"""The program that checks worlds: a process that limits its own time and memory.
 
-It writes a line when it is ready. A request is a line of JSON and then the bytes of a world; the answer is
-the verdict as a line of JSON. It writes no file, and ends with its parent. Only the operator runs it, as
+It writes a line when it is ready. A request is a line of JSON and then the bytes of a world; the response is
+the verdict as a line of JSON. It does not write files, and ends with its parent. Only the operator runs it,
+as
 
     python -m palaestra.operator.world_check_main PARENT SECONDS MEBIBYTES
 """
@@ -22,7 +23,7 @@ from palaestra_sim.world import check
 
 MOST_CHARACTERS = 4096  # of the message of a refusal; a status shows fewer
 TOO_MUCH_MEMORY = "memory"
-_NICENESS = 5  # the operator itself comes first
+_NICENESS = 5  # the operator itself has priority
 _PR_SET_PDEATHSIG = 1  # Source: linux/prctl.h
 _OOM_SCORE = Path("/proc/self/oom_score_adj")
 
@@ -32,7 +33,7 @@ def main() -> None:
     parent, seconds, mebibytes = map(int, sys.argv[1:])
     _end_with(parent)
     _limit(mebibytes)
-    gc.disable()  # a tree of nodes has no cycles, and a collection walks all of it
+    gc.disable()  # a tree of nodes has no cycles, and a collection visits all of it
     _write({})
     for field, source in _requests():
         _give_time(seconds)
@@ -52,7 +53,7 @@ def _requests() -> Iterator[tuple[str, bytes]]:
 
 
 def _verdict(field: str, source: bytes) -> dict[str, str]:
-    """Return the refusal of a world, or the exceeded budget; {}: the world is fine."""
+    """Return the refusal of a world, or the exceeded budget; {} if the world is valid."""
     try:
         check(source, field)
     except WorldError as error:
@@ -66,12 +67,12 @@ def _end_with(parent: int) -> None:
     """Have the kernel kill this process as soon as its parent ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:  # it ended before
+    if os.getppid() != parent:  # the parent ended before this call
         sys.exit(1)
 
 
 def _limit(mebibytes: int) -> None:
-    """Bound the memory, write no file and no core, and be the first to end if the container has none left."""
+    """Limit the memory, forbid files and core dumps, and be the kernel's first choice if memory runs out."""
     _bound(resource.RLIMIT_AS, mebibytes << 20)
     _bound(resource.RLIMIT_CORE, 0)
     _bound(resource.RLIMIT_FSIZE, 0)
@@ -81,7 +82,7 @@ def _limit(mebibytes: int) -> None:
 
 
 def _give_time(seconds: int) -> None:
-    """Bound the processor time from now on; the kernel ends the process with SIGXCPU."""
+    """Limit the processor time from now on; the kernel ends the process with SIGXCPU."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     _bound(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + 1 + seconds)
 

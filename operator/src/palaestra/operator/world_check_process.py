@@ -1,7 +1,7 @@
-"""Check worlds in a process of its own, with a budget for each world.
+"""Check worlds in a separate process, with a budget for each world.
 
-A mistake in a check, such as one whose time grows with the square of a world's size, then costs the author's
-job, and not the operator that serves everybody.
+So an error in a check, for example a time that grows with the square of a world's size, affects only the
+author's job, and not the operator that serves all jobs.
 """
 
 import json
@@ -17,9 +17,9 @@ import structlog
 
 from palaestra.plan import GivenWorld, WorldVerdict
 
-SECONDS = 20  # of processor time for a world; the costliest of 900 kB takes 2
-MEBIBYTES = 144  # of address space; the costliest of 900 kB takes 135, and two fit into the container
-DEADLINE_S = 300.0  # for all worlds of a job; passing it is the fault of a busy node, not of a world
+SECONDS = 20  # of processor time for a world; the costliest known world of 900 kB takes 2
+MEBIBYTES = 144  # of address space; the costliest known of 900 kB takes 135, and two fit into the container
+DEADLINE_S = 300.0  # for all worlds of a job; it passes because of a busy node, not because of a world
 _CRASHES: Final = frozenset(  # 1: an exception, whose traceback is in the operator's log
     (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
 )
@@ -49,7 +49,7 @@ class WorldCheckProcess:
         self._stopped = False
 
     def check(self, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return the verdicts on worlds by digest; one that has none can be tried again."""
+        """Return the verdicts on worlds by digest; a world without a verdict can be checked again."""
         lines, code = self._answers(worlds)
         ready, lines = bool(lines), lines[1:]
         verdicts = {
@@ -62,7 +62,7 @@ class WorldCheckProcess:
         return verdicts
 
     def stop(self) -> None:
-        """End all checks; later ones return no verdict."""
+        """End all checks; later checks return no verdicts."""
         with self._lock:
             self._stopped = True
             for process in self._running:
@@ -77,7 +77,7 @@ class WorldCheckProcess:
                 return [], -signal.SIGKILL
             try:
                 process = subprocess.Popen([*command, *limits], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-            except OSError as error:  # no memory or no process left
+            except OSError as error:  # the memory or the number of processes is exhausted
                 log.warning("no process for a check", error=str(error))
                 return [], -signal.SIGKILL
             self._running.add(process)
@@ -98,7 +98,7 @@ class WorldCheckProcess:
         return WorldVerdict(problem=answer.get("problem", ""))
 
     def _ended(self, world: GivenWorld, code: int, *, ready: bool) -> WorldVerdict | None:
-        """Return the verdict on the world at which the program ended; None: another try may succeed."""
+        """Return the verdict on the world at which the program ended; None if a retry may succeed."""
         if code == -signal.SIGXCPU:
             return self._too_costly(world, f"{self._seconds} s of processor time")
         if ready and code in _CRASHES:

@@ -1,8 +1,8 @@
-"""The verdicts on the worlds of jobs: looked up, checked here if that costs nothing, else checked apart.
+"""The verdicts on the worlds of jobs. Small worlds are checked here, larger ones in a separate process.
 
-No worker waits for a check. Its reconcile finds that a verdict is missing and reports that the worlds are
-being checked; the verdict's arrival queues the job again. Worlds are not kept meanwhile: at its turn, a job
-is queued to hand them over.
+No worker waits for a check. A reconcile without a verdict reports that the worlds are being checked, and the
+verdict queues the job again. Worlds are not stored in the meantime: at its turn, a job is queued to hand them
+over.
 """
 
 import threading
@@ -15,11 +15,11 @@ from palaestra.plan import GivenWorld, WorldVerdict
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world import check
 
-MOST_BYTES_HERE = 16_384  # of a job's worlds that are checked by the worker itself, in less than 0.1 s
+MOST_BYTES_HERE = 16_384  # of a job's worlds that the worker itself checks, in less than 0.1 s
 AT_ONCE = 2  # checks of all namespaces together
 REMEMBERED = 4000  # verdicts, each with a message of at most 4 kB if it is a refusal
-HANDED_S = 10.0  # for a job to hand over its worlds at its turn; then the next one has it
-PAUSE_S = 5.0  # after a check without a verdict: the node is busy, or has no memory
+HANDED_S = 10.0  # for a job to hand over its worlds at its turn; after that, the next job has its turn
+PAUSE_S = 5.0  # after a check without a verdict: the node is busy, or is out of memory
 
 Apart = Callable[[Sequence[GivenWorld]], Mapping[str, WorldVerdict]]
 
@@ -28,7 +28,7 @@ class WorldChecker:
     """Checks the worlds of jobs.
 
     Args:
-        apart: checks worlds in a process of its own; returns the verdicts that it has come to.
+        apart: checks worlds in a separate process; returns the verdicts that it reached.
         wake: queues a job.
     """
 
@@ -37,7 +37,7 @@ class WorldChecker:
         self._wake = wake
         self._turns = FairQueue()
         self._lock = threading.Lock()
-        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()  # by digest, the one used last at the end
+        self._known: OrderedDict[str, WorldVerdict] = OrderedDict()  # by digest, the last used at the end
         self._stopped = threading.Event()
         self._threads = [
             threading.Thread(target=self._run, name=f"check {number}", daemon=True)
@@ -59,7 +59,7 @@ class WorldChecker:
         return self._turns.waits(key)
 
     def verdicts(self, key: Key, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return the verdicts on a job's worlds that are known; the others follow, and queue the job."""
+        """Return the known verdicts on a job's worlds; the others follow, and queue the job."""
         missing = [world for world in worlds if self._recall(world.digest) is None]
         if missing and sum(len(world.source) for world in missing) <= MOST_BYTES_HERE:
             self._remember({world.digest: _checked(world) for world in missing})

@@ -1,7 +1,7 @@
 """Turn a TrainingJob into the objects that it needs.
 
-Pure: the same job and layout, the same objects. No clock, no network, no randomness, so the plan of every
-example is recorded in tests/golden/, as a cluster gets it and as a laptop does.
+Pure: the same job and layout give the same objects. It uses no clock, network or randomness, so tests/golden/
+has the plan of every example, for a cluster and for a laptop.
 
     plan(job, layout).objects
 """
@@ -53,16 +53,16 @@ class ReplicaPlan:
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Return them in the order of their creation: a Job's pods need the other two."""
+        """Return the objects in the order of their creation: a Job's pods need the other two."""
         found = (self.config_map, self.claim, self.job)
         return tuple(part for part in found if part is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The objects of a TrainingJob: one for all of it, then those of the planned replicas, by index.
+    """The objects of a TrainingJob: one for the whole job, and those of the planned replicas, by index.
 
-    `network_policy` is None in a layout whose pods have no network of their own.
+    `network_policy` is None in a layout whose pods do not have their own network.
     """
 
     network_policy: Object | None
@@ -70,7 +70,7 @@ class Plan:
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Return all of them in the order of their creation: no pod is there before its policy."""
+        """Return all objects in the order of their creation: the network policy is created before any pod."""
         policy = () if self.network_policy is None else (self.network_policy,)
         return (*policy, *(obj for replica in self.replicas.values() for obj in replica.objects))
 
@@ -85,7 +85,7 @@ def plan(
     """Return the plan of a job that has a uid.
 
     `config_maps` holds the worlds of `configMap` sources, by name and key. `replicas` are the indices of the
-    replicas to plan; by default all of them. `verdicts` are the results of the checks of its
+    replicas to plan; by default all of them. `verdicts` are the results of the checks of the job's
     worlds; without them the worlds are checked here.
 
     Raises:
@@ -101,7 +101,7 @@ def plan(
 
 
 def identified(job: TrainingJob, uid: str) -> TrainingJob:
-    """Return the job as it is with a uid, for one that no cluster has given one to."""
+    """Return a copy of the job with a uid, for a job that has no uid from a cluster."""
     metadata = job.metadata.model_copy(update={"uid": uid})
     return job.model_copy(update={"metadata": metadata})
 

@@ -1,6 +1,6 @@
-"""Where the run of a replica is kept: a claim of its own, one that was there before, or the pod.
+"""The storage of a replica's run: its own claim, an existing claim, or the pod.
 
-And the claim with the policy that the run begins with, if the job names one.
+Also the claim with the initial policy of the run, if the job names one.
 """
 
 from hashlib import sha256
@@ -11,15 +11,16 @@ from palaestra.errors import PlanError
 from palaestra.plan.replica import TRAINER, Replica
 
 INITIAL = "initial-policy"
-LONGEST_NAME = 63  # of a label's value and of a cloud's tag, into which provisioners put the name of a claim
-DIGITS = 12  # hexadecimal, of a name that would be longer
+# Provisioners copy the name of a claim into a label's value or a cloud's tag, which have this limit.
+LONGEST_NAME = 63
+DIGITS = 12  # hexadecimal digits in a shortened name
 
 
 def claim(replica: Replica) -> dict[str, Any] | None:
-    """Return the replica's own PersistentVolumeClaim, or None when the job wants none.
+    """Return the replica's own PersistentVolumeClaim, or None if the job uses other storage.
 
-    Its name depends on the job's uid: a job that is deleted and made again starts anew, beside the old run.
-    It has no owner, so that it outlives the job, unless the job says `retain: Delete`.
+    Its name depends on the job's uid: a job that is deleted and created again starts a new run, and the old
+    run stays. With `retain: Keep` it has no owner, so it outlives the job.
     """
     storage = replica.job.spec.storage
     if storage.ephemeral or storage.existing_claim is not None:
@@ -39,7 +40,7 @@ def claim(replica: Replica) -> dict[str, Any] | None:
 
 
 def run_volume(replica: Replica) -> dict[str, Any]:
-    """Return the volume on which the run directory lies."""
+    """Return the volume with the run directory."""
     storage = replica.job.spec.storage
     if storage.ephemeral:
         return {"name": "run", "emptyDir": {"sizeLimit": storage.size}}
@@ -48,9 +49,9 @@ def run_volume(replica: Replica) -> dict[str, Any]:
 
 
 def initial_volume(replica: Replica) -> dict[str, Any] | None:
-    """Return the volume with the initial policy; None: there is none, or it is the run's own volume.
+    """Return the volume with the initial policy; None without one, or if it is the run's own volume.
 
-    A pod must not have one claim as two volumes: some drivers then never mount it.
+    A pod must not have two volumes of one claim: some drivers then never mount it.
     """
     initial = replica.job.spec.trainer.initial_policy
     if initial is None or initial.claim in {None, replica.job.spec.storage.existing_claim}:
@@ -59,10 +60,10 @@ def initial_volume(replica: Replica) -> dict[str, Any] | None:
 
 
 def initial_path(replica: Replica) -> str | None:
-    """Return the path of the initial policy for the trainer; None: there is none.
+    """Return the path of the initial policy for the trainer, or None.
 
     Raises:
-        PlanError: it is on a claim, and there are no claims here.
+        PlanError: it is on a claim, and this layout has no claims.
     """
     initial = replica.job.spec.trainer.initial_policy
     if initial is None:
@@ -81,7 +82,7 @@ def initial_path(replica: Replica) -> str | None:
 def claim_name(job: str, index: int, uid: str) -> str:
     """Return the name of the claim of a job's replica: `<job>-<replica>-<uid>`.
 
-    If that is too long, the job's name is cut, and a hash over all of it takes the place of the uid.
+    If that is too long, the job's name is cut, and a hash of the whole name replaces the uid.
     """
     whole = f"{job}-{index}-{uid}"
     if len(whole) <= LONGEST_NAME:

@@ -1,4 +1,4 @@
-"""The ConfigMap of a replica: its training.yaml and the source worlds of its groups, for anyone to read."""
+"""The ConfigMap of a replica: its training.yaml and the source worlds of its groups, as readable text."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ from palaestra.plan.worlds import FOLDER
 
 
 def config_map(replica: Replica, worlds: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the ConfigMap; its name ends in a hash of its content, as neither ever changes."""
+    """Return the ConfigMap; its content never changes, and its name ends in a hash of the content."""
     data = {
         FILE: training_yaml(replica, worlds).decode(),
         **{name: content.decode() for name, content in worlds.items()},
@@ -27,7 +27,7 @@ def config_map(replica: Replica, worlds: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def config_volume(planned: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the volume that shows a ConfigMap as training.yaml and a folder of worlds."""
+    """Return the volume that mounts a ConfigMap as training.yaml and a folder of worlds."""
     return {
         "name": "config",
         "configMap": {

@@ -17,23 +17,23 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # of a probe; the ROS master's waits as long in one try
+PERIOD_S = 10  # of a probe; one try of the ROS master's probe waits as long
 BUILT_IN = "palaestra-train"  # the program of a job without a command
 SECURITY = {
     "allowPrivilegeEscalation": False,
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
-# Process 1 of a container ends at a signal only if it asks for it, which rosmaster does not: without
-# somebody before it, a pod would stay for its whole grace period.
+# A signal ends process 1 of a container only if the process handles it, and rosmaster does not. Without this
+# shell as process 1, a pod would stay for its whole grace period.
 ROS_MASTER_PROGRAM = "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!"
-# One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
-# quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
+# One try waits for the port itself: a kubelet's shortest period is a second, and the master starts in a
+# quarter of a second. The port is on loopback, which a kubelet's own TCP probe cannot reach.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 
 def ros_master(replica: Replica) -> Container:
-    """Return the ROS master: no parameter of it is shared by anything but loopback."""
+    """Return the ROS master, which is reachable on loopback only."""
     port = replica.layout.ports.ros_master
     probe = ["bash", "-c", MASTER_ANSWERS.format(host=LOOPBACK, port=port)]
     return {
@@ -53,7 +53,7 @@ def ros_master(replica: Replica) -> Container:
 
 
 def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, bytes]) -> Container:
-    """Return the sidecar of one simulator, which starts it when the trainer asks."""
+    """Return the sidecar of one simulator, which starts the simulator when the trainer requests it."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
     quantities = planned.resources(group.resources, _least(replica, group.driver))
@@ -72,7 +72,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
         "command": [program],
         "args": _arguments(replica, simulator, world_path(replica, simulator, worlds)),
         "ports": [_port(f"sim-{simulator.place}", ports.health[simulator.place])],
-        # Without a startup probe: if the first start of a sidecar with one fails, kubelets before 1.34.3
+        # It has no startup probe: if the first start of a sidecar with one fails, kubelets before 1.34.3
         # never start the trainer (Kubernetes issue 132826).
         "livenessProbe": {
             "initialDelaySeconds": min(group.start_deadline_seconds, _start_s(replica)),
@@ -83,7 +83,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
 
 
 def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> list[str]:
-    """Return the options of a sidecar, none of which refers to a variable."""
+    """Return the options of a sidecar, without references to variables."""
     group, layout = simulator.group, replica.layout
     words = [
         f"--driver={group.driver.value}",
@@ -100,7 +100,7 @@ def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> lis
 
 
 def trainer(replica: Replica) -> Container:
-    """Return the trainer: the built-in loop, or the job's own program in its place."""
+    """Return the trainer: the built-in loop, or the job's custom program."""
     spec, places = replica.job.spec.trainer, replica.places(TRAINER)
     port = replica.layout.ports.status
     least = planned.by_default(replica.layout.resources.trainer, planned.TRAINER)
@@ -114,15 +114,15 @@ def trainer(replica: Replica) -> Container:
         "terminationMessagePolicy": "FallbackToLogsOnError",
         **_common(replica, TRAINER, planned.resources(spec.resources, least), spec.env),
     }
-    if not spec.command:  # a program of the job's own need not serve anything
-        # Importing PyTorch takes a busy node minutes, before anything can answer.
+    if not spec.command:  # a custom program need not serve HTTP
+        # On a busy node the import of PyTorch takes minutes, and the trainer cannot respond before it.
         container["startupProbe"] = {**_healthz(port), "failureThreshold": _tries(replica)}
         container["livenessProbe"] = _alive(port)
     return container
 
 
 def install_sidecar(replica: Replica) -> Container | None:
-    """Return the init container that copies the sidecar for users' own images; None: not needed."""
+    """Return the init container that copies the sidecar for users' own images, or None if not needed."""
     groups = replica.job.spec.simulators
     if replica.places(SIDECAR).sidecar is None or not any(group.driver is Driver.COMMAND for group in groups):
         return None
@@ -131,7 +131,8 @@ def install_sidecar(replica: Replica) -> Container | None:
         "name": INSTALL_SIDECAR,
         "image": replica.layout.images.stub,
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
-        # The contents of the folder only: cp may not set the times of the volume's own folder.
+        # It copies only the contents of the folder, because cp may not set the times of the volume's own
+        # folder.
         "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
         "terminationMessagePolicy": "FallbackToLogsOnError",
         "securityContext": SECURITY,
@@ -141,14 +142,14 @@ def install_sidecar(replica: Replica) -> Container | None:
 
 
 def shared_memory(container: str) -> str:
-    """Return the name of the volume that a simulator's or the trainer's container has for shared memory."""
+    """Return the name of the shared-memory volume of a simulator's or the trainer's container."""
     return f"memory-{container}"
 
 
 def _common(
     replica: Replica, container: str, quantities: planned.Planned, own: tuple[Variable, ...]
 ) -> Container:
-    """Return what every container has: environment, resources, security and mounts."""
+    """Return the fields of every container: environment, resources, security context and mounts."""
     places = replica.places(container)
     env = {
         **_environment(replica, container, planned.threads(quantities)),
@@ -168,12 +169,12 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
         "ROS_MASTER_URI": f"http://{LOOPBACK}:{replica.layout.ports.ros_master}",
         "ROS_HOSTNAME": "localhost",
         "ROS_HOME": f"{places.scratch}/ros",
-        # A folder that is there: one that ROS makes it would give the owner of a volume, which is root.
+        # Must exist already: ROS would give a new folder to the volume's owner, root.
         "ROS_LOG_DIR": places.scratch,
         "PALAESTRA_CONFIG": f"{places.config}/{FILE}",
         "PALAESTRA_RUN": places.run,
         "OMP_NUM_THREADS": str(threads),
-        "PYTHONUNBUFFERED": "1",  # a log is read while it is written
+        "PYTHONUNBUFFERED": "1",  # people read the log while it is written
         **({"HOME": places.home} if places.home is not None else {}),
         **({"PALAESTRA_TERMINATION_LOG": places.termination} if container == TRAINER else {}),
     }
@@ -226,7 +227,7 @@ def _simulator_image(replica: Replica, simulator: PlannedSimulator) -> str:
 
 
 def _least(replica: Replica, driver: Driver) -> Resources:
-    """Return the resources of a simulator whose job asks for none."""
+    """Return the default resources of a simulator."""
     release = planned.MUJOCO if driver is Driver.MUJOCO else planned.SIMULATOR
     return planned.by_default(replica.layout.resources.simulator, release)
 
@@ -247,7 +248,7 @@ def _port(name: str, number: int) -> dict[str, Any]:
 
 
 def _healthz(port: int) -> dict[str, Any]:
-    """Return a probe that asks a container whether it is alive."""
+    """Return a probe that sends a container the request GET /healthz."""
     return {
         "httpGet": {"path": "/healthz", "port": port},
         "periodSeconds": PERIOD_S,
@@ -256,12 +257,12 @@ def _healthz(port: int) -> dict[str, Any]:
 
 
 def _alive(port: int) -> dict[str, Any]:
-    """Return a liveness probe that bears a minute of a busy node."""
+    """Return a liveness probe that tolerates a minute of a busy node."""
     return {**_healthz(port), "failureThreshold": 6}
 
 
 def _tries(replica: Replica) -> int:
-    """Return how often a startup probe may fail: for as long as the replica may wait for its first step."""
+    """Return the allowed failures of a startup probe, by the replica's time for its first step."""
     return math.ceil(_start_s(replica) / PERIOD_S)
 
 

@@ -1,4 +1,4 @@
-"""The batch/v1 Job of a replica, which makes its pods, one at a time."""
+"""The batch/v1 Job of a replica, which creates its pods, one at a time."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,15 +7,16 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra_protocol.pod.status import ExitCode
 
 QUEUE_LABEL = "kueue.x-k8s.io/queue-name"
-SUSPEND_SET = "palaestra.dev/suspend-set"  # annotation: the spec.suspend that the operator set last
+SUSPEND_SET = "palaestra.dev/suspend-set"  # annotation: the `spec.suspend` that the operator last set
 GIVEN_UP = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET, ExitCode.DIVERGED)
 
 
 def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the Job; its deadline is the operator's, which does not count suspended time.
+    """Return the Job; the operator enforces the job's deadline, because it does not count suspended time.
 
-    With a queue it is made suspended, and Kueue sets `spec.suspend` from then on. Without one an annotation
-    holds what the operator set, so that a change by anybody else is seen as such and left alone.
+    With a queue it is created suspended, and Kueue sets `spec.suspend` from then on. Without a queue an
+    annotation holds the operator's value, so that the operator recognizes another client's change and keeps
+    it.
     """
     queue, suspend = replica.job.spec.scheduling.queue_name, replica.job.spec.suspend
     metadata = replica.metadata(replica.name)
@@ -29,7 +30,7 @@ def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
         "metadata": metadata,
         "spec": {
             "backoffLimit": replica.job.spec.backoff_limit,
-            "podReplacementPolicy": "Failed",  # one writer: the old pod is gone before the next
+            "podReplacementPolicy": "Failed",  # one writer: the old pod has ended before the next
             "podFailurePolicy": {"rules": _failure_rules()},
             "suspend": queue is not None or suspend,
             "template": template,
@@ -43,9 +44,9 @@ def suspend_set(*, suspend: bool) -> dict[str, str]:
 
 
 def _failure_rules() -> list[dict[str, Any]]:
-    """Return what the end of a pod means, in order; what matches no rule is tried again, counted.
+    """Return the rules for failed pods, in order; a failure without a rule is counted and retried.
 
-    The trainer is always named: a rule without a name would match the sidecars' exit codes too.
+    The rules always name the trainer: a rule without a name would match the sidecars' exit codes too.
     """
     disrupted = {"type": "DisruptionTarget", "status": "True"}
     return [

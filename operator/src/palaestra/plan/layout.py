@@ -1,6 +1,6 @@
-"""What differs between a cluster and a laptop: ports, places and images. Nothing else does.
+"""The differences between a cluster and a laptop: ports, paths, images and a few settings of pods.
 
-A layout is given to `plan` and only read there; nothing is edited after planning.
+`plan` receives a layout and only reads it; the planned objects are not edited later.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,14 +12,14 @@ from palaestra.plan.resources import NO_DEFAULTS, Defaults
 
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
-CONTROL_PORTS = range(7100, 7200)  # of the k-th simulator of a pod; a pod has 32 at most
+CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32
 HEALTH_PORTS = range(7200, 7300)
-USER = 65532  # uid, gid and fsGroup of everything in a pod, as in the images
+USER = 65532  # uid, gid and fsGroup of a pod, as in the images
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ports:
-    """The ports of one replica; `control` and `health` are indexed by the simulator's place."""
+    """The ports of one replica; `control` and `health` are indexed by the simulator's number in the pod."""
 
     ros_master: int = ROS_MASTER_PORT
     status: int = STATUS_PORT
@@ -29,7 +29,7 @@ class Ports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Images:
-    """The release's own images, for jobs that name none."""
+    """The release's own images, for jobs that do not name images."""
 
     trainer: str
     stub: str
@@ -49,12 +49,12 @@ class Images:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContainerPaths:
-    """Where things lie for the containers of one replica; absolute paths.
+    """The absolute paths in the containers of one replica.
 
-    `volume` is where the claim is mounted and `run` the run directory on it. `home` is given where
-    the image's own cannot be written, `shared_memory` where the default is too small for a simulator,
-    and `sidecar` where `palaestra-sidecar` has to be copied into a user's image. A claim with an initial
-    policy is mounted at `initial`.
+    The claim is mounted at `volume`, and `run` is the run directory on it. `home` is set if the image's own
+    home is read-only, `shared_memory` if the default is too small for a simulator, and `sidecar` if
+    `palaestra-sidecar` must be copied into a user's image. A claim with an initial policy is mounted at
+    `initial`.
     """
 
     config: str
@@ -70,11 +70,11 @@ class ContainerPaths:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """What the jobs of a cluster may ask for beyond their own pods, as its installation allows it.
+    """The settings beyond their own pods that an installation allows to the jobs of a cluster.
 
     Attributes:
         pod_labels: keys of labels that jobs may give their pods, or domains that end in `/`.
-        pod_annotations: the same of annotations.
+        pod_annotations: the same for annotations.
         priority_classes: names.
         runtime_classes: names.
         tolerations: keys of taints, or domains that end in `/`.
@@ -93,11 +93,11 @@ class Allowed:
 
 
 class Layout(Protocol):
-    """A cluster's or a laptop's."""
+    """The layout of a cluster or of a laptop."""
 
     @property
     def images(self) -> Images:
-        """The images for jobs that name none."""
+        """The images for jobs that do not name images."""
         ...
 
     @property
@@ -107,37 +107,37 @@ class Layout(Protocol):
 
     @property
     def health_host(self) -> str:
-        """The address on which health and metrics are served."""
+        """The address at which health and metrics are served."""
         ...
 
     @property
     def longest_start_s(self) -> int | None:
-        """The seconds to which the start of a container is bounded here; None: only as the job bounds it."""
+        """The limit for the start of a container in seconds; None: only the job limits it."""
         ...
 
     @property
     def operator_namespace(self) -> str | None:
-        """Where the operator runs, whose pods may ask the trainers; None: no pod has a network."""
+        """The operator's namespace, whose pods may connect to trainers; None if pods share a network."""
         ...
 
     @property
     def monitoring_namespace(self) -> str | None:
-        """Where metrics are gathered; None: no pod has a network."""
+        """The namespace that collects metrics; None if pods share a network."""
         ...
 
     @property
     def node_selector(self) -> Mapping[str, str]:
-        """Labels that the node of every pod must have, unless the job gives such a label itself."""
+        """Labels that the node of every pod must have, unless the job sets such a label itself."""
         ...
 
     @property
     def host_users(self) -> bool:
-        """Whether the users in a pod are those of its node; False: each pod has a user namespace."""
+        """Whether pods use the user IDs of their nodes; False: each pod has a user namespace."""
         ...
 
     @property
     def resources(self) -> Defaults:
-        """Requests and limits of containers of jobs that mention none."""
+        """Requests and limits of containers for which a job does not set any."""
         ...
 
     @property
@@ -146,21 +146,21 @@ class Layout(Protocol):
         ...
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
-        """Return where things lie for a container of a replica of the job with `uid`."""
+        """Return the paths for a container of a replica of the job with `uid`."""
         ...
 
     def another_run(self, uid: str, replica: int) -> str:
         """Return the run directory of a replica of the job with `uid`, on the same volume.
 
         Raises:
-            PlanError: no two jobs share a volume here.
+            PlanError: in this layout, jobs cannot share a volume.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
-    """Every pod has a network and a file system of its own, so places and ports are always the same."""
+    """Every pod has its own network and file system, so paths and ports are always the same."""
 
     images: Images
     ports: Ports = Ports()
@@ -175,7 +175,7 @@ class ClusterLayout:
     user: int | None = USER
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
-        """Return the same places for every container; runs are kept apart by the job's uid."""
+        """Return the same paths for every container; the job's uid separates the runs."""
         return ContainerPaths(
             config="/etc/palaestra",
             volume="/var/lib/palaestra",
@@ -189,13 +189,13 @@ class ClusterLayout:
         )
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Return the folder that is the run's own there."""
+        """Return the run's own folder on the volume."""
         return f"/var/lib/palaestra/{uid}/{replica}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalLayout:
-    """All containers share this machine: everything lies in the run directory, on loopback.
+    """All containers share this machine: all files are in the run directory, all ports on loopback.
 
     `job_directory` is the absolute folder of the job's replicas, `<dir>/<job name>`.
     """
@@ -204,7 +204,7 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     health_host: str = "127.0.0.1"
-    longest_start_s: int = 600  # a person waits for it, and nothing is pulled or mounted
+    longest_start_s: int = 600  # a person waits for it, and no image is pulled and no volume is mounted
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
@@ -213,7 +213,7 @@ class LocalLayout:
     user: int = USER
 
     def places(self, uid: str, replica: int, container: str) -> ContainerPaths:
-        """Return the places of one container, all below `<job_directory>/<replica>`."""
+        """Return the paths of one container, all below `<job_directory>/<replica>`."""
         run = f"{self.job_directory}/{replica}"
         return ContainerPaths(
             config=run,
@@ -224,9 +224,9 @@ class LocalLayout:
         )
 
     def another_run(self, uid: str, replica: int) -> str:
-        """Refuse: a laptop has no claims."""
+        """Raise an error, because a laptop has no claims."""
         raise PlanError(
-            "spec.storage.resumeFrom: names a run on a claim of a cluster, which is not to be had here; "
+            "spec.storage.resumeFrom: names a run on a claim of a cluster, but this machine has no claims; "
             "remove it. A job that is run again resumes from its own run directory, and more "
             "spec.trainer.steps prolong it"
         )

@@ -1,8 +1,8 @@
-"""The NetworkPolicy of a job's pods: the second layer behind loopback, as ROS 1 has no authentication.
+"""The NetworkPolicy of a job's pods: a second protection after loopback, because ROS 1 has no authentication.
 
 Ingress: metrics, the trainer's status and the simulators' states, from the operator's pods and from the
-monitoring namespace. What the containers of a pod say to each other is on loopback, which no policy sees;
-a node always reaches the pods on it, for their probes. Egress is free unless the job closes it.
+monitoring namespace. The containers of a pod communicate on loopback, to which policies do not apply; a node
+always reaches its pods, for their probes. Egress is open unless the job closes it.
 """
 
 from typing import Any
@@ -13,14 +13,15 @@ from palaestra.plan.layout import HEALTH_PORTS, Layout
 from palaestra.plan.replica import JOB_LABEL, UID_LABEL, owner, uid_of
 
 OPERATOR_LABEL = "palaestra.dev/operator"
-NAMESPACE_LABEL = "kubernetes.io/metadata.name"  # which every API server sets itself
+NAMESPACE_LABEL = "kubernetes.io/metadata.name"  # every API server sets this label itself
 SHORT_UID = 8
 
 
 def network_policy(job: TrainingJob, layout: Layout) -> dict[str, Any] | None:
-    """Return the NetworkPolicy of all pods of the job; None where pods have no network of their own.
+    """Return the NetworkPolicy of all pods of the job; None if pods have no network of their own.
 
-    Its name holds the start of the job's uid, so that a job that is made again meets no old one.
+    Its name has the start of the job's uid, so that it differs from the policy of an earlier job of this
+    name.
 
     Raises:
         PlanError: the job has no uid.

@@ -1,4 +1,4 @@
-"""The pod template of a replica: containers in order, volumes, and what *restricted* security asks."""
+"""The pod template of a replica: containers in order, volumes, and the settings of *restricted* security."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
-GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot notice
+GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot node's notice
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"
 
@@ -18,7 +18,7 @@ MEMORY_SIZE = "128Mi"
 def pod_template(
     replica: Replica, config_map: Mapping[str, Any], worlds: Mapping[str, bytes]
 ) -> dict[str, Any]:
-    """Return the template; `config_map` is the replica's, `worlds` are those in it."""
+    """Return the template; `config_map` is the replica's, `worlds` are the worlds in it."""
     installed = install_sidecar(replica)
     init = [
         *([installed] if installed else []),
@@ -63,7 +63,7 @@ def _security(user: int | None) -> dict[str, Any]:
 
 
 def _metadata(replica: Replica) -> dict[str, Any]:
-    """Return labels and annotations; the job's own labels never replace ours."""
+    """Return labels and annotations; the job's own labels never replace the operator's."""
     scheduling = replica.job.spec.scheduling
     metadata: dict[str, Any] = {"labels": {**scheduling.pod_labels, **replica.labels}}
     if scheduling.pod_annotations:
@@ -72,7 +72,7 @@ def _metadata(replica: Replica) -> dict[str, Any]:
 
 
 def _scheduling(replica: Replica) -> dict[str, Any]:
-    """Return the fields of a pod that the job's `scheduling` and pull secrets fill."""
+    """Return the fields of a pod from the job's `scheduling` and pull secrets."""
     spec, scheduling = replica.job.spec, replica.job.spec.scheduling
     given = scheduling.model_dump(mode="json", by_alias=True, exclude_none=True)
     given["nodeSelector"] = {**replica.layout.node_selector, **scheduling.node_selector}
@@ -86,7 +86,7 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
 def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
     """Return the size of each container's shared memory by the name of its volume.
 
-    The trainer's own memory limit bounds what it shares with its workers.
+    The trainer's own memory limit is the limit for the memory that it shares with its workers.
     """
     return {
         shared_memory(TRAINER): main["resources"]["limits"]["memory"],
@@ -98,7 +98,7 @@ def _sizes(replica: Replica, main: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return an empty volume for every mount that has no other: each container has its own."""
+    """Return an empty volume for every mount without another volume: each container has its own."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [
         {"name": name, "emptyDir": _empty(name, memory)}

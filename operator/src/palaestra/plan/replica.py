@@ -1,7 +1,7 @@
-"""One replica of a job, resolved: what all its objects are made from.
+"""One replica of a job in a layout: the input for all its objects.
 
-Names are deterministic, so that a second operator, or the same one after a crash, makes the same
-objects again and is refused by the API server.
+Names are deterministic. If a second operator, or the same one after a crash, creates the same objects again,
+the API server refuses them.
 """
 
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from palaestra_sim.world import RunIdentity
 
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
-UID_LABEL = "palaestra.dev/job-uid"  # a job that is made again has the name of the one before
+UID_LABEL = "palaestra.dev/job-uid"  # a job that is created again has the name of the earlier job
 RESTART_LOST_RUNS = "palaestra.dev/restart-lost-runs"  # annotation of a TrainingJob: any new value
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"
 INSTALL_SIDECAR = "install-sidecar"
-SIMULATOR_PREFIX = "sim-"  # of a container's name; the simulator's name follows
+SIMULATOR_PREFIX = "sim-"  # the start of a container's name; the simulator's name follows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedSimulator:
-    """One simulator of a replica; `place` counts all of the pod's, in the order of the job."""
+    """One simulator of a replica; `place` is its number among all simulators of the pod, from 0."""
 
     group: SimulatorGroup
     identity: RunIdentity
@@ -41,7 +41,7 @@ class PlannedSimulator:
 
     @property
     def keeps_clock(self) -> bool:
-        """Return whether it publishes /clock: one simulator of a ROS master at most may."""
+        """Return whether it publishes /clock: only one simulator of a ROS master may do so."""
         return self.place == 0
 
 
@@ -57,7 +57,7 @@ def uid_of(job: TrainingJob) -> str:
 
 
 def owner(job: TrainingJob) -> dict[str, object]:
-    """Return the owner reference of what goes with the TrainingJob."""
+    """Return the owner reference of objects that are deleted with the TrainingJob."""
     return {
         "apiVersion": job.api_version,
         "kind": job.kind,
@@ -87,7 +87,7 @@ class Replica:
 
     @property
     def name(self) -> str:
-        """Return `<job>-<replica>`, the name of its Job; no two jobs of a namespace share one."""
+        """Return `<job>-<replica>`, the name of its Job, which is unique in its namespace."""
         return f"{self.job.metadata.name}-{self.index}"
 
     @property
@@ -100,11 +100,11 @@ class Replica:
         )
 
     def places(self, container: str) -> ContainerPaths:
-        """Return where things lie for one of its containers."""
+        """Return the paths for one of its containers."""
         return self.layout.places(self.uid, self.index, container)
 
     def metadata(self, name: str, *, owned: bool = True) -> dict[str, object]:
-        """Return the metadata of one of its objects; what is owned goes with the TrainingJob."""
+        """Return the metadata of one of its objects; an owned object is deleted with the TrainingJob."""
         metadata: dict[str, object] = {
             "name": name,
             "namespace": self.job.metadata.namespace,
@@ -116,7 +116,7 @@ class Replica:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Return the labels by which its objects are found."""
+        """Return the labels that select its objects."""
         return {
             "app.kubernetes.io/managed-by": "palaestra",
             JOB_LABEL: self.job.metadata.name,

@@ -1,7 +1,7 @@
 """CPU and memory of the containers, and the number of threads that follows from them.
 
-The defaults let two replicas of two simulators each, and the operator, fit on two cores: a replica
-asks for 425m. Small networks learn no faster with a second thread, so the trainer has one.
+With the defaults, two replicas of two simulators each, and the operator, fit on two cores: a replica requests
+425m. A second thread does not speed up small networks, so the trainer has one.
 """
 
 import math
@@ -23,7 +23,7 @@ NONE = Resources()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defaults:
-    """An installation's resources for containers of jobs that mention none; Palaestra's own fill the rest."""
+    """An installation's default resources for containers; Palaestra's own defaults fill the rest."""
 
     ros_master: Resources = NONE
     simulator: Resources = NONE
@@ -34,17 +34,17 @@ NO_DEFAULTS = Defaults()
 
 ROS_MASTER = Resources(requests={"cpu": "25m", "memory": "64Mi"}, limits={"memory": "256Mi"})
 SIMULATOR = Resources(requests={"cpu": "75m", "memory": "160Mi"}, limits={"memory": "2Gi"})
-# 100 MB without a camera, 200 MB with one, beside the sidecar.
+# It uses 100 MB without a camera and 200 MB with one, in addition to the sidecar.
 MUJOCO = Resources(requests={"cpu": "75m", "memory": "256Mi"}, limits={"memory": "2Gi"})
 TRAINER = Resources(requests={"cpu": "250m", "memory": "768Mi"}, limits={"cpu": "1", "memory": "2Gi"})
 
 
 def resources(wanted: Resources, default: Resources) -> Planned:
-    """Return what the job asks for, with defaults for what it does not name.
+    """Return the job's resources, with defaults for those that it does not set.
 
-    If a job names only the request of a resource, the default limit stays, raised to the request if that is
-    more: without a limit, one container could use all memory of its node. If a job names only a limit, there
-    is no default request, because an API server then requests the limit.
+    If a job sets only the request of a resource, the default limit stays, but is raised to the request if
+    that is more. Without a limit, one container could use all memory of its node. If a job sets only a limit,
+    the default request is left out, because an API server then requests the limit.
     """
     requests = {name: value for name, value in default.requests.items() if name not in wanted.limits}
     limits = {
@@ -56,12 +56,12 @@ def resources(wanted: Resources, default: Resources) -> Planned:
 
 
 def by_default(installation: Resources, release: Resources) -> Resources:
-    """Return the default of a container: the installation's, and the release's where that mentions none."""
+    """Return the default of a container: the installation's, completed by the release's."""
     return Resources.model_validate(resources(installation, release))
 
 
 def for_two(planned: Planned) -> Planned:
-    """Return the resources of a container in which a second simulator stands by: twice the memory.
+    """Return the resources of a container with a standby simulator: twice the memory.
 
     One of the two computes at a time, so they share the processor.
     """
@@ -78,23 +78,23 @@ def twice(quantity: str) -> str:
 
 
 def in_bytes(memory: str) -> int:
-    """Return how many bytes an amount of memory such as 400Mi is."""
+    """Return the bytes of an amount of memory, such as 400Mi."""
     return int(_amount(memory))
 
 
 def threads(planned: Planned) -> int:
-    """Return how many threads the CPU limit is good for, 1 where there is none."""
+    """Return the number of threads for the CPU limit; 1 without a limit."""
     return max(math.ceil(_amount(planned.get("limits", {}).get("cpu", "1"))), 1)
 
 
 def asks_for_gpu(wanted: Resources) -> bool:
-    """Return whether requests or limits name a GPU, such as nvidia.com/gpu, and more than none of it."""
+    """Return whether requests or limits have a GPU, such as nvidia.com/gpu, in an amount above 0."""
     names = (*wanted.requests, *wanted.limits)
     return any(name.endswith("/gpu") and asks_for(name, wanted) for name in names)
 
 
 def asks_for(resource: str, wanted: Resources) -> bool:
-    """Return whether requests or limits name a resource, and more than none of it."""
+    """Return whether requests or limits have a resource in an amount above 0."""
     quantities = (wanted.requests.get(resource, "0"), wanted.limits.get(resource, "0"))
     return any(_amount(quantity) > 0 for quantity in quantities)
 

@@ -1,4 +1,4 @@
-"""training.yaml: the job, resolved for one replica, as its trainer reads it."""
+"""training.yaml: the job's settings for one replica, as its trainer reads them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,16 +14,16 @@ FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
 NEVER = Recycle(after_resets=0)
 DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
-AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended there with a bus error
+AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended with a bus error there
 
 
 def training_yaml(replica: Replica, files: Mapping[str, bytes]) -> bytes:
-    """Return the text of the replica's training.yaml; `files` are the worlds beside it."""
+    """Return the text of the replica's training.yaml; `files` are the worlds next to it."""
     return as_yaml([_training(replica, files)]).encode()
 
 
 def status_address(replica: Replica) -> str:
-    """Return where the trainer serves /metrics, /status and /healthz."""
+    """Return the address at which the trainer serves /metrics, /status and /healthz."""
     return f"{replica.layout.health_host}:{replica.layout.ports.status}"
 
 
@@ -82,14 +82,14 @@ def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str
 
 
 def recycling(group: SimulatorGroup) -> Recycle:
-    """Return when the simulators of a group are recycled, also where the job does not say."""
+    """Return the recycle limits of a group's simulators, with the default for a job without them."""
     if group.recycle is not None:
         return group.recycle
     return NEVER if group.driver in DO_NOT_AGE else AFTER_24_RESETS
 
 
 def _limits(recycle: Recycle) -> dict[str, int]:
-    """Return the limits that there are, memory in bytes."""
+    """Return the limits that are set, memory in bytes."""
     memory = recycle.above_memory
     limits = {
         "afterResets": recycle.after_resets,

@@ -1,7 +1,7 @@
-"""The results of checks of worlds that were done before the plan.
+"""The results of checks of worlds before the plan.
 
-A check costs seconds for a large world, so the operator does it in another process. A plan only looks its
-result up, by a digest of the world and of its field, which is the name of the world in messages.
+The check of a large world takes seconds, so the operator runs it in another process. A plan only looks up the
+result, by a digest of the world and of its field, which is the name of the world in messages.
 """
 
 import hashlib
@@ -16,8 +16,8 @@ class WorldVerdict:
     """The result of the check of one world.
 
     Attributes:
-        problem: the message of the refusal; "": the world is fine.
-        too_costly: the check was ended because it took more than its budget.
+        problem: the message of the refusal; "": the world is valid.
+        too_costly: whether the check was ended because it exceeded its budget.
     """
 
     problem: str = ""
@@ -29,22 +29,22 @@ Verdicts = Mapping[str, WorldVerdict]  # by the digests of worlds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GivenWorld:
-    """A world that the author of a job wrote: the field of the spec that gives it, and its bytes."""
+    """A world that the author of a job wrote: its field in the spec, and its bytes."""
 
     field: str
     source: bytes
 
     @property
     def digest(self) -> str:
-        """Return the digest under which its verdict is remembered."""
+        """Return the key of its verdict."""
         return hashlib.sha256(b"\0".join((self.field.encode(), self.source))).hexdigest()
 
 
 def require_fine(worlds: Mapping[str, GivenWorld], verdicts: Verdicts) -> None:
-    """Check that every world has a verdict, and that none is refused; `worlds` are by digest.
+    """Check that every world has a verdict and is not refused; `worlds` are by digest.
 
     Raises:
-        WorldCheckTooCostly: a check took more than its budget.
+        WorldCheckTooCostly: a check exceeded its budget.
         WorldRefused: a world is wrong.
         WorldUnchecked: a world has no verdict yet.
     """

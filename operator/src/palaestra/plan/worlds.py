@@ -1,8 +1,8 @@
 """The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
 
-Each source is checked once for all replicas, so that a mistake in it is known before anything is created. The
-plan checks it, or the operator does before the plan and passes the verdicts. Only the sidecar writes the ROS
-names of a simulator into a world. Sources of `file` are in the image, and only the sidecar reads them.
+Each source is checked once for all replicas, so that an error in it is found before objects are created. The
+plan checks it, or the operator checks it before the plan and passes the verdicts. Only the sidecar writes the
+ROS names of a simulator into a world. Sources of `file` are in the image, and only the sidecar reads them.
 """
 
 from collections.abc import Mapping
@@ -13,19 +13,19 @@ from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.world_verdicts import GivenWorld, Verdicts, require_fine
 from palaestra_sim.world import MJCF, WBT, builtin, check, suffix
 
-MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
+MOST_BYTES = 900_000  # of all worlds; an object has at most 1 MiB, and training.yaml is in it too
 FOLDER = "worlds"
 
 _READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
 
 ConfigMaps = Mapping[tuple[str, str], bytes]  # (name, key) -> content
-Files = Mapping[str, bytes]  # what goes into a ConfigMap, by file name
+Files = Mapping[str, bytes]  # the content of a ConfigMap, by file name
 
 
 def source_files(job: TrainingJob, config_maps: ConfigMaps, verdicts: Verdicts | None = None) -> Files:
-    """Return the source worlds that go into the ConfigMap of every replica, each checked.
+    """Return the checked source worlds for the ConfigMap of every replica.
 
-    Without `verdicts` they are checked here, in a time proportional to their bytes.
+    Without `verdicts` they are checked here, which takes time in proportion to their size.
 
     Raises:
         PlanError: a ConfigMap is not among `config_maps`, the worlds are too big, or a verdict is missing or
@@ -44,16 +44,16 @@ def source_files(job: TrainingJob, config_maps: ConfigMaps, verdicts: Verdicts |
 
 
 def given_worlds(job: TrainingJob, config_maps: ConfigMaps) -> tuple[GivenWorld, ...]:
-    """Return the worlds of a job that have to be checked before it is planned.
+    """Return the worlds of a job that must be checked before it is planned.
 
     Raises:
-        PlanError: as `source_files` does before it checks anything.
+        PlanError: a ConfigMap is not among `config_maps`, or the worlds are too big.
     """
     return _given(job, _sources(job, config_maps))
 
 
 def _given(job: TrainingJob, sources: Mapping[int, bytes]) -> tuple[GivenWorld, ...]:
-    """Return the worlds that the author of a job wrote, each once; those that ship pass every check."""
+    """Return the worlds that the author of a job wrote, each once; built-in worlds are known to be valid."""
     worlds: dict[bytes, GivenWorld] = {}
     for place, source in sources.items():
         world = job.spec.simulators[place].world
@@ -63,7 +63,7 @@ def _given(job: TrainingJob, sources: Mapping[int, bytes]) -> tuple[GivenWorld, 
 
 
 def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
-    """Return the source worlds by the place of their groups, without those that lie in an image.
+    """Return the source worlds by the number of their group, without those in an image.
 
     Raises:
         PlanError: a ConfigMap is not among `config_maps`, or the worlds are too big.
@@ -86,7 +86,7 @@ def _sources(job: TrainingJob, config_maps: ConfigMaps) -> Mapping[int, bytes]:
 
 
 def world_path(replica: Replica, simulator: PlannedSimulator, files: Files) -> str:
-    """Return the path of the world that a simulator's sidecar is given."""
+    """Return the path of the world for a simulator's sidecar."""
     if simulator.group.world.file is not None:
         return simulator.group.world.file
     folder = f"{replica.places(simulator.container).config}/{FOLDER}"
@@ -102,7 +102,7 @@ def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> 
     """Check that the simulator of a group reads worlds of this format.
 
     Raises:
-        PlanError: the world is MJCF, and the driver reads no such world.
+        PlanError: the world is MJCF, which the driver does not read.
     """
     mjcf = group.world.file.endswith(MJCF) if group.world.file is not None else False
     if source is not None:
@@ -115,7 +115,7 @@ def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> 
 
 
 def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes | None:
-    """Return the text of a group's world; None: it lies in the image."""
+    """Return the content of a group's world; None if it is in the image."""
     match group.world:
         case WorldSource(inline=str(text)):
             return text.encode()
@@ -134,6 +134,6 @@ def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes
 
 
 def _kind(world: WorldSource) -> str:
-    """Return the field that a world is given by."""
+    """Return the name of the field that has a world."""
     given = {"inline": world.inline, "configMap": world.config_map, "builtin": world.builtin}
     return next((name for name, value in given.items() if value is not None), "file")

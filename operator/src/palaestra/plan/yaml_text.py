@@ -1,6 +1,6 @@
-"""Objects as YAML that a person reads: fields in their own order, long texts as blocks, no anchors.
+"""Objects as YAML for people: fields in their own order, long texts as blocks, no anchors.
 
-And text that comes through to a container as it stands.
+Also text that the kubelet passes to a container unchanged.
 """
 
 import re
@@ -9,17 +9,17 @@ from typing import Any
 
 import yaml
 
-# Line ends to YAML, which would be read back as others; quoted doubly they are escaped.
+# YAML treats these as line ends and would read back other characters; in double quotes they are escaped.
 _BREAKS = frozenset("\x85\u2028\u2029")
-# Text to PyYAML, a number to kubectl: 5e-4.
+# PyYAML reads such values, for example 5e-4, as text, but kubectl reads them as numbers.
 _NUMBER = re.compile(r"[-+]?[0-9.][0-9._]*([eE][-+]?[0-9]+)?")
 
 
 class _Dumper(yaml.CSafeDumper):
     """PyYAML's safe dumper for people."""
 
-    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - equal parts are written out
-        """Return True: no object refers to a part of another."""
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - equal parts are written in full
+        """Return True, so that no anchors are written."""
         return True
 
 
@@ -37,13 +37,13 @@ _Dumper.add_representer(str, _text)
 
 
 def as_yaml(documents: Iterable[Mapping[str, Any]]) -> str:
-    """Return objects as YAML documents, as `kubectl apply` takes them."""
+    """Return objects as YAML documents for `kubectl apply`."""
     return yaml.dump_all(documents, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
 
 
 def literal(text: str) -> str:
-    """Return what a kubelet makes `text` of, in a command, its arguments and the values of variables.
+    """Return the escaped form from which a kubelet makes `text`, for commands, arguments and variables.
 
-    A kubelet puts variables in the place of `$(NAME)`, and takes two $ for one.
+    A kubelet replaces `$(NAME)` by the variable, and `$$` by `$`.
     """
     return text.replace("$", "$$")

@@ -1,6 +1,7 @@
-"""Trials in a cluster: TrainingJobs with a label in common, which the operator and a queue run.
+"""Trials in a cluster: TrainingJobs with a common label, which the operator and a queue run.
 
-They need no command that runs. This one creates them, reads their status, and deletes those of pruned trials.
+They continue if the command ends. The command creates them, reads their status, and deletes those of pruned
+trials.
 """
 
 import time
@@ -17,27 +18,28 @@ from palaestra.errors import PalaestraError
 from palaestra.sweeps.model import LABEL
 from palaestra.sweeps.trial import Point, RunFigures, Trial, TrialFigures, TrialProgress
 
-LOOK_S = 5.0  # the operator writes a status every 30 s at most
+LOOK_S = 5.0  # the operator writes progress at most every 30 s
 DELETED_S = 300.0
 AWAY = (Gone, ServerError, TooManyRequests, Unreachable)
-QUIET_LOOKS = 6  # looks in vain before a line says so: half a minute at least
+QUIET_LOOKS = 6  # failed requests before a line reports them: at least half a minute
 
 Answer = TypeVar("Answer")
 
 
 class NotOfThisSweep(ClientError):
-    """A job of a trial's name exists that is not of the sweep."""
+    """A job with a trial's name exists, but does not belong to the sweep."""
 
 
 class ClusterBackend:
     """The TrainingJobs of a sweep in a namespace.
 
     Args:
-        client: of the cluster and namespace.
-        sweep: its name.
-        at_once: trials at the same time; None: all, and the queue decides.
-        report: is called with a line when the API server has been away for a while, and when it is back.
-        look_s: seconds between two looks.
+        client: client for the cluster and namespace.
+        sweep: the name of the sweep.
+        at_once: number of trials at the same time; None: all, and the queue decides.
+        report: called with a line when the API server has not responded for a while, and when it responds
+            again.
+        look_s: seconds between two requests.
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class ClusterBackend:
         """Check that the job of a trial is for the namespace.
 
         Raises:
-            PalaestraError: it names another one.
+            PalaestraError: the job names another namespace.
         """
         named = job.metadata.namespace if "namespace" in job.metadata.model_fields_set else None
         if named not in {None, self._client.namespace}:
@@ -79,20 +81,20 @@ class ClusterBackend:
         """Create the job of a trial, unless it exists.
 
         Raises:
-            NotOfThisSweep: a job of this name is not of the sweep.
-            ApiError: the API server refuses it, or gives no answer to the first request of this command.
+            NotOfThisSweep: a job of this name does not belong to the sweep.
+            ApiError: the API server refuses it, or does not respond to the first request of this command.
         """
         self._answer_of(lambda: self._create(trial))
         self._begun.add(trial.number)
 
     def wait(self) -> None:
-        """Return after some seconds with the newest status of every job; ask a busy API server again."""
+        """Wait some seconds, then read the newest status of every job; retry if the API server is busy."""
         time.sleep(self._look_s)
         jobs = self._answer_of(lambda: self._client.list(self._selector))
         self._jobs = {job.metadata.name: job for job in jobs}
 
     def look(self, trial: Trial) -> TrialFigures:
-        """Return the figures of a trial by the status of its job; a job that was deleted has failed."""
+        """Return the figures of a trial from the status of its job; a deleted job counts as failed."""
         job = self._jobs.get(trial.name)
         if job is None:
             self._begun.discard(trial.number)
@@ -124,9 +126,9 @@ class ClusterBackend:
             self._client.delete(trial.name, deadline_s=DELETED_S)
 
     def _answer_of(self, ask: Callable[[], Answer]) -> Answer:
-        """Return the answer of the API server; once it has answered, ask again while it is away.
+        """Return the response of the API server; after its first response, retry while it does not respond.
 
-        A server that has never answered may be the wrong one, so its first error is raised.
+        A server that has never responded may be the wrong one, so its first error is raised.
         """
         looks = 0
         while True:

@@ -1,7 +1,7 @@
-"""Trials from a Sweep. Pure: the same Sweep, the same trials, in the same order.
+"""Trials from a Sweep. Pure: the same Sweep gives the same trials in the same order.
 
-A value at random is a function of the sweep's seed, the number of the trial and the field. So a new trial or
-field changes no other value, and neither does the version of Python.
+A random value is a function of the sweep's seed, the number of the trial and the field. So a new trial or
+field does not change other values, and neither does the version of Python.
 """
 
 import hashlib
@@ -20,10 +20,10 @@ _BITS = 53  # of a float's precision
 
 
 def trials(sweep: Sweep) -> tuple[Trial, ...]:
-    """Return every trial, in order; for a search some that together have every bound and choice.
+    """Return every trial, in order; for a search, trials that together have every bound and choice.
 
     Raises:
-        SpecErrors: jobs are wrong; lists every mistake once, with the first trial that has it.
+        SpecErrors: jobs are wrong; the error lists every problem once, with its first trial.
     """
     points = list(settings(sweep) if sweep.spec.optuna is None else probes(sweep))
     found: list[Trial] = []
@@ -40,7 +40,7 @@ def trials(sweep: Sweep) -> tuple[Trial, ...]:
 
 
 def settings(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
-    """Yield the values of the fields that differ, trial by trial; of a matrix the last field varies first."""
+    """Yield the values of the fields that differ, trial by trial; the last field of a matrix varies first."""
     spec = sweep.spec
     if spec.random:
         for number in range(spec.trials or 0):
@@ -57,7 +57,7 @@ def trial(sweep: Sweep, number: int, changes: Mapping[str, Any]) -> Trial:
     """Return a trial with its job, which has the sweep's label and a replica for each seed.
 
     Raises:
-        SpecErrors: the job is wrong; lists every mistake.
+        SpecErrors: the job is wrong; the error lists every problem.
     """
     job = sweep.spec.job
     own = {
@@ -79,7 +79,7 @@ def probes(sweep: Sweep) -> Iterator[Mapping[str, Any]]:
 
 
 def drawn(values: Distribution, share: float) -> Any:
-    """Return the value of a distribution at a share of it, 0 to 1 (excluded)."""
+    """Return the value of a distribution at a share of its range, 0 to 1 (excluded)."""
     if values.choice is not None:
         return values.choice[int(share * len(values.choice))]
     low, high = float(values.low or 0), float(values.high or 0)
@@ -90,13 +90,13 @@ def drawn(values: Distribution, share: float) -> Any:
 
 
 def chance(seed: int, number: int, field: str) -> float:
-    """Return a number from 0 to 1 (excluded) that only these three decide, uniformly distributed."""
+    """Return a uniformly distributed number from 0 to 1 (excluded) that depends only on the arguments."""
     digest = hashlib.sha256(f"{seed}/{number}/{field}".encode()).digest()
     return (int.from_bytes(digest[:8]) >> (64 - _BITS)) / (1 << _BITS)
 
 
 def short(fields: Iterable[str]) -> Mapping[str, str]:
-    """Return the shortest ends of paths that tell them apart, for headings."""
+    """Return the shortest ends that distinguish the paths, for headings."""
     paths = list(fields)
     return {path: next(end for end in _endings(path) if end == path or _is_one(end, paths)) for path in paths}
 

@@ -1,7 +1,7 @@
-"""Trials on this machine: runs in the background, as many at the same time as fit its processors.
+"""Trials on this machine: runs in the background, as many at the same time as the processors allow.
 
-The trainer and its collecting simulators step in turns, and evaluating simulators rest meanwhile. So a run
-keeps as many processors busy as it has collecting simulators.
+The trainer and its collecting simulators work in turns, and evaluating simulators wait in the meantime. So a
+run keeps as many processors busy as it has collecting simulators.
 """
 
 import json
@@ -28,8 +28,8 @@ class LocalBackend:
     """The runs of a sweep on this machine.
 
     Args:
-        folder: of the sweep.
-        at_once: runs at the same time; None: as many as fit the processors.
+        folder: folder of the sweep.
+        at_once: number of runs at the same time; None: as many as the processors allow.
 
     Attributes:
         stopped: whether all runs have ended by themselves or after a checkpoint.
@@ -44,7 +44,7 @@ class LocalBackend:
         self._busy: dict[tuple[int, int], int] = {}
 
     def check(self, job: TrainingJob) -> None:
-        """Do all checks of a trial that need no file to be written.
+        """Run all checks of a trial that do not write files.
 
         Raises:
             LocalError: it cannot be run here.
@@ -55,18 +55,18 @@ class LocalBackend:
         check(identified(job, uid_of(directory)), directory, range(job.spec.replicas), options)
 
     def has_room(self) -> bool:
-        """Return whether no run waits for a processor."""
+        """Return whether a processor is free and no run waits for one."""
         return not self._waiting and self._fits(1)
 
     def begin(self, trial: Trial) -> None:
-        """Begin the runs of a trial as soon as they fit; those that are complete are not repeated."""
+        """Queue the runs of a trial, and start those that fit; complete runs are not repeated."""
         for replica in range(trial.job.spec.replicas):
             if not self._complete(trial, replica):
                 self._waiting.append((trial, replica))
         self._fill()
 
     def wait(self) -> None:
-        """Return when a run has ended, or after a second."""
+        """Wait until a run has ended, at most a second."""
         select.select([*self._running.values()], [], [], LOOK_S if self._running else 0.0)
         for key, started in tuple(self._running.items()):
             if started.ended:
@@ -74,7 +74,7 @@ class LocalBackend:
         self._fill()
 
     def look(self, trial: Trial) -> TrialFigures:
-        """Return the figures of a trial, from its run directories; also if it was not begun."""
+        """Return the figures of a trial from its run directories, even if it was not begun."""
         return TrialFigures.of(
             tuple(self._figures(trial, replica) for replica in range(trial.job.spec.replicas))
         )
@@ -87,7 +87,7 @@ class LocalBackend:
                 started.interrupt()
 
     def stop(self) -> None:
-        """End all runs, each with a checkpoint; a KeyboardInterrupt meanwhile kills them."""
+        """End all runs, each with a checkpoint; a KeyboardInterrupt during that kills them."""
         self._waiting.clear()
         runs = tuple(self._running.values())
         try:
@@ -142,9 +142,9 @@ def evaluations(directory: Path) -> tuple[Point, ...]:
     """Return the evaluations of a run so far, in order."""
     try:
         lines = (directory / "evaluations.jsonl").read_text().split("\n")
-    except OSError:  # none yet
+    except OSError:  # the file does not exist yet
         return ()
-    return tuple(_point(json.loads(line)) for line in lines[:-1])  # the last is empty, or not complete yet
+    return tuple(_point(json.loads(line)) for line in lines[:-1])  # the last is empty or incomplete
 
 
 def _point(line: dict[str, Any]) -> Point:

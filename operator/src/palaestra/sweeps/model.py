@@ -1,6 +1,6 @@
 """The Sweep: a job, the fields that differ between its trials, and their values.
 
-A Sweep is read by the command line only. No cluster has it: there it becomes TrainingJobs.
+Only the command line reads a Sweep. A cluster does not store it, but gets TrainingJobs for it.
 """
 
 from collections.abc import Mapping
@@ -151,8 +151,8 @@ def load(file: Path) -> Sweep:
     """Return the Sweep in a file, with its job as plain data.
 
     Raises:
-        SpecErrors: the file is wrong; lists every mistake.
-        OSError: it or the file of its job cannot be read.
+        SpecErrors: the file is wrong; the error lists every problem.
+        OSError: the file or that of its job cannot be read.
         TooLarge: one of them is too large.
     """
     try:

@@ -1,7 +1,7 @@
-"""A search by Optuna: it suggests trials from the results of others, and prunes.
+"""A search by Optuna: it suggests trials based on earlier results, and prunes trials.
 
-The search is kept in a journal file, so the same command continues it. A trial that was running when the
-search was interrupted is suggested once more, under its old number, and its runs resume.
+The search is stored in a journal file, so the same command continues it. A trial that was running when the
+search was interrupted is suggested again, with its old number, and its runs resume.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ class OptunaSearch:
     """The trials that Optuna suggests."""
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the journal in the sweep's folder; begin it if there is none."""
+        """Open the journal in the sweep's folder; create it if it does not exist."""
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._sweep = sweep
         self._space = {field: _space(values) for field, values in sweep.spec.random.items()}
@@ -40,17 +40,17 @@ class OptunaSearch:
 
     @property
     def known(self) -> Sequence[Trial]:
-        """Return all trials that were suggested, in order."""
+        """Return all suggested trials, in order."""
         return [self._known[number] for number in sorted(self._known)]
 
     @property
     def left(self) -> int:
-        """Return the number of trials to suggest, with those to suggest once more."""
+        """Return the number of trials to suggest, including those to suggest again."""
         waits = self._study.get_trials(deepcopy=False, states=(TrialState.WAITING,))
         return len(waits) + max((self._sweep.spec.trials or 0) - len(self._known), 0)
 
     def next(self) -> Trial | None:
-        """Return the next trial; None after as many as the sweep wants."""
+        """Return the next trial; None if the sweep has all its trials."""
         if not self.left:
             return None
         asked = self._study.ask(self._space)
@@ -60,13 +60,13 @@ class OptunaSearch:
         return self._know(number, asked.params)
 
     def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
-        """Report the medians over the seeds so far; return whether Optuna prunes the trial."""
+        """Report the current medians over the seeds; return whether Optuna prunes the trial."""
         self._report(trial, figures)
         return self._asked[trial.number].should_prune()
 
     def learn(self, trial: Trial, figures: TrialFigures) -> None:
         """Report the median result; a trial without one has failed."""
-        self._report(trial, figures)  # a short trial may have ended before it was looked at
+        self._report(trial, figures)  # a short trial may have ended before its figures were read
         asked, value = self._asked.pop(trial.number), figures.median(self._sweep.spec.objective)
         if figures.state is TrialProgress.PRUNED:
             self._study.tell(asked, state=TrialState.PRUNED)
@@ -76,7 +76,7 @@ class OptunaSearch:
             self._study.tell(asked, state=TrialState.FAIL)
 
     def _suggest_again(self) -> None:
-        """Enqueue each trial that was running; one without a number was never begun, and is dropped."""
+        """Enqueue each trial that was running; a trial without a number was never begun, and is dropped."""
         waits = self._study.get_trials(states=(TrialState.WAITING,))
         enqueued = {old.user_attrs.get(NUMBER) for old in waits}
         for running in self._study.get_trials(states=(TrialState.RUNNING,)):
@@ -86,7 +86,7 @@ class OptunaSearch:
             self._study.tell(running.number, state=TrialState.FAIL)
 
     def _report(self, trial: Trial, figures: TrialFigures) -> None:
-        """Report the medians over the seeds that are new."""
+        """Report the new medians over the seeds."""
         asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
         for step, value in figures.common(self._sweep.spec.objective).items():
             if step not in reported:
@@ -94,7 +94,7 @@ class OptunaSearch:
                 reported.add(step)
 
     def _know(self, number: int | None, values: Mapping[str, Any]) -> Trial | None:
-        """Return a trial by its number; None if it was interrupted before it had one."""
+        """Store and return the trial of a number; None if it was interrupted before it had a number."""
         if number is None:
             return None
         self._known[number] = grid.trial(self._sweep, number, dict(values))
@@ -116,14 +116,14 @@ def _study(sweep: Sweep, folder: Path) -> optuna.Study:
         pruner=pruner,
         load_if_exists=True,
     )
-    # A sampler with the same seed would suggest its first trials once more.
+    # A sampler with the same seed would suggest its first trials again.
     seed = sweep.spec.seed + len(study.get_trials(deepcopy=False))
     study.sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=wanted.startup_trials)
     return study
 
 
 def _values(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
-    """Return the values of a trial, with those that Optuna will use when an enqueued one begins."""
+    """Return the values of a trial, including those that Optuna will use for an enqueued trial."""
     return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 

@@ -1,4 +1,4 @@
-"""The result of a sweep as a picture: learning curves, with median and quartiles over the seeds."""
+"""The result of a sweep as a figure: learning curves, with median and quartiles over the seeds."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from palaestra.sweeps.model import Objective
 from palaestra.sweeps.table import WORDS, TrialRow, quartiles
 
-MOST_CURVES = 10  # as many as there are colors
+MOST_CURVES = 10  # the number of colors
 
 
 def draw(rows: Sequence[TrialRow], objective: Objective, file: Path) -> bool:
-    """Write the curves of the best trials into `file`; return whether there was any."""
+    """Write the curves of the best trials into `file`; return False if no trial has a curve."""
     drawn = sorted(
         (row for row in rows if row.figures.common(objective)),
         key=lambda row: -max(row.figures.common(objective).values()),

@@ -1,4 +1,4 @@
-"""The loop of a sweep: begin trials where there is room, look at them, note those that have ended."""
+"""The loop of a sweep: begin trials while the backend has room, read their figures, record their ends."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -14,7 +14,7 @@ from palaestra.sweeps.trial import Trial, TrialFigures, TrialProgress
 
 
 class TrialBackend(Protocol):
-    """Where trials run."""
+    """The backend that runs trials."""
 
     def has_room(self) -> bool:
         """Return whether another trial can begin."""
@@ -25,7 +25,7 @@ class TrialBackend(Protocol):
         ...
 
     def wait(self) -> None:
-        """Return when a trial may have changed."""
+        """Wait until a trial may have changed."""
         ...
 
     def look(self, trial: Trial) -> TrialFigures:
@@ -33,12 +33,12 @@ class TrialBackend(Protocol):
         ...
 
     def prune(self, trial: Trial) -> None:
-        """End a trial that is not worth going on."""
+        """End a trial that is not worth continuing."""
         ...
 
 
 class NoSuccess(PalaestraError):
-    """A sweep compares success rates, and its environment reports no success."""
+    """A sweep compares success rates, but its environment does not report success."""
 
 
 def carry_out(
@@ -49,12 +49,12 @@ def carry_out(
     Args:
         search: chooses the trials.
         place: runs them.
-        folder: that of the sweep; each trial that ends is noted there.
+        folder: the folder of the sweep; each trial that ends is recorded there.
         objective: the figure that is compared.
-        report: is called with a line for each trial that begins or ends.
+        report: called with a line for each trial that begins or ends.
 
     Raises:
-        NoSuccess: a trial was evaluated, and has no success rate to compare.
+        NoSuccess: a trial was evaluated, but has no success rate to compare.
     """
     active: dict[int, Trial] = {}
     for figures in trial_log.ended(folder).values():
@@ -64,7 +64,7 @@ def carry_out(
             active[trial.number] = trial
             report(f"{trial.name}: {_shown(trial)}")
             place.begin(trial)
-        if not active and place.has_room():  # without room, a pruned trial is still ending
+        if not active and place.has_room():  # without room, a pruned trial has not ended yet
             return
         place.wait()
         for trial in tuple(active.values()):
@@ -81,7 +81,7 @@ def carry_out(
 
 
 def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None:
-    """Return if the figures can be compared, or are still to come."""
+    """Return if the figures can be compared, or do not exist yet."""
     if objective is Objective.SUCCESS_RATE and figures.lacks(objective):
         raise NoSuccess(
             "spec.objective: SuccessRate is compared, and the environment reports no success; write "
@@ -90,7 +90,7 @@ def _refuse_without_success(figures: TrialFigures, objective: Objective) -> None
 
 
 def _ending(trial: Trial, figures: TrialFigures, objective: Objective, left: int) -> Iterator[str]:
-    """Yield the state of a trial, the reason or the result, and the number of trials to come."""
+    """Yield the state of a trial, the reason or the result, and the number of remaining trials."""
     yield f"{trial.name}: {figures.state}"
     yield from figures.reasons()
     if (value := figures.median(objective)) is not None:

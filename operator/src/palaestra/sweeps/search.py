@@ -1,4 +1,4 @@
-"""The order of trials: which one comes next, and whether one is worth going on."""
+"""The order of trials: the choice of the next one, and the decision to prune."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ class Search(Protocol):
 
     @property
     def known(self) -> Sequence[Trial]:
-        """Return all trials that are known by now, in order."""
+        """Return all known trials, in order."""
         ...
 
     @property
@@ -21,20 +21,20 @@ class Search(Protocol):
         ...
 
     def next(self) -> Trial | None:
-        """Return the next trial; None if there is none, or none before another has ended."""
+        """Return the next trial; None if no trial is left, or another must end first."""
         ...
 
     def hopeless(self, trial: Trial, figures: TrialFigures) -> bool:
-        """Return whether a trial that runs should be pruned."""
+        """Return whether a running trial should be pruned."""
         ...
 
     def learn(self, trial: Trial, figures: TrialFigures) -> None:
-        """Note the end of a trial."""
+        """Record the end of a trial."""
         ...
 
 
 class InTurn:
-    """Every trial of a list, in order, without those that are complete."""
+    """Every trial of a list, in order, without complete trials."""
 
     def __init__(self, trials: Iterable[Trial], ended: Mapping[int, TrialFigures]) -> None:
         self.known: Sequence[Trial] = tuple(trials)
@@ -46,7 +46,7 @@ class InTurn:
 
     @property
     def left(self) -> int:
-        """Return the number of trials that are not begun."""
+        """Return the number of trials that were not begun."""
         return len(self._left)
 
     def next(self) -> Trial | None:
@@ -59,4 +59,4 @@ class InTurn:
         return False
 
     def learn(self, trial: Trial, figures: TrialFigures) -> None:
-        """Return at once: the list stays as it is."""
+        """Return at once, because the list does not change."""

@@ -36,7 +36,7 @@ def lines(rows: Sequence[TrialRow], objective: Objective) -> Iterator[str]:
 
 
 def best(rows: Iterable[TrialRow], objective: Objective) -> TrialRow | None:
-    """Return the complete trial with the highest median; of equal ones the first."""
+    """Return the complete trial with the highest median; the first one if several are equal."""
     complete = [
         row for row in rows if row.figures.state is TrialProgress.COMPLETE and row.figures.values(objective)
     ]
@@ -44,7 +44,7 @@ def best(rows: Iterable[TrialRow], objective: Objective) -> TrialRow | None:
 
 
 def quartiles(values: Sequence[float]) -> tuple[float, float]:
-    """Return the first and the third quartile of one value or more."""
+    """Return the first and the third quartile of at least one value."""
     if len(values) == 1:
         return values[0], values[0]
     low, _, high = quantiles(values, n=4, method="inclusive")

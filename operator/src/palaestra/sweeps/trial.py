@@ -12,7 +12,7 @@ from palaestra.sweeps.model import Objective
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """The values of the fields that differ, and the job with them; it has a replica for each seed."""
+    """The values of the fields that differ, and the job with these values; it has a replica for each seed."""
 
     number: int
     changes: Mapping[str, Any]
@@ -33,15 +33,15 @@ class Point:
     mean_return: float | None
 
     def value(self, objective: Objective) -> float | None:
-        """Return the figure that counts."""
+        """Return the figure of the objective."""
         return self.success_rate if objective is Objective.SUCCESS_RATE else self.mean_return
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
-    """One run of a trial: its evaluations in order, and its result by objective; None: none yet.
+    """One run of a trial: its evaluations in order, and its result; None: not known yet.
 
-    `reason` says how it ended; empty: it has not, or nothing is known.
+    `reason` is the reason for its end; empty: it has not ended, or the reason is unknown.
     """
 
     curve: tuple[Point, ...] = ()
@@ -51,21 +51,21 @@ class RunFigures:
     reason: str = ""
 
     def at(self, step: int, objective: Objective) -> float | None:
-        """Return the newest figure at a step; None if there is none yet, or the curve ends before."""
+        """Return the newest figure at a step; None if the curve ends or has no figure before that step."""
         if not self.curve or self.curve[-1].step < step:
             return None
         newest = next((point for point in reversed(self.curve) if point.step <= step), None)
         return None if newest is None else newest.value(objective)
 
     def value(self, objective: Objective) -> float | None:
-        """Return the result: the policy's if it was measured at the end, else that of the last evaluation."""
+        """Return the policy's result if it was measured at the end, else that of the last evaluation."""
         if objective is Objective.SUCCESS_RATE and self.success_rate is not None:
             return self.success_rate
         return self.curve[-1].value(objective) if self.curve else None
 
 
 class TrialProgress(StrEnum):
-    """How far a trial has come."""
+    """The state of a trial."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -90,30 +90,30 @@ class TrialFigures:
         return cls(state=TrialProgress.COMPLETE if done else TrialProgress.FAILED, runs=runs)
 
     def reasons(self) -> tuple[str, ...]:
-        """Return why runs failed, each reason once."""
+        """Return the reasons of failed runs, each once."""
         failed = (run for run in self.runs if run.ended and not run.succeeded)
         return tuple(dict.fromkeys(run.reason for run in failed if run.reason))
 
     def lacks(self, objective: Objective) -> bool:
-        """Return whether every run was evaluated, and none has the figure that counts."""
+        """Return whether every run was evaluated, but none has the figure of the objective."""
         return all(run.curve for run in self.runs) and bool(self.runs) and not self.values(objective)
 
     def values(self, objective: Objective) -> tuple[float, ...]:
-        """Return the known results, one a seed."""
+        """Return the known results, one for each seed."""
         return tuple(value for run in self.runs if (value := run.value(objective)) is not None)
 
     def median(self, objective: Objective) -> float | None:
-        """Return the median of the known results; None if there is none."""
+        """Return the median of the known results; None without results."""
         values = self.values(objective)
         return median(values) if values else None
 
     def common(self, objective: Objective) -> Mapping[int, float]:
-        """Return the median over all seeds by step, as far as the figures of every run go."""
+        """Return the median over all seeds by step, for the steps that every run has reached."""
         steps = {point.step for run in self.runs for point in run.curve}
         values = {step: self.at(step, objective) for step in sorted(steps)}
         return {step: median(found) for step, found in values.items() if len(found) == len(self.runs)}
 
     def at(self, step: int, objective: Objective) -> tuple[float, ...]:
-        """Return the newest figure of each run at a step, for the runs whose figures go that far."""
+        """Return the newest figure of each run at a step, for the runs that have reached it."""
         values = (run.at(step, objective) for run in self.runs)
         return tuple(value for value in values if value is not None)

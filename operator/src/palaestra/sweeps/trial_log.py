@@ -1,4 +1,4 @@
-"""The folder of a sweep: the Sweep that it was begun with, and the trials that have ended.
+"""The folder of a sweep: the Sweep at its beginning, and the trials that have ended.
 
 <dir>/<sweep>/sweep.yaml        the Sweep, with its job
 <dir>/<sweep>/trials.jsonl      a line for each trial that has ended
@@ -23,18 +23,18 @@ from palaestra.sweeps.trial import Point, RunFigures, TrialFigures, TrialProgres
 RECORD = "sweep.yaml"
 TRIALS = "trials.jsonl"
 MUTABLE = {"trials"}
-_COMPARING = {"objective"}  # trials.jsonl has both figures; a search by Optuna has learned from one of them
+_COMPARING = {"objective"}  # trials.jsonl has both figures, but a search by Optuna has used only one of them
 
 
 def begin(folder: Path, sweep: Sweep) -> None:
-    """Write the Sweep into its folder; one that is there must be the same.
+    """Write the Sweep into its folder; an existing Sweep must be the same.
 
-    `trials` may differ, and `objective` too unless Optuna searches.
+    `trials` may differ, and `objective` too, except in a search by Optuna.
 
-    A line of `trials.jsonl` that a crash has cut is removed, so that the next one begins a line.
+    An incomplete last line of `trials.jsonl`, after a crash, is removed, so that the next one begins a line.
 
     Raises:
-        RunRefused: the folder has another sweep.
+        RunRefused: the folder belongs to another sweep.
         StorageFailed: it cannot be written.
     """
     record = sweep.model_dump(mode="json", by_alias=True, exclude_none=True)
@@ -53,7 +53,7 @@ def begin(folder: Path, sweep: Sweep) -> None:
 
 
 def ended(folder: Path) -> Mapping[int, TrialFigures]:
-    """Return the trials that have ended, by number; the last line about a trial counts."""
+    """Return the ended trials by number; the last line about a trial counts."""
     path = folder / TRIALS
     if not path.exists():
         return {}

@@ -1,7 +1,7 @@
 """TrainingJobs as text. Pure: the clock is passed in.
 
 `tables` and `sparkline` draw, `durations` formats durations, `describe` prints one job in full, `history`
-keeps past figures of a job, and `live` shows its progress.
+stores past figures of a job, and `live` shows its progress.
 """
 
 from palaestra.view.describe import describe, happened, progress

@@ -19,5 +19,5 @@ def short(seconds: float) -> str:
 
 
 def ago(moment: datetime | None, now: datetime) -> str:
-    """Return how long ago a moment was; empty where there is none."""
+    """Return the time since a moment, such as `3m12s ago`; empty without a moment."""
     return "" if moment is None else f"{short((now - moment).total_seconds())} ago"

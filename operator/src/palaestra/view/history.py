@@ -1,4 +1,4 @@
-"""Past figures of a job, since the watch began."""
+"""The figures of a job since the start of the watch."""
 
 from collections import defaultdict, deque
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from palaestra.api import Status
 from palaestra.api.status import ReplicaStatus
 
-MOST = 40  # Values of each figure; as many as fit into one line.
+MOST = 40  # The number of values of each figure that fit into one line.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,7 @@ BAR = 60
 
 
 def live(job: TrainingJob, history: History, now: datetime) -> Group:
-    """Return the drawing of a job; figures are as old as its status, ages are relative to `now`."""
+    """Return the drawing of a job; figures are as old as its status, and ages are relative to `now`."""
     status = job.status
     phase = str(status.phase or "not reconciled by an operator yet")
     heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _color(status.phase)))
@@ -53,7 +53,7 @@ def _replica(
 
 
 def _bar(step: int, target: int | None) -> Table:
-    """Return the bar as a line of its own, empty where there is no target."""
+    """Return the bar as a separate line; empty without a target."""
     line = Table.grid()
     if target:
         line.add_row(ProgressBar(total=target, completed=step, width=BAR, complete_style="cyan"))

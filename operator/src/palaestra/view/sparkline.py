@@ -27,7 +27,7 @@ def sparkline(
 def _bar(value: float | None, floor: float, ceiling: float) -> str:
     if value is None:
         return UNKNOWN
-    if ceiling <= floor:  # all are equal: neither low nor high
+    if ceiling <= floor:  # all values are equal: neither low nor high
         return BARS[len(BARS) // 2]
     share = (value - floor) / (ceiling - floor)
     return BARS[min(max(round(share * (len(BARS) - 1)), 0), len(BARS) - 1)]

@@ -19,7 +19,7 @@ def server_table(table: Mapping[str, Any], *, wide: bool = False, namespaces: bo
     """Return the lines of an API server's `Table`, with the columns that the CRD defines.
 
     Args:
-        table: the API server's answer.
+        table: the API server's response.
         wide: whether to include the low-priority columns.
         namespaces: whether to add a first column for the namespace.
     """

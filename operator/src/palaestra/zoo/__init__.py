@@ -1,12 +1,12 @@
 """TrainingJobs from the hyperparameter files of RL-Baselines3-Zoo.
 
-Pure: text in, text out. Whatever a TrainingJob cannot hold exactly becomes a note, never silence.
+Pure: text in, text out. Each setting that a TrainingJob cannot represent exactly becomes a note.
 
 - `conversion`: one entry of a file as a TrainingJob with its notes
-- `draft`: the job and the notes that the words of an entry fill
+- `draft`: the job and the notes, which the keys of an entry fill
 - `expressions`: Python expressions in a file, read as data and never evaluated
 - `hyperparameter_file`: a file, its entries and its algorithm
-- `mapping`: the place of each word in a TrainingJob
+- `mapping`: the field of a TrainingJob for each key of an entry
 """
 
 from palaestra.zoo.conversion import Converted, convert

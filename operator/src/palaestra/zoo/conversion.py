@@ -13,7 +13,7 @@ from palaestra.zoo.hyperparameter_file import ZooError, algorithm_of, entry_of, 
 from palaestra.zoo.mapping import note_together, put
 
 _LONGEST_NAME = 48
-_OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has hyperparameters of its own for it
+_OWN_DEFAULTS = "MoveToTargetEnv-v0"  # the trainer has its own default hyperparameters for it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +22,7 @@ class Converted:
 
     Attributes:
         text: the job as YAML; its comments have the notes.
-        notes: one line for each thing that the job does not do exactly as Zoo.
+        notes: one line for each difference between the job and Zoo.
     """
 
     text: str
@@ -34,13 +34,13 @@ def convert(text: str, name: str, *, env: str | None = None, algorithm: str | No
 
     Args:
         text: the content of the file.
-        name: the path of the file, of which the last part names the algorithm.
+        name: the path of the file; its last part names the algorithm.
         env: id of the environment; None: the only one in the file.
         algorithm: name of the algorithm; None: the file's.
 
     Raises:
-        ZooError: the file has no such entry, or its algorithm is not usable here.
-        SpecErrors: a value of the entry is out of the bounds of a TrainingJob.
+        ZooError: the file does not have the entry, or its algorithm cannot be used here.
+        SpecErrors: a value of the entry is not valid in a TrainingJob.
     """
     environment, entry, chosen = entry_of(read_file(text, name), name, env)
     draft = Draft(

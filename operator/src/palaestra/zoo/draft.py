@@ -1,4 +1,4 @@
-"""The TrainingJob under way, and the notes about everything that it cannot hold exactly."""
+"""The TrainingJob during the conversion, and the notes about settings that it cannot represent exactly."""
 
 import re
 from collections.abc import Mapping
@@ -6,25 +6,25 @@ from dataclasses import dataclass, field
 from typing import Any
 
 MOST_OF_A_GROUP = 16
-MOST_COLLECTING = 31  # of the 32 simulators of a pod, one evaluates
+MOST_COLLECTING = 31  # one of the 32 simulators of a pod evaluates
 
 
 @dataclass(slots=True, kw_only=True)
 class Draft:
-    """A TrainingJob that the words of an entry fill.
+    """A TrainingJob that the keys of an entry fill.
 
     Attributes:
-        entry: the whole entry, since some words change the meaning of others.
+        entry: the whole entry, because some keys change the meaning of others.
         environment: id of the environment.
         algorithm: fields of `trainer.algorithm`, without its hyperparameters.
         hyperparameters: the keyword arguments of the algorithm's class.
         options: the keyword arguments of the environment.
         wrappers: the wrappers of the environment.
-        frame_stack: how many observations are one.
-        collecting: how many simulators collect.
+        frame_stack: number of observations that are stacked.
+        collecting: number of collecting simulators.
         steps: length of training.
         seed: seed of the job; None: the job's default.
-        notes: "<word>: <fact>; <remedy>" for each thing that differs from the entry.
+        notes: "<key>: <fact>; <remedy>" for each difference from the entry.
     """
 
     entry: Mapping[str, Any]
@@ -45,11 +45,11 @@ class Draft:
         return str(self.algorithm["name"])
 
     def note(self, word: str, fact: str) -> None:
-        """Keep a note about a word of the entry, as one line of printable characters."""
+        """Store a note about a key of the entry, as one line of printable characters."""
         self.notes.append(" ".join(re.sub(r"[^ -~]+", " ", f"{word}: {fact}").split()))
 
     def spec(self) -> dict[str, Any]:
-        """Return the spec of the job, with only what differs from a job's defaults."""
+        """Return the spec of the job, with only the fields that differ from the defaults."""
         algorithm = {**self.algorithm}
         if self.hyperparameters:
             algorithm["hyperparameters"] = self.hyperparameters
@@ -66,7 +66,7 @@ class Draft:
         return {**seed, "simulators": self._groups(), "trainer": {**trainer, **steps}}
 
     def _groups(self) -> list[dict[str, Any]]:
-        """Return the groups of simulators; one that collects has at most 16."""
+        """Return the groups of simulators; a collecting group has at most 16."""
         first = min(self.collecting, MOST_OF_A_GROUP)
         groups: list[dict[str, Any]] = [{"name": "collect", "role": "Collect", "count": first}]
         if rest := self.collecting - first:

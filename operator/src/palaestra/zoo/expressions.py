@@ -1,21 +1,21 @@
 """Python expressions in a file of RL-Baselines3-Zoo, such as `dict(net_arch=[64], activation_fn=nn.ReLU)`.
 
-Zoo evaluates them. Here they are parsed, and only literals, `dict(...)` and names of classes are read, so a
-file from a stranger runs no code. A class becomes text that a TrainingJob takes: `ReLU` or `module:Class`.
+Zoo evaluates them. Here they are parsed, and only literals, `dict(...)` and names of classes are read, so an
+untrusted file cannot run code. A class becomes text for a TrainingJob: `ReLU` or `module:Class`.
 """
 
 import ast
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-# The classes that a TrainingJob names as PyTorch does; a test compares them with the trainer's.
+# A TrainingJob uses PyTorch's names for these classes; a test compares them with the trainer's.
 SHORT: Mapping[str, frozenset[str]] = {
     "torch.nn": frozenset(
         {"ELU", "GELU", "LeakyReLU", "Mish", "ReLU", "SELU", "SiLU", "Softplus", "Tanh"},
     ),
     "torch.optim": frozenset({"Adam", "AdamW", "NAdam", "RAdam", "RMSprop", "SGD"}),
 }
-# What Zoo's own modules import under a shorter name.
+# Zoo's own modules import these modules with shorter names.
 _ROOTS: Mapping[str, str] = {
     "gym": "gymnasium",
     "nn": "torch.nn",
@@ -33,9 +33,9 @@ class NotPlain(ValueError):
 
 
 def entries(text: str) -> Iterator[tuple[str, Any]]:
-    """Yield the name and the value of each entry of a mapping that `text` writes.
+    """Yield the name and the value of each entry of the mapping in `text`.
 
-    A value that cannot be read is yielded as the `NotPlain` that says why.
+    For an unreadable value, a `NotPlain` with the reason is yielded.
 
     Raises:
         NotPlain: the text is not a mapping with text as its keys.
@@ -48,10 +48,10 @@ def entries(text: str) -> Iterator[tuple[str, Any]]:
 
 
 def value(text: str) -> Any:
-    """Return the value that `text` writes.
+    """Return the value in `text`.
 
     Raises:
-        NotPlain: it is neither a literal, nor `dict(...)`, nor the name of a class.
+        NotPlain: the text is neither a literal, nor `dict(...)`, nor the name of a class.
     """
     return _value(_parsed(text))
 
@@ -93,7 +93,7 @@ def _value(node: ast.expr) -> Any:
 
 
 def _class(name: str) -> str:
-    """Return a class as a TrainingJob names it."""
+    """Return the name of a class for a TrainingJob."""
     if name in _IMPORTED:
         return _IMPORTED[name]
     module, _, last = name.rpartition(".")

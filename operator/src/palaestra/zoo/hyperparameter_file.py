@@ -11,7 +11,7 @@ from palaestra.api.yaml_io import NotYaml, read
 from palaestra.errors import PalaestraError
 from palaestra_protocol.foreign_words import NO_ALGORITHM
 
-# Zoo names its files after these words for algorithms.
+# Zoo names its files after these names of algorithms.
 OF_FILES: Mapping[str, str] = {
     "a2c": "A2C",
     "crossq": "CrossQ",
@@ -25,8 +25,8 @@ OF_FILES: Mapping[str, str] = {
     "tqc": "TQC",
     "trpo": "TRPO",
 }
-_SHARED = ("default", "atari")  # entries that stand for other environments
-CHOOSES_ALGORITHM = "model_class"  # a word of her.yml, where HER was not yet a replay buffer
+_SHARED = ("default", "atari")  # entries that apply to other environments
+CHOOSES_ALGORITHM = "model_class"  # a key of her.yml, which is older than HER as a replay buffer
 _LONGEST_LIST = 12
 _OF_AN_ENTRY = "n_timesteps"  # every entry has it
 
@@ -60,10 +60,10 @@ def read_file(text: str, name: str) -> Mapping[str, Any]:
 def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, Mapping[str, Any], str]:
     """Return the id of an environment, its entry, and the name of the entry.
 
-    As in Zoo, an environment that the file does not name gets the entry `default`.
+    As in Zoo, an environment without an entry gets the entry `default`.
 
     Raises:
-        ZooError: the file has no such entry, or several and no id is given.
+        ZooError: the file does not have the entry, or has several and `env` is None.
     """
     if _OF_AN_ENTRY in data:
         if env is None:
@@ -89,7 +89,7 @@ def algorithm_of(given: str | None, name: str, entry: Mapping[str, Any]) -> str:
     """Return the algorithm: the given one, else that of the entry, else that of the file.
 
     Raises:
-        ZooError: it is unknown, or not usable here.
+        ZooError: it is unknown, or cannot be used here.
     """
     word = str(given or entry.get(CHOOSES_ALGORITHM) or PurePath(name).stem)
     here = {**{known.lower(): known for known in ALGORITHMS}, **OF_FILES}

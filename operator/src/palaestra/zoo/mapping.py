@@ -1,7 +1,7 @@
-"""The place of each word of RL-Baselines3-Zoo in a TrainingJob.
+"""The field of a TrainingJob for each key of an entry of RL-Baselines3-Zoo.
 
-A word that is in no table is a keyword argument of the algorithm's class, as in Zoo. The trainer checks these
-against the class before it starts a simulator.
+A key without a table is a keyword argument of the algorithm's class, as in Zoo. The trainer checks these
+arguments against the class before it starts a simulator.
 """
 
 import math
@@ -21,7 +21,7 @@ _OFF_POLICY = frozenset({"DQN", "SAC", "TD3", "DDPG", "QRDQN", "TQC", "CrossQ"})
 _LINEAR = re.compile(r"lin_\d+(\.\d*)?(e-?\d+)?")
 _HINDSIGHT = "HerReplayBuffer"
 _GOALS = ("n_sampled_goal", "goal_selection_strategy")
-# Options of replay buffers that a run has anyway, and their values in a run.
+# Options of replay buffers with a fixed value in a run, and that value.
 _BUFFER_OPTIONS: Mapping[str, object] = {
     "copy_info_dict": False,
     "handle_timeout_termination": True,
@@ -34,7 +34,7 @@ _NORMALIZE = {
     "clip_reward": "clipRewards",
 }
 _LENGTH = "max_episode_length"  # of her.yml
-# Callbacks whose work a run does itself, and the fields of the job for it.
+# Callbacks that a run replaces, and the remedy for each.
 _CALLBACKS: Mapping[str, str] = {
     "CheckpointCallback": "a run saves checkpoints; set trainer.checkpoint.everySteps",
     "EvalCallback": "a run evaluates; set trainer.evaluation",
@@ -46,14 +46,14 @@ _CALLBACKS: Mapping[str, str] = {
 
 
 def note_together(draft: Draft) -> None:
-    """Note what only words together change, once all words are in their places."""
+    """Add notes about combinations of keys, after all keys were converted."""
     normalized = draft.algorithm.get("normalize", {}).get("observations", False)
     if draft.frame_stack is not None and normalized:
         draft.note("frame_stack", "a run normalizes the stacked observation; Zoo stacks normalized ones")
 
 
 def put(draft: Draft, word: str, value: Any) -> None:
-    """Put one word of an entry into its place, or note why it has none."""
+    """Convert one key of an entry, or add a note with the reason that it is left out."""
     if word == CHOOSES_ALGORITHM:
         return
     if word in _PLACES:
@@ -98,7 +98,7 @@ def _normalize(draft: Draft, value: Any) -> None:
     for name, option in _options(draft, "normalize", {} if value is True else value):
         if name in _NORMALIZE:
             chosen[_NORMALIZE[name]] = option
-        elif name != "gamma" or "gamma" not in draft.entry:  # Zoo gives it the algorithm's gamma then
+        elif name != "gamma" or "gamma" not in draft.entry:  # then Zoo uses the algorithm's gamma
             draft.note(f"normalize.{name}", "left out; algorithm.normalize has no such field")
     if not chosen["observations"]:
         chosen.pop("clipObservations", None)
@@ -112,7 +112,7 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
     arguments = dict(_options(draft, "policy_kwargs", value))
     layers = arguments.get("net_arch")
     if isinstance(layers, list) and any(isinstance(layer, dict) for layer in layers):
-        if len(layers) == 1:  # the form of Stable-Baselines3 before 1.8, with the same networks
+        if len(layers) == 1:  # the format of Stable-Baselines3 before 1.8, with the same networks
             arguments["net_arch"] = layers[0]
         else:
             del arguments["net_arch"]
@@ -126,7 +126,7 @@ def _policy_arguments(draft: Draft, value: Any) -> None:
 
 
 def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
-    """Return the place of the class of a buffer: `kind` is replay or rollout."""
+    """Return the converter for the class of a buffer: `kind` is replay or rollout."""
 
     def place(draft: Draft, value: Any) -> None:
         if value is not None:
@@ -137,7 +137,7 @@ def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
 
 
 def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
-    """Return the place of the options of a buffer; those of Stable-Baselines3's own classes are a run's."""
+    """Return the converter for a buffer's options; a run sets those of Stable-Baselines3's classes."""
 
     def place(draft: Draft, value: Any) -> None:
         chosen = draft.entry.get(f"{kind}_buffer_class")
@@ -151,7 +151,7 @@ def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
 
 
 def _takes(buffer: Any, option: str) -> bool:
-    """Return whether a buffer of an entry has an option of its own; an author's may have any."""
+    """Return whether a buffer of an entry accepts an option; an author's own buffer may accept any."""
     if buffer is None:
         return False
     return option in _GOALS if _is_hindsight(buffer) else option not in _BUFFER_OPTIONS
@@ -172,7 +172,7 @@ def _buffer_option(draft: Draft, word: str, option: Any) -> None:
 
 
 def _old_hindsight(word: str) -> Callable[[Draft, Any], None]:
-    """Return the place of a word of Zoo's her.yml, which is from before HER was a replay buffer."""
+    """Return the converter for a key of Zoo's her.yml, which is older than HER as a replay buffer."""
 
     def place(draft: Draft, value: Any) -> None:
         draft.hyperparameters["replay_buffer_class"] = _HINDSIGHT
@@ -257,7 +257,7 @@ def _environment_arguments(draft: Draft, value: Any) -> None:
 
 
 def _options(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the entries of a mapping, written as YAML or as a Python expression, and note what is neither."""
+    """Yield the entries of a mapping in YAML or in a Python expression; note other values."""
     if value is None:
         return
     try:
@@ -274,7 +274,7 @@ def _options(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _classes(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the dotted name and the arguments of each class of `env_wrapper`, `callback` and their like."""
+    """Yield the dotted name and the arguments of each class in keys such as `env_wrapper` and `callback`."""
     if value is None:
         return
     for item in value if isinstance(value, list) else [value]:
@@ -289,20 +289,20 @@ def _classes(draft: Draft, word: str, value: Any) -> Iterator[tuple[str, dict[st
 
 
 def _schedule(draft: Draft, word: str, value: str) -> Any:
-    """Return a schedule in the words of a job. In Zoo, a value after any word and `_` falls linearly to 0."""
+    """Return a schedule in the form of a job. In Zoo, a value after any word and `_` falls linearly to 0."""
     if _LINEAR.fullmatch(value):
         return value
     kind, _, rest = value.partition("_")
     number = _number(rest)
     if number is None:
-        return value  # the trainer refuses it with the forms that it takes
+        return value  # the trainer refuses it and lists the accepted forms
     if kind not in {"lin", "linear"}:
         draft.note(word, f"{value} falls linearly to 0, as in Zoo, which reads every schedule so")
     return [[0, number], [1, 0.0]]
 
 
 def _whole(draft: Draft, word: str, value: Any) -> int | None:
-    """Return a number without its fraction, as Zoo does; note what is not a number."""
+    """Return a number without its fraction, as Zoo does; add a note if it is not a number."""
     number = _number(value)
     if number is None:
         draft.note(word, f"left out; {value!r} is not a number; write one")

@@ -150,5 +150,7 @@ def _reach(shape: Shape) -> float:
     """Return the distance from the robot's origin to the farthest point of a shape, seen from above."""
     x, y, _ = shape.pose.position
     return math.hypot(x, y) + (
-        shape.size[0] / 2.0 if shape.kind != "box" else math.hypot(shape.size[0], shape.size[1]) / 2.0
+        shape.size[0] / 2.0
+        if shape.kind not in {"box", "mesh"}
+        else math.hypot(shape.size[0], shape.size[1]) / 2.0
     )

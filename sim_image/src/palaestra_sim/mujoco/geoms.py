@@ -27,12 +27,15 @@ STANDING: Final = 1 << 2  # robots' links and dynamic solids touch obstacles and
 _FIRST_ROBOT: Final = 3
 _BITS: Final = 32
 _LEAST_M3: Final = 1e-9
-FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' default coulombFriction between materials
+_LEAST_M: Final = 1e-6  # of the straight part of a capsule
+FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
 
 _GEOMS: Final = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "ball": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
 
 
@@ -60,13 +63,11 @@ def own_bit(index: int) -> int:
     return 1 << min(_FIRST_ROBOT + index, _BITS - 2)
 
 
-def add_geom(body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
-    """Add a shape to a body, at a pose in its frame; return the geom, whose mass is 0."""
-    half = [length / 2.0 for length in shape.size]
-    size = {"box": half, "cylinder": [half[0], half[2], 0.0], "ball": [half[0], 0.0, 0.0]}[shape.kind]
+def add_geom(spec: Any, body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
+    """Add a shape to a body of a model, at a pose in its frame; return the geom, whose mass is 0."""
     geom = body.add_geom(
         type=_GEOMS[shape.kind],
-        size=size,
+        **_form(spec, shape),
         contype=touch.contype,
         conaffinity=touch.conaffinity,
         friction=FRICTION,
@@ -75,6 +76,36 @@ def add_geom(body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
     )
     put(geom.pos, geom.quat, pose)
     return geom
+
+
+def _form(spec: Any, shape: Shape) -> dict[str, Any]:
+    """Return the arguments of a geom that are its size; of a mesh, its name. Rays meet its triangles."""
+    x, _, z = half = [length / 2.0 for length in shape.size]
+    match shape.kind:
+        case "box":
+            return {"size": half}
+        case "cylinder":
+            return {"size": [x, z, 0.0]}
+        case "capsule":
+            return {"size": [x, max(z - x, _LEAST_M), 0.0]}
+    if shape.mesh is None:
+        return {"size": [x, 0.0, 0.0]}
+    name = f"mesh {len(spec.meshes)}"
+    spec.add_mesh(
+        name=name,
+        uservert=np.ravel(shape.mesh.points),
+        userface=np.ravel(shape.mesh.triangles),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+    )
+    return {"meshname": name}
+
+
+def fill(geom: Any, shape: Shape, density: float) -> None:
+    """Give a geom the mass of its shape, from a density in kg/m3."""
+    if shape.mesh is None:
+        geom.density = density
+    else:  # MuJoCo would fill the convex hull
+        geom.mass = density * volume_m3(shape)
 
 
 def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
@@ -95,8 +126,8 @@ def add_matter(body: Any, matter: MassProperties, frame: Pose, geoms: Mapping[Sh
 def spread(mass_kg: float, shapes: Sequence[Shape], geoms: Iterable[Any]) -> None:
     """Divide a mass among geoms by their volumes."""
     density = mass_kg / max(sum(map(volume_m3, shapes)), _LEAST_M3)
-    for geom in geoms:
-        geom.density = density
+    for geom, shape in zip(geoms, shapes, strict=True):
+        fill(geom, shape, density)
 
 
 def put(position: Any, quaternion: Any, pose: Pose) -> None:

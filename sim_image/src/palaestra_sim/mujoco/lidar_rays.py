@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +16,9 @@ from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.sensor_rays import Beam
 
 _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
+
+_PAST_M: Final = 1e-6  # behind a triangle
+_MOST_TRIANGLES: Final = 100  # that one ray passes from behind
 
 
 class LidarBeams:
@@ -43,7 +47,8 @@ class LidarBeams:
         passed = [self._own_geoms(visible)]
         visible.model.geom_group[passed[0]] = PASSED
         for first, end in self._bundles:
-            distances[first:end] = _cast(visible, origins[first], directions[first:end], passed)
+            with _without(visible, _seen_from_below(visible, origins[first])):
+                distances[first:end] = _cast(visible, origins[first], directions[first:end], passed)
         visible.model.geom_group[np.concatenate(passed)] = 0
         missed = (distances < 0.0) | (distances > self._reach)
         travelled: list[float] = np.where(missed, self._reach, distances).tolist()
@@ -57,6 +62,23 @@ class LidarBeams:
             own = [at for at, place in enumerate(places) if place is not None and carrier in place.chain()]
             self._own = (visible, np.array(own, dtype=int))
         return self._own[1]
+
+
+def _seen_from_below(visible: VisualModel, origin: Any) -> Any:
+    """Return the numbers of the Planes below whose upper side a point is: only that one is drawn."""
+    planes = visible.planes
+    offsets = origin - visible.data.geom_xpos[planes]
+    heights = np.sum(offsets * visible.data.geom_xmat[planes][:, 2::3], axis=1)
+    return planes[heights < visible.model.geom_size[planes, 2]]
+
+
+@contextmanager
+def _without(visible: VisualModel, geoms: Any) -> Iterator[None]:
+    """Hide some geoms, which were seen before."""
+    shown = geoms[visible.model.geom_group[geoms] == 0]
+    visible.model.geom_group[shown] = PASSED
+    yield
+    visible.model.geom_group[shown] = 0
 
 
 def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any]) -> Any:
@@ -79,9 +101,28 @@ def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any])
             mujoco.mjMAXVAL,
         )
         from_inside = (distances >= 0.0) & (np.sum(normals * directions, axis=1) > 0.0)
-        around = np.unique(hits[from_inside])
-        around = around[visible.model.geom_type[around] != mujoco.mjtGeom.mjGEOM_MESH.value]
+        meshes = visible.model.geom_type[hits] == mujoco.mjtGeom.mjGEOM_MESH.value
+        around = np.unique(hits[from_inside & ~meshes])
         if not len(around):
+            for at in np.flatnonzero(from_inside):
+                distances[at] = _beyond(visible, origin, directions[at], distances[at])
             return distances
         visible.model.geom_group[around] = PASSED
         passed.append(around)
+
+
+def _beyond(visible: VisualModel, origin: Any, direction: Any, distance_m: float) -> float:
+    """Return how far a ray travels that met a triangle from behind, which is not drawn; -1 without end."""
+    normal = np.empty(3)
+    for _ in range(_MOST_TRIANGLES):
+        distance_m += _PAST_M
+        start = origin + distance_m * direction
+        further = mujoco.mj_ray(
+            visible.model, visible.data, start, direction, _GROUPS, True, -1, None, normal
+        )
+        if further < 0.0:
+            break
+        distance_m += further
+        if normal @ direction <= 0.0:
+            return distance_m
+    return -1.0

@@ -81,7 +81,7 @@ def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoB
         geoms = {}
         for shape in link.shapes:
             frame = frames_between(link.place, shape.place)
-            geoms[shape] = add_geom(inner, shape, frame.after(shape.local), _TOUCH)
+            geoms[shape] = add_geom(ground.spec, inner, shape, frame.after(shape.local), _TOUCH)
             marks.note(geoms[shape], shape, body, 0 if body is None else 1 << bit)
             bit += 1
         for matter in link.matter:

@@ -26,6 +26,7 @@ from palaestra_sim.mujoco.geoms import (
     Marks,
     Touch,
     add_geom,
+    fill,
     own_bit,
     put,
 )
@@ -50,15 +51,16 @@ class Built:
     """A compiled model with its data, and the objects of the scene to which its parts belong.
 
     Attributes:
-        figures: each robot that moves, with its body and the number of this body in the model.
-        geoms: by number, the shape of an obstacle or outline; for a robot also its body.
-        stands: by frame, the number of the body that has obstacles, or links mounted on it.
-        loose: the dynamic solids.
-        links: the links of each robot; the key None has those without a robot.
-        own_geoms: the numbers of the geoms on these links.
-        fixed: the poses of the obstacles that do not move.
-        of_robots: by number, whether a geom is part of a robot.
-        changed: the dynamic solids that clients moved since the last step.
+        figures: each robot that moves, with its body and the number of this in the model.
+        geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
+        stands: the number of the body of each place that has obstacles, or links mounted on it.
+        loose: the loose things.
+        links: the links of each robot, and under None those on no robot.
+        own_geoms: the numbers of the geoms on them.
+        fixed: where the obstacles are that do not move.
+        of_robots: whether a geom is a part of a robot, by number.
+        changed: the loose things that clients moved since the physics looked.
+        floors_m: the heights of the Planes of the world.
     """
 
     model: Any
@@ -72,6 +74,7 @@ class Built:
     fixed: dict[Frame, Pose]
     of_robots: Any
     changed: dict[DynamicFrame, None]
+    floors_m: tuple[float, ...]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it does not have one."""
@@ -186,6 +189,7 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
         fixed=fixed,
         of_robots=_of_robots(model.ngeom, marks),
         changed={},
+        floors_m=tuple(floor.height_m for floor in surroundings.floors),
         links=bodies(links, model, data),
         own_geoms={
             whose: [geom.id for it in some for geom in it.body.geoms] for whose, some in links.items()
@@ -292,7 +296,7 @@ def _add_obstacle(
             bottom, top = body.build.heights
             if low < top + height and bottom + height < high:
                 bits |= own_bit(index)
-        marks.note(add_geom(added, shape, shape.local, Touch(bits, 0)), shape)
+        marks.note(add_geom(spec, added, shape, shape.local, Touch(bits, 0)), shape)
     return added
 
 
@@ -301,9 +305,9 @@ def _add_loose(spec: Any, thing: DynamicSolid, marks: Marks) -> Any:
     added.add_freejoint()
     frame = thing.place.ground_pose.inverse
     touch = Touch(LOOSE, STANDING | LOOSE)
-    geoms = [add_geom(added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
+    geoms = [add_geom(spec, added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
     for geom, shape, density in zip(geoms, thing.shapes, thing.densities, strict=True):
-        geom.density = density
+        fill(geom, shape, density)
         marks.note(geom, shape)
     return added
 
@@ -339,5 +343,5 @@ def _add_robot(
         actuator.set_to_velocity(kv=gain)
     touch = Touch(ROBOTS, own_bit(index) | ROBOTS | LOOSE)
     for number, (shape, pose) in enumerate(zip(body.build.outline, body.poses, strict=True)):
-        marks.note(add_geom(added, shape, pose, touch), shape, body, 1 << number)
+        marks.note(add_geom(spec, added, shape, pose, touch), shape, body, 1 << number)
     return added

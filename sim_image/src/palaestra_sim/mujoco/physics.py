@@ -43,6 +43,7 @@ class MujocoPhysics:
         self._surroundings = PhysicsSettings()
         self._floors = self._surroundings.heights_m()
         self._contents = Contents()
+        self._heights: list[float] = []
         self._built: Built = build(self._contents, self._surroundings)
         self._moved: frozenset[Frame] = frozenset()  # obstacles that moved since the last reset
         self._stale = False
@@ -73,6 +74,10 @@ class MujocoPhysics:
         floors = self._surroundings.heights_m()
         if floors != self._floors:
             self._floors = floors
+            self._stale = True
+        heights = [figure.place.height_m for figure, _ in contents.moving]
+        if heights != self._heights:  # at which they move, and which decide what they touch
+            self._heights = heights
             self._stale = True
         if contents == self._contents:
             self._built.put_obstacles()

@@ -40,9 +40,20 @@ class Beams:
             for first, end in self._bundles:
                 self._cast(built, origins[first], directions[first:end].ravel(), own, slice(first, end))
         distances = self._distances
+        self._meet_floors_from_below(built, origins, directions)
         missed = (distances < 0.0) | (distances > self._reach)
         travelled: list[float] = np.where(missed, self._reach, distances).tolist()
         return travelled
+
+    def _meet_floors_from_below(self, built: Built, origins: Any, directions: Any) -> None:
+        """Shorten the beams that meet a floor from below: MuJoCo's planes have an upper side alone."""
+        for height_m in built.floors_m:
+            ways = height_m - origins[:, 2]
+            if ways.max(initial=0.0) > 0.0:
+                rising = (ways > 0.0) & (directions[:, 2] > 0.0)
+                met = ways[rising] / directions[rising, 2]
+                before = self._distances[rising]
+                self._distances[rising] = np.where(before < 0.0, met, np.minimum(before, met))
 
     def _cast(self, built: Built, origin: Any, directions: Any, own: int, part: slice) -> None:
         count = part.stop - part.start

@@ -35,8 +35,9 @@ class VisualModel:
     """A compiled model, and the objects that are needed to render it.
 
     Attributes:
-        things: the visible shapes, by the number of their geom; the last geom is the sky.
-        positions, rotations: of the geoms in the frames of their shapes, (n, 3) and (n, 3, 3).
+        things: by the number of their geom; the last geom is the sky.
+        positions, rotations: of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
+        planes: the numbers of those that are Planes.
         sun: the direction of its light.
         scene, option, camera: of MuJoCo's visualizer.
     """
@@ -46,6 +47,7 @@ class VisualModel:
     data: Any
     positions: Any
     rotations: Any
+    planes: Any
     sun: Vector
     scene: Any
     option: Any
@@ -85,6 +87,7 @@ def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> VisualModel:
         data=data,
         positions=data.geom_xpos.copy(),
         rotations=data.geom_xmat.reshape(-1, 3, 3).copy(),
+        planes=np.array([at for at, thing in enumerate(things) if thing.geometry == "Plane"], dtype=int),
         sun=sun,
         scene=mujoco.MjvScene(model, maxgeom=len(things) + 8),
         option=mujoco.MjvOption(),

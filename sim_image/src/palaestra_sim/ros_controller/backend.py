@@ -83,6 +83,11 @@ class Backend(Protocol):
         ...
 
     @property
+    def unread_textures(self) -> int:
+        """How many visible shapes have a texture that infra-red sensors do not see."""
+        ...
+
+    @property
     def basic_step_ms(self) -> int:
         """WorldInfo.basicTimeStep."""
         ...

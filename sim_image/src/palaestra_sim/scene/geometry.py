@@ -108,6 +108,21 @@ def from_axis_angle(rotation: AxisAngle) -> Matrix:
     )
 
 
+def minus(a: Vector, b: Vector) -> Vector:
+    """Return the vector from `b` to `a`."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
 def turned(rotation: AxisAngle, by: Matrix) -> AxisAngle:
     """Return a rotation after a turn `by` in its own frame."""
     return to_axis_angle(multiply(from_axis_angle(rotation), by))

@@ -13,6 +13,7 @@ from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.scene.validation import LeaveOut
 from palaestra_sim.world import builtin_protos, local_protos, parse
 from palaestra_sim.world.bounded_read import read_bounded
+from palaestra_sim.world.project_files import ProjectFiles
 from palaestra_sim.world.stand_ins import StandIn, shipped
 
 
@@ -39,7 +40,8 @@ class Loader:
             WorldError: the file is wrong, or contains an object that cannot be simulated.
             OSError: it cannot be read.
         """
-        world = parse(read_bounded(world_path), world_path.name)
+        source = read_bounded(world_path)
+        world = parse(source, world_path.name)
         found = local_protos(world_path, world, name=world_path.name, without=self.stand_ins)
         # A PROTO of the project overrides a built-in stand-in, and a stand-in of the user overrides both.
         solids = {name: entry for name, entry in shipped().items() if name not in found.local}
@@ -48,4 +50,6 @@ class Loader:
             stand_ins={**solids, **self.stand_ins},
             unusable=found.refused,
         )
-        return Simulation.of(world, self.physics(), world_path.name, mode, descriptions, self.leave_out)
+        simulation = Simulation.of(world, self.physics(), world_path.name, mode, descriptions, self.leave_out)
+        simulation.read_textures(ProjectFiles(world_path, source).read)
+        return simulation

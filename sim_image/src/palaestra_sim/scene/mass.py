@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from palaestra_sim.scene import meshes
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -60,6 +61,10 @@ def read_matter(
 def volume_m3(shape: Shape) -> float:
     """Return the volume of a shape in m3."""
     x, y, z = shape.size
+    if shape.mesh is not None:
+        return meshes.volume_m3(shape.mesh)
+    if shape.kind == "capsule":
+        return math.pi / 4.0 * x * x * (z - x / 3.0)
     return x * y * z * _FILLED[shape.kind]
 
 

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import Vector, cross, dot, minus
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _SIDES: Final = 20  # of a cone
 _CORNERS: Final = 3  # of a triangle
 _FEW: Final = 4  # a face with at most so many corners is treated as convex; most have three or four
 _LARGEST_M: Final = 1e5
+_PARALLEL: Final = 1e-12
+_THIN_M: Final = 1e-4  # a mesh that is thinner is flat
+_SHEET_M: Final = 1e-3
+
+_FEW_TRIANGLES: Final = 8  # that are tried one by one
+_SLACK_M: Final = 1e-9  # of a ray along the side of a box
 
 Triangle = tuple[int, int, int]
+Corners = tuple[Vector, Vector, Vector]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +32,59 @@ class Mesh:
 
     points: tuple[Vector, ...]
     triangles: tuple[Triangle, ...]
+    _parts: list[_Part] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    @property
+    def whole(self) -> _Part:
+        """All triangles, in boxes in boxes; they are sorted once."""
+        if not self._parts:
+            points = self.points
+            self._parts.append(_part([(points[a], points[b], points[c]) for a, b, c in self.triangles]))
+        return self._parts[0]
+
+
+class _Part(NamedTuple):
+    """Some triangles of a mesh.
+
+    Attributes:
+        low, high: the corners of the box around them.
+        inner: their halves, if there are many.
+        corners: of each triangle, if there are few.
+    """
+
+    low: Vector
+    high: Vector
+    inner: tuple[_Part, ...]
+    corners: tuple[Corners, ...]
+
+    def reached(self, origin: Vector, direction: Vector, nearest_m: float) -> bool:
+        """Return whether a ray enters the box before it has travelled so far."""
+        enter, leave = 0.0, nearest_m
+        for at, way, low, high in zip(origin, direction, self.low, self.high, strict=True):
+            if -_PARALLEL < way < _PARALLEL:
+                if not low - _PARALLEL <= at <= high + _PARALLEL:
+                    return False
+                continue
+            first, second = (low - at) / way, (high - at) / way
+            enter, leave = max(enter, min(first, second)), min(leave, max(first, second))
+        return enter <= leave + _SLACK_M
+
+
+def _part(corners: list[Corners]) -> _Part:
+    """Return triangles in halves of halves, along the longest side of the box around each."""
+    points = [point for three in corners for point in three]
+    middle, size = box_of(points)
+    low, high = (
+        tuple(at + sign * length / 2.0 for at, length in zip(middle, size, strict=True))
+        for sign in (-1.0, 1.0)
+    )
+    box = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+    if len(corners) <= _FEW_TRIANGLES:
+        return _Part(*box, (), tuple(corners))
+    axis = max(range(3), key=lambda it: size[it])
+    ordered = sorted(corners, key=lambda three: three[0][axis] + three[1][axis] + three[2][axis])
+    half = len(ordered) // 2
+    return _Part(*box, (_part(ordered[:half]), _part(ordered[half:])), ())
 
 
 def cone(radius_m: float, height_m: float) -> Mesh:
@@ -82,6 +142,94 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
         del left[ear]
     found += _fan(left)
     return [(face[a], face[b], face[c]) for a, b, c in found]
+
+
+def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bool = False) -> float:
+    """Return the meters along a ray to the nearest triangle; infinite if it misses all of them.
+
+    With `front`, a triangle is met from its outer side alone.
+    """
+    least, nearest_m = _PARALLEL if front else -math.inf, math.inf
+    waiting = [mesh.whole]
+    while waiting:
+        part = waiting.pop()
+        if part.reached(origin, direction, nearest_m):
+            waiting += part.inner
+            for three in part.corners:
+                nearest_m = min(nearest_m, _to_triangle(origin, direction, three, least))
+    return nearest_m
+
+
+def _to_triangle(origin: Vector, direction: Vector, corners: Corners, least: float) -> float:
+    """Return the meters to a triangle, as in Möller and Trumbore (1997); from behind `volume` is below 0."""
+    a, b, c = corners
+    first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
+    across = cross(direction, second)
+    volume = dot(first, across)
+    if abs(volume) < _PARALLEL or volume < least:
+        return math.inf
+    u = dot(apart, across) / volume
+    turned = cross(apart, first)
+    v = dot(direction, turned) / volume
+    if u < 0.0 or v < 0.0 or u + v > 1.0:
+        return math.inf
+    distance = dot(second, turned) / volume
+    return distance if distance >= 0.0 else math.inf
+
+
+def placed(mesh: Mesh, scale: Vector) -> Mesh | None:
+    """Return a mesh of a size, without points that are on no triangle; a flat one becomes 1 mm thick.
+
+    It is None if no triangle has an area.
+    """
+    used = sorted({index for triangle in mesh.triangles for index in triangle})
+    at = {index: place for place, index in enumerate(used)}
+    x, y, z = scale
+    points = [(px * x, py * y, pz * z) for px, py, pz in (mesh.points[index] for index in used)]
+    triangles = [(at[a], at[b], at[c]) for a, b, c in mesh.triangles]
+    largest = max((_area(points, triangle) for triangle in triangles), key=lambda it: math.hypot(*it))
+    if math.hypot(*largest) < _PARALLEL:
+        return None
+    normal = _normal(points, largest)
+    if normal is None:
+        return Mesh(tuple(points), tuple(triangles))
+    half = _SHEET_M / 2.0
+    sides = [
+        [(px + side * normal[0], py + side * normal[1], pz + side * normal[2]) for px, py, pz in points]
+        for side in (half, -half)
+    ]
+    count = len(points)
+    backs = [(a + count, c + count, b + count) for a, b, c in triangles]
+    return Mesh((*sides[0], *sides[1]), (*triangles, *backs))
+
+
+def _normal(points: Sequence[Vector], largest: Vector) -> Vector | None:
+    """Return the normal of a plane that has all points, along a vector; None if no plane has."""
+    length = math.hypot(*largest)
+    normal = largest[0] / length, largest[1] / length, largest[2] / length
+    heights = [dot(normal, point) for point in points]
+    return normal if max(heights) - min(heights) < _THIN_M else None
+
+
+def _area(points: Sequence[Vector], triangle: Triangle) -> Vector:
+    """Return a normal as long as twice the area of a triangle."""
+    a, b, c = (points[index] for index in triangle)
+    return cross(minus(b, a), minus(c, a))
+
+
+def box_of(points: Sequence[Vector]) -> tuple[Vector, Vector]:
+    """Return the middle and the size of the box around points."""
+    low = [min(point[axis] for point in points) for axis in range(3)]
+    high = [max(point[axis] for point in points) for axis in range(3)]
+    x, y, z = ((below + above) / 2.0 for below, above in zip(low, high, strict=True))
+    across, along, up = (above - below for below, above in zip(low, high, strict=True))
+    return (x, y, z), (across, along, up)
+
+
+def volume_m3(mesh: Mesh) -> float:
+    """Return the volume that the triangles enclose; wrong if they have gaps."""
+    points = mesh.points
+    return abs(sum(dot(points[a], cross(points[b], points[c])) for a, b, c in mesh.triangles)) / 6.0
 
 
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:

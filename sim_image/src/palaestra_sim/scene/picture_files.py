@@ -56,9 +56,13 @@ def load(path: str) -> ImageBuffer | None:
     Raises:
         UnsimulatedError: Pillow is missing.
     """
+    return _opened(path)
+
+
+def _opened(file: str | BytesIO) -> ImageBuffer | None:
     images = pillow("Image")
     try:
-        with images.open(path, formats=("PNG", "JPEG")) as image:
+        with images.open(file, formats=("PNG", "JPEG")) as image:
             width, height = image.size
             if width * height > _MOST_PIXELS:
                 return None
@@ -66,6 +70,15 @@ def load(path: str) -> ImageBuffer | None:
     except (OSError, SyntaxError, ValueError, images.DecompressionBombError):
         return None
     return ImageBuffer(width=width, height=height, pixels=pixels)
+
+
+def decode(data: bytes) -> ImageBuffer | None:
+    """Return the picture of the bytes of a PNG or JPEG file; None if they are of none.
+
+    Raises:
+        UnsimulatedError: Pillow is missing.
+    """
+    return _opened(BytesIO(data))
 
 
 def pillow(module: str) -> Any:

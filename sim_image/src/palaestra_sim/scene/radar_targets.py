@@ -10,15 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.hits import first_hit
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.validation import NodeReader
-
-_NEVER: Final = (math.inf, -math.inf)
 
 
 class Bounds(NamedTuple):
@@ -154,36 +153,6 @@ def _around(boxes: Sequence[Bounds]) -> Bounds | None:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return the distance at which a ray enters a shape; infinite if it never does."""
+    """Return how far a ray travels until it meets a shape; infinite if it never does."""
     frame = shape.pose.inverse
-    origin, way = frame.carry(start), frame.turned(direction)
-    half = [length / 2.0 for length in shape.size]
-    if shape.kind == "ball":
-        spans = [_in_ball(origin, way, half[0])]
-    elif shape.kind == "cylinder":
-        spans = [_in_ball(origin[:2], way[:2], half[0]), _in_slab(origin[2], way[2], half[2])]
-    else:
-        spans = [_in_slab(*of_axis) for of_axis in zip(origin, way, half, strict=True)]
-    enter, leave = max(span[0] for span in spans), min(span[1] for span in spans)
-    return max(enter, 0.0) if enter <= leave and leave >= 0.0 else math.inf
-
-
-def _in_slab(origin: float, way: float, half: float) -> tuple[float, float]:
-    """Return the distances along a ray at which it enters and leaves the space between two planes."""
-    if way == 0.0:
-        return (-math.inf, math.inf) if abs(origin) <= half else _NEVER
-    ends = (-half - origin) / way, (half - origin) / way
-    return min(ends), max(ends)
-
-
-def _in_ball(origin: Sequence[float], way: Sequence[float], radius: float) -> tuple[float, float]:
-    """Return the distances along a ray at which it enters and leaves a ball, or a circle of the plane."""
-    a = sum(it * it for it in way)
-    b = sum(it * at for it, at in zip(way, origin, strict=True))
-    c = sum(at * at for at in origin) - radius * radius
-    if a == 0.0:
-        return (-math.inf, math.inf) if c <= 0.0 else _NEVER
-    root = b * b - a * c
-    if root < 0.0:
-        return _NEVER
-    return (-b - math.sqrt(root)) / a, (-b + math.sqrt(root)) / a
+    return first_hit(shape, frame.carry(start), frame.turned(direction))

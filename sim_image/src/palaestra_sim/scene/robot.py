@@ -96,8 +96,8 @@ class Robot:
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function for the object that each infra-red beam meets now; see `Carrier`."""
-        return VisualRays(self._view, self.place, beams).cast
+        """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
+        return VisualRays(self._view, self.place, beams, textures=True).cast
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
         """Return a camera at a frame; None if this simulator does not render; see `Carrier`."""

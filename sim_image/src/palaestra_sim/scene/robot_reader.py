@@ -299,7 +299,7 @@ class _RobotReader:
     def _as_driven(
         self, joint: Joint, place: Frame, shapes: Sequence[Shape], end: SceneNode
     ) -> Driven | None:
-        round_ones = [shape for shape in shapes if shape.kind != "box"]
+        round_ones = [shape for shape in shapes if shape.kind not in {"box", "mesh"}]
         if joint.motor is None or joint.slides or not round_ones or _moves(place):
             return None
         frame = place.world_pose

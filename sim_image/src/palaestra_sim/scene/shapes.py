@@ -1,7 +1,4 @@
-"""Convert a boundingObject to shapes.
-
-A capsule counts as a cylinder of its length, a mesh as the box around its points.
-"""
+"""From a boundingObject to shapes."""
 
 from __future__ import annotations
 
@@ -11,7 +8,8 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import IDENTITY, Matrix, Pose, Vector
+from palaestra_sim.scene.geometry import IDENTITY, Matrix, Pose, Vector, minus
+from palaestra_sim.scene.meshes import Mesh, box_of, face_set, placed
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
 from palaestra_sim.scene.validation import NodeReader
@@ -19,17 +17,27 @@ from palaestra_sim.scene.validation import NodeReader
 _ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
 _ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
+_LEAST_M: Final = 1e-3  # of a side of the box around points
+_ACROSS: Final = 1e-3  # of a unit vector: level, to within a milliradian
+
+Kind = Literal["box", "cylinder", "ball", "capsule", "mesh"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """A box, cylinder or ball in its frame. Meters: `size` is x, y, z or 2 r, 2 r, height."""
+    """A box, cylinder, ball, capsule or mesh in the frame of its place.
 
-    kind: Literal["box", "cylinder", "ball"]
+    Attributes:
+        size: x, y, z in meters; of what is round 2 r, 2 r, height; of a capsule with its caps.
+        mesh: of kind "mesh"; its middle is the origin of the frame.
+    """
+
+    kind: Kind
     size: Vector
     local: Pose
     place: Frame
     node: SceneNode
+    mesh: Mesh | None = None
 
     @property
     def pose(self) -> Pose:
@@ -45,10 +53,16 @@ class Shape:
         """
         rotation = self.pose.rotation
         return (
-            self.kind == "ball"
+            self.kind in {"ball", "mesh"}
             or any(abs(rotation[6 + axis]) > _ALONG for axis in range(3))
+            or self.lies
             or any(around.stand_in for around in self.node.ancestors())
         )
+
+    @property
+    def lies(self) -> bool:
+        """Whether it is round about a level axis."""
+        return self.kind in {"cylinder", "capsule"} and abs(self.pose.rotation[8]) < _ACROSS
 
     def heights(self) -> tuple[float, float]:
         """Return z of its lower and its upper end."""
@@ -60,6 +74,9 @@ class Shape:
         """Return half its length along an axis of a frame, 0 to 2, in which it has that rotation."""
         if self.kind == "ball":
             return self.size[2] / 2.0
+        if self.kind == "capsule":
+            straight = max(self.size[2] - self.size[0], 0.0)
+            return (straight * abs(rotation[3 * axis + 2]) + self.size[0]) / 2.0
         if self.kind == "cylinder":
             along = min(1.0, abs(rotation[3 * axis + 2]))
             return (self.size[2] * along + self.size[0] * math.sqrt(1.0 - along * along)) / 2.0
@@ -123,7 +140,7 @@ def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -
 
 def _solid(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
     """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
-    kind: Literal["box", "cylinder", "ball"] = "cylinder"
+    kind: Kind = "cylinder"
     local = standing(node, grown.frame) if node.type_name in _ALONG_AN_AXIS else grown.frame
     if node.type_name == "Box":
         kind = "box"
@@ -132,6 +149,7 @@ def _solid(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) ->
         x = y = 2.0 * reading.number(node, "radius", 1.0)
         z = reading.number(node, "height", 2.0)
     elif node.type_name == "Capsule":
+        kind = "capsule"
         x = y = 2.0 * reading.number(node, "radius", 1.0)
         z = reading.number(node, "height", 2.0) + x
     elif node.type_name == "Sphere":
@@ -149,13 +167,19 @@ def _solid(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) ->
 
 
 def _mesh(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -> Iterator[Shape]:
-    """Yield the box around the points of a mesh."""
+    """Yield the triangles of a mesh; without faces, the box around its points."""
     points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
     if not points or len(points) % 3:
         reading.refuse(node, "an IndexedFaceSet without points", "give it a Coordinate with points")
         return
-    low = [min(points[axis::3]) for axis in range(3)]
-    high = [max(points[axis::3]) for axis in range(3)]
-    middle = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, (low[2] + high[2]) / 2.0)
-    x, y, z = ((high[axis] - low[axis]) * grown.scale[axis] for axis in range(3))
-    yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)
+    written = face_set(node)
+    mesh = None if written is None else placed(written, grown.scale)
+    if mesh is None:  # no face
+        middle, size = box_of(list(zip(points[0::3], points[1::3], points[2::3], strict=True)))
+        x, y, z = (max(it * factor, _LEAST_M) for it, factor in zip(size, grown.scale, strict=True))
+        yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)
+        return
+    middle, size = box_of(mesh.points)
+    centered = Mesh(tuple(minus(point, middle) for point in mesh.points), mesh.triangles)
+    local = grown.frame.after(Pose(middle))
+    yield Shape(kind="mesh", size=size, local=local, place=place, node=node, mesh=centered)

@@ -33,6 +33,7 @@ from palaestra_sim.scene.reader import SceneContents, read_added, read_scene
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.saved_states import States, require_joint
 from palaestra_sim.scene.shapes import bounding_shapes
+from palaestra_sim.scene.textures import ReadFile, Textures
 from palaestra_sim.scene.tree.fields import NodeField
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 from palaestra_sim.scene.tree.write_rules import require_removable, require_room
@@ -116,6 +117,15 @@ class Simulation:
         """
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, physics, leave_out), mode)
+
+    def read_textures(self, read: ReadFile) -> None:
+        """Let infra-red sensors see textures, whose files `read` returns."""
+        self._view.textures = Textures(read)
+
+    @property
+    def unread_textures(self) -> int:
+        """How many visible shapes have a texture that infra-red sensors do not see."""
+        return self._view.unread_textures()
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:
@@ -338,14 +348,20 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Update the poses of the obstacles, if `place` is part of one of them."""
+        """Arrange the world anew, if `place` is part of a solid or floor, or a robot has another height."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
-        if any(place in moving.chain() for moving in places):
+        lifted = self._heights != self._heights_now()
+        if lifted or any(place in moving.chain() for moving in places):
             self._solids_moved = True
             self._arrange()
 
+    def _heights_now(self) -> list[float]:
+        """Return how high the robots that nothing but a client lifts are, in meters."""
+        return [robot.place.height_m for robot in self.robots if robot.body is not None]
+
     def _arrange(self) -> None:
+        self._heights = self._heights_now()
         self.scene.physics.arrange(self.robots, self.scene.solids, self.scene.loose, self.scene.doors)
 
     def _basic_step(self) -> None:

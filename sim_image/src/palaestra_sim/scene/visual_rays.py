@@ -14,9 +14,10 @@ from operator import itemgetter
 from typing import Final, NamedTuple
 
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Pose, Vector, turn
-from palaestra_sim.scene.meshes import Mesh
+from palaestra_sim.scene.geometry import Pose, Vector, dot, minus, turn
+from palaestra_sim.scene.meshes import Mesh, nearest_triangle
 from palaestra_sim.scene.sensor_rays import Beam
+from palaestra_sim.scene.textures import Paint, Textures
 from palaestra_sim.scene.visuals import Drawn, View
 
 _PARALLEL: Final = 1e-12
@@ -41,10 +42,12 @@ class VisualRays:
         view: the visible part of the world.
         carrier: the frame of the robot.
         beams: in the frame of the robot.
+        textures: whether they count for the light that returns.
     """
 
-    def __init__(self, view: View, carrier: Frame, beams: Sequence[Beam]) -> None:
+    def __init__(self, view: View, carrier: Frame, beams: Sequence[Beam], *, textures: bool = False) -> None:
         self._view = view
+        self._textures = textures
         self._carrier = carrier
         self._bundles = [
             (origin, [(direction, reach_m) for _, direction, reach_m in rays])
@@ -75,16 +78,19 @@ class VisualRays:
             if self._carrier in chain:
                 continue
             of_its_kind = self._moving if any(place.moves for place in chain) else self._standing
-            of_its_kind.append(_Target(thing))
+            of_its_kind.append(_Target(thing, self._view.textures if self._textures else None))
 
 
 class _Target:
     """A visible shape, at the pose of its last update."""
 
-    __slots__ = ("_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
+    __slots__ = ("_paint", "_thing", "center", "half_height_m", "hit", "inward", "radius_m", "reflection")
 
-    def __init__(self, thing: Drawn) -> None:
+    def __init__(self, thing: Drawn, textures: Textures | None) -> None:
         self._thing = thing
+        self._paint: Paint | None = None
+        if textures is not None and thing.look is not None:
+            self._paint = textures.paint(thing.look, thing.geometry, thing.color[3], thing.tiles)
         self.hit = _surface(thing)
         self.radius_m = _radius(thing)
         self.reflection = reflection(thing)
@@ -100,6 +106,16 @@ class _Target:
         up = pose.rotation[6:]
         box_m = sum(abs(share) * length / 2.0 for share, length in zip(up, thing.size, strict=True))
         self.half_height_m = self.radius_m if thing.mesh else box_m
+
+    def light(self, origin: Vector, direction: Vector, distance_m: float) -> float:
+        """Return the share of light that returns from where a ray meets the shape; all in its frame."""
+        if self._paint is None:
+            return self.reflection
+        x, y, z = (
+            2.0 * (at + distance_m * way) / length
+            for at, way, length in zip(origin, direction, self._thing.size, strict=True)
+        )
+        return self._paint.reflection((x, y, z))
 
 
 def reflection(thing: Drawn) -> float:
@@ -124,23 +140,24 @@ def _bundle(
     farthest = max(reach_m for _, reach_m in rays)
     near = []
     for target in targets:
-        offset = _minus(target.center, start)
-        beyond = _dot(offset, offset) - target.radius_m**2  # negative if the origin is inside its ball
+        offset = minus(target.center, start)
+        beyond = dot(offset, offset) - target.radius_m**2  # negative: the origin is inside its ball
         if beyond < 0.0 or math.hypot(*offset) - target.radius_m < farthest:
             near.append((target, *offset, target.radius_m, beyond, target.inward.carry(start)))
     near.sort(key=itemgetter(5))  # the nearest first, because it hides most
     level = [row for row in near if abs(row[3]) <= row[0].half_height_m]
     for direction, reach_m in rays:
         dx, dy, dz = towards = turn(pose.rotation, direction)
-        nearest, light = reach_m, 1.0
+        nearest, met = reach_m, None
         for target, x, y, z, radius_m, beyond, inside in near if dz else level:
             along = x * dx + y * dy + z * dz
             if along - radius_m > nearest or (beyond > 0.0 and (along < 0.0 or beyond > along * along)):
                 continue
-            distance_m = target.hit(inside, turn(target.inward.rotation, towards))
+            inward = turn(target.inward.rotation, towards)
+            distance_m = target.hit(inside, inward)
             if distance_m < nearest:
-                nearest, light = distance_m, target.reflection
-        yield Glance(nearest, light)
+                nearest, met = distance_m, (target, inside, inward)
+        yield Glance(nearest, 1.0 if met is None else met[0].light(met[1], met[2], nearest))
 
 
 def _radius(thing: Drawn) -> float:
@@ -165,6 +182,8 @@ def _surface(thing: Drawn) -> Surface:
             return lambda origin, direction: _cylinder(origin, direction, half)
         case "capsule":
             return lambda origin, direction: _capsule(origin, direction, half)
+    if thing.geometry == "Plane":
+        return lambda origin, direction: _sheet(origin, direction, half)
     return lambda origin, direction: _box(origin, direction, half)
 
 
@@ -186,6 +205,16 @@ def _box(origin: Vector, direction: Vector, half: Vector) -> float:
         if enter > leave:
             return math.inf
     return math.inf if inside else enter
+
+
+def _sheet(origin: Vector, direction: Vector, half: Vector) -> float:
+    """Return the meters to the upper side of a box, the only one that a Plane has."""
+    above = origin[2] - half[2]
+    if above < 0.0 or direction[2] > -_PARALLEL:
+        return math.inf
+    distance = -above / direction[2]
+    x, y = origin[0] + distance * direction[0], origin[1] + distance * direction[1]
+    return distance if abs(x) <= half[0] and abs(y) <= half[1] else math.inf
 
 
 def _ball(origin: Vector, direction: Vector, half: Vector) -> float:
@@ -240,38 +269,6 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
-    """Return the surface of triangles, which are visible from both sides."""
-    corners = [(points[a], points[b], points[c]) for a, b, c in mesh.triangles]
-
-    def nearest(origin: Vector, direction: Vector) -> float:
-        return min((_triangle(origin, direction, *three) for three in corners), default=math.inf)
-
-    return nearest
-
-
-def _triangle(origin: Vector, direction: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Return the distance to a triangle in meters, as in Möller and Trumbore (1997)."""
-    first, second, apart = _minus(b, a), _minus(c, a), _minus(origin, a)
-    across = _cross(direction, second)
-    volume = _dot(first, across)
-    if abs(volume) < _PARALLEL:
-        return math.inf
-    u = _dot(apart, across) / volume
-    turned = _cross(apart, first)
-    v = _dot(direction, turned) / volume
-    if u < 0.0 or v < 0.0 or u + v > 1.0:
-        return math.inf
-    distance = _dot(second, turned) / volume
-    return distance if distance >= 0.0 else math.inf
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    """Return the surface of triangles, of which the outer sides are seen."""
+    scaled = Mesh(tuple(points), mesh.triangles)
+    return lambda origin, direction: nearest_triangle(scaled, origin, direction, front=True)

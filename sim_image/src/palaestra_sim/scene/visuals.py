@@ -1,7 +1,8 @@
 """Convert the nodes of a world to visible shapes, each with a color and the frame that carries it.
 
-Pure. Textures, lights and mesh files are not read: a shape has one color. A stand-in has the shapes of its
-outline, in the color of its first appearance. A shape that a scale distorts keeps its angles.
+Lights and mesh files are not read, and no texture: a shape has one color. A stand-in has the shapes of its
+outline, in the color of its first appearance that is not of another part. What a scale distorts keeps its
+angles.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle
 from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
+from palaestra_sim.scene.textures import Textures, texture_of
 
 Kind = Literal["box", "ball", "cylinder", "capsule", "mesh"]
 Color = tuple[float, float, float, float]  # red, green, blue, alpha, from 0 to 1
@@ -42,14 +44,19 @@ _LOOKS: Final = frozenset(
         "Coordinate",
         "Cylinder",
         "ElevationGrid",
+        "ImageTexture",
         "IndexedFaceSet",
         "Material",
         "PBRAppearance",
         "Plane",
         "Shape",
         "Sphere",
+        "TextureTransform",
     )
 )
+# What has the size of a floor's texture, by the PROTO.
+_TILES: Final = {"Floor": "tileSize", "RectangleArena": "floorTileSize"}
+_TILE_M: Final = (0.5, 0.5)  # Source: Floor.proto of Webots
 _HOLDING: Final = ("children", "endPoint")
 
 
@@ -66,6 +73,10 @@ class Drawn:
         node: the Shape, or the stand-in.
         mesh: for the kind "mesh".
         roughness: of a PBRAppearance, 0 to 1.
+        geometry: the type of its geometry, such as "Plane".
+        look: its appearance; None if it has none, or if the place of its texture is not known.
+        textured: whether its appearance has a texture.
+        tiles: how often the texture repeats along x and y.
     """
 
     kind: Kind
@@ -76,6 +87,10 @@ class Drawn:
     node: SceneNode
     mesh: Mesh | None = None
     roughness: float = 0.0
+    geometry: str = ""
+    look: SceneNode | None = None
+    textured: bool = False
+    tiles: tuple[float, float] = (1.0, 1.0)
 
 
 def drawn(root: SceneNode) -> Iterator[Drawn]:
@@ -88,12 +103,14 @@ class View:
 
     Attributes:
         root: of the world.
-        changes: number of times that a shape was added, removed, or got another look.
-        moves: number of times that a client moved a shape; motion of robots and joints does not count.
+        textures: the images of its textures.
+        changes: how often something has come, gone, or got another look.
+        moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
     """
 
     def __init__(self, root: SceneNode) -> None:
         self.root = root
+        self.textures = Textures()
         self.changes = 0
         self.moves = 0
 
@@ -107,6 +124,12 @@ class View:
     def things(self) -> tuple[Drawn, ...]:
         """Return the current visible shapes."""
         return tuple(drawn(self.root))
+
+    def unread_textures(self) -> int:
+        """Return how many shapes have a texture that is not read, or not in its place."""
+        paint = self.textures.paint
+        textured = (thing for thing in self.things() if thing.textured)
+        return sum(it.look is None or paint(it.look, it.geometry, 1.0) is None for it in textured)
 
     def sky(self) -> Vector:
         """Return the color of the background, red, green and blue from 0 to 1."""
@@ -162,24 +185,55 @@ def _inside(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 
 def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
-    looks = [it for it in node.inside() if it.type_name in {"Appearance", "PBRAppearance"}]
-    look = _look(looks[0]) if looks else None
+    floor, others = _stand_in_look(node, "wallAppearance"), _stand_in_look(node, "floorAppearance")
+    tile = _tile(node)
+    floor = floor._replace(tile=tile) if tile else floor._replace(node=None)
     for outline in node.nodes("boundingObject"):
         for pose in outline.nodes():
             for geometry in pose.nodes():
-                plain = _FLOOR if geometry.type_name == "Plane" else _STAND_IN
-                yield from _geometry(geometry, frame.within(pose), look or _Look((*plain, 1.0)), node)
+                is_floor = geometry.type_name == "Plane"
+                look = floor if is_floor else others._replace(node=None)
+                if not look.color:
+                    look = look._replace(color=(*(_FLOOR if is_floor else _STAND_IN), 1.0))
+                yield from _geometry(geometry, frame.within(pose), look, node)
+
+
+def _stand_in_look(node: SceneNode, but: str) -> _Look:
+    """Return the first look that a stand-in has, but for that in one field; without color if it has none."""
+    looks = (
+        item
+        for name, content in node.fields.items()
+        for item in content.items
+        if name != but and isinstance(item, SceneNode) and item.type_name in {"Appearance", "PBRAppearance"}
+    )
+    found = next(looks, None)
+    return _Look(()) if found is None else _look(found)
+
+
+def _tile(node: SceneNode) -> tuple[float, float] | None:
+    """Return the size of a texture on the floor of a stand-in, in meters; None if it is not known."""
+    field = _TILES.get(node.proto_name)
+    width, length = (0.0, 0.0) if field is None else _numbers(node, field, _TILE_M)
+    return (width, length) if min(width, length) > 0.0 else None
 
 
 class _Look(NamedTuple):
-    color: Color
+    """How a shape looks; `node` is None if the place of its texture is not known.
+
+    `tile` is the size of one texture in meters; None: it is as large as the shape.
+    """
+
+    color: Color | tuple[()]
     roughness: float = 0.0
+    node: SceneNode | None = None
+    textured: bool = False
+    tile: tuple[float, float] | None = None
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
     """Yield the shape of a geometry; nothing if its numbers are invalid or it is in another file."""
     solid = _solid(node, frame.pose)
-    if solid is None or look.color[3] <= 0.0:
+    if solid is None or not look.color or look.color[3] <= 0.0:
         return
     x, y, z = (length * factor for length, factor in zip(solid.size, frame.scale, strict=True))
     if node.type_name == "Plane":
@@ -194,6 +248,10 @@ def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> 
             node=owner,
             mesh=solid.mesh,
             roughness=look.roughness,
+            geometry=node.type_name,
+            look=look.node,
+            textured=look.textured,
+            tiles=(1.0, 1.0) if look.tile is None else (x / look.tile[0], y / look.tile[1]),
         )
 
 
@@ -246,7 +304,11 @@ def _of_shape(shape: SceneNode) -> _Look:
 
 
 def _look(look: SceneNode) -> _Look:
-    """Return the look of an Appearance, of a PBRAppearance, or of an appearance PROTO."""
+    """Return the look of an Appearance, of a PBRAppearance, or of a PROTO for one."""
+    return _plain_look(look)._replace(node=look, textured=texture_of(look) is not None)
+
+
+def _plain_look(look: SceneNode) -> _Look:
     if look.type_name == "Appearance":
         material = next(iter(look.nodes("material")), None)
         if material is None:

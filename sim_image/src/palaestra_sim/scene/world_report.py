@@ -14,11 +14,13 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.scene.tree.field_types import without_effect
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 _ROLLS_AND_TURNS: Final = 2
 _MOST_NAMES: Final = 8  # of devices in one line
+_OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
 class Described(Protocol):
@@ -34,6 +36,11 @@ class Described(Protocol):
     @property
     def forces(self) -> bool:
         """Whether the masses and frictions of the world's nodes affect the motion."""
+        ...
+
+    @property
+    def unread_textures(self) -> int:
+        """How many visible shapes have a texture that infra-red sensors do not see."""
         ...
 
     @property
@@ -104,11 +111,14 @@ def differences(simulation: Described) -> Iterator[str]:
     yield from _not_in_webots(devices)
     yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
-        yield f"{infrared} infra-red DistanceSensor: textures do not count, rays pass the robot itself"
+        yield f"{infrared} infra-red DistanceSensor: rays pass the robot itself"
+        if unread := simulation.unread_textures:
+            yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
+    yield from _without_physics(robots)
     if meshes:
-        yield f"{meshes} IndexedFaceSet as boundingObject: the box around its points"
+        yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"
     rays = (
         beam
         for _, it in devices
@@ -118,6 +128,18 @@ def differences(simulation: Described) -> Iterator[str]:
     sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _without_physics(robots: Iterable[RobotParts]) -> Iterator[str]:
+    """Yield a line for each type of sensor that measures nothing in Webots where no Solid has physics."""
+    lacking = Counter(
+        node.type_name
+        for robot in robots
+        for node in robot.devices.nodes.values()
+        if node.type_name in _OF_BODIES and not any(it.nodes("physics") for it in (node, *node.ancestors()))
+    )
+    for type_name, count in sorted(lacking.items()):
+        yield f"{count} {type_name} on a robot without physics: Webots measures nothing there"
 
 
 def _not_in_webots(devices: Iterable[tuple[DeviceType[Any], Any]]) -> Iterator[str]:

@@ -2,8 +2,8 @@
 
 - `cli`: `palaestra-stub`
 - `physics`: the robots and obstacles of a world
-- `body`, `contacts`: the motion of robots, and their contacts
-- `rays`: the distances that the beams of sensors travel
+- `body`, `contacts`: motion, and what a robot runs into
+- `rays`, `others`: how far the beams of sensors travel, and robots as they meet them
 - `outline`, `obstacles`: shapes, seen from above
 
 `scene` has worlds and devices, `ros_controller` the interface of Webots' `ros` controller; all simulators

@@ -1,4 +1,4 @@
-"""The obstacles of robots and rays, seen from above: discs and blocks.
+"""The obstacles of robots and rays, seen from above: discs, blocks and the hulls of meshes.
 
 Each shape computes how deep a round robot is inside it, and the distance that a ray travels until it meets
 the shape. Callers check heights first: here, every shape is as high as the robots.
@@ -7,13 +7,14 @@ the shape. Callers check heights first: here, every shape is as high as the robo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
 from palaestra_sim.scene.sensor_rays import Ray
 
 # A contact: x and y of the unit normal that points at the robot, depth in meters.
 Contact = tuple[float, float, float]
+Point = tuple[float, float]  # x and y in meters
 
 _SAME_PLACE_M2 = 1e-24  # squared distance below which rounding destroys the direction
 
@@ -171,6 +172,96 @@ class Block:
         if out_x < out_y:
             return (math.copysign(1.0, x), 0.0, out_x + radius)
         return (0.0, math.copysign(1.0, y), out_y + radius)
+
+
+class Hull:
+    """The outline of a mesh: the convex polygon around its points, counter-clockwise."""
+
+    __slots__ = ("corners", "x", "y")
+
+    def __init__(self, points: Iterable[Point]) -> None:
+        self.corners = _hull(points)
+        self.x = sum(x for x, _ in self.corners) / len(self.corners)
+        self.y = sum(y for _, y in self.corners) / len(self.corners)
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the meters from a point to the polygon; 0 inside it."""
+        nearest_x, nearest_y, inside = self._nearest(x, y)
+        return 0.0 if inside else math.hypot(x - nearest_x, y - nearest_y)
+
+    def contact(self, x: float, y: float, radius: float) -> Contact | None:
+        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        nearest_x, nearest_y, inside = self._nearest(x, y)
+        distance = math.hypot(x - nearest_x, y - nearest_y)
+        if not inside and distance >= radius:
+            return None
+        if distance * distance < _SAME_PLACE_M2:
+            away = math.hypot(x - self.x, y - self.y) or 1.0
+            return ((x - self.x) / away, (y - self.y) / away, radius)
+        sign = -1.0 if inside else 1.0
+        push = radius + distance if inside else radius - distance
+        return (sign * (x - nearest_x) / distance, sign * (y - nearest_y) / distance, push)
+
+    def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
+        """Shorten `reach` to where the rays of a robot at `frame` meet the polygon."""
+        for i, ray in enumerate(rays):
+            enter, leave = self.crossing(frame, ray)
+            if max(enter, 0.0) <= leave:
+                reach[i] = min(reach[i], max(enter, 0.0))
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the polygon, in meters along it; enter > leave: it misses."""
+        x, y, c, s = frame
+        px, py, ux, uy = ray
+        at_x, at_y = x + c * px - s * py, y + s * px + c * py
+        way_x, way_y = c * ux - s * uy, s * ux + c * uy
+        enter, leave = -math.inf, math.inf
+        for (ax, ay), (bx, by) in self._edges():
+            beyond = (at_x - ax) * (by - ay) - (at_y - ay) * (bx - ax)  # positive: outside of this edge
+            outward = way_x * (by - ay) - way_y * (bx - ax)
+            if outward > 0.0:
+                leave = min(leave, -beyond / outward)
+            elif outward < 0.0:
+                enter = max(enter, -beyond / outward)
+            elif beyond > 0.0:
+                return math.inf, -math.inf
+        return enter, leave
+
+    def _edges(self) -> Iterator[tuple[Point, Point]]:
+        return zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
+
+    def _nearest(self, x: float, y: float) -> tuple[float, float, bool]:
+        """Return the point of the edges that is nearest to another one, and whether that one is inside."""
+        best, inside = (math.inf, 0.0, 0.0), True
+        for (ax, ay), (bx, by) in self._edges():
+            dx, dy = bx - ax, by - ay
+            along = ((x - ax) * dx + (y - ay) * dy) / ((dx * dx + dy * dy) or 1.0)
+            along = max(0.0, min(1.0, along))
+            at_x, at_y = ax + along * dx, ay + along * dy
+            best = min(best, (math.hypot(x - at_x, y - at_y), at_x, at_y))
+            inside = inside and (x - ax) * dy - (y - ay) * dx <= 0.0
+        return best[1], best[2], inside
+
+
+def _hull(points: Iterable[Point]) -> list[Point]:
+    """Return the corners of the convex polygon around points, counter-clockwise: Andrew's chains."""
+    ordered = sorted(set(points))
+    if len(ordered) < len("abc"):
+        return ordered
+    return [*_chain(ordered), *_chain(ordered[::-1])]
+
+
+def _chain(points: Iterable[Point]) -> list[Point]:
+    """Return the lower half of a hull, without its last corner."""
+    found: list[Point] = []
+    for x, y in points:
+        while len(found) > 1:
+            (ax, ay), (bx, by) = found[-2:]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                break
+            found.pop()
+        found.append((x, y))
+    return found[:-1]
 
 
 def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:

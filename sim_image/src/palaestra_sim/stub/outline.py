@@ -1,7 +1,7 @@
-"""Outlines, seen from above: discs and blocks of obstacles, and discs of robots.
+"""Outlines, seen from above: discs, blocks and hulls of obstacles, and discs of robots.
 
-A shape has one outline, which holds from its lower to its upper end. That is exact for upright and lying
-boxes and cylinders. For a ball, a capsule and a mesh it is the widest outline.
+A shape has one outline, which holds from its lower to its upper end. That is exact for boxes and for
+cylinders that stand. Of others it is the widest outline, for contacts; rays meet their true surface.
 
 A robot's outline is a set of discs, fixed in its frame. A disc keeps its shape however the robot turns, so a
 contact costs the same at every heading. A box becomes a row of discs with its length, its width, and round
@@ -16,10 +16,11 @@ from typing import Final, NamedTuple
 
 from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.shapes import Shape
-from palaestra_sim.stub.obstacles import Block, Disc
+from palaestra_sim.stub.obstacles import Block, Disc, Hull
 
 _Z: Final = 2
-_MOST_DISCS: Final = 16  # of one box; if its length is over eight times its width, gaps remain between discs
+_ALONG_Z: Final = frozenset(("cylinder", "capsule"))
+_MOST_DISCS: Final = 16  # of one box; a bar more than eight times as long as wide has gaps between them
 
 
 class RoundPart(NamedTuple):
@@ -51,15 +52,27 @@ def discs_of_box(
     return tuple(RoundPart(x_m + c * place, y_m + s * place, radius_m) for place in places)
 
 
-def obstacle(shape: Shape) -> Disc | Block:
-    """Return the outline of a shape at its current place."""
+def obstacle(shape: Shape) -> Disc | Block | Hull:
+    """Return the outline of a shape, where it is now."""
+    if shape.mesh is None:
+        return _simple(shape)
+    return Hull(shape.pose.carry(point)[:2] for point in shape.mesh.points)
+
+
+def _simple(shape: Shape) -> Disc | Block:
+    """Return a disc or a block around a shape; of a mesh, around its box."""
     pose = shape.pose
     x, y, _ = pose.position
     vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
-    if shape.kind == "ball" or (shape.kind == "cylinder" and vertical == _Z):
+    if shape.kind == "ball" or (shape.kind in _ALONG_Z and vertical == _Z):
         return Disc(x, y, shape.size[0] / 2.0)
     heading_rad, length, width = _footprint(shape, pose, vertical)
     return Block(x, y, heading_rad, (length, width))
+
+
+def prismatic(shape: Shape) -> bool:
+    """Return whether the outline of a shape holds from its lower to its upper end."""
+    return shape.kind == "box" or (shape.kind == "cylinder" and not shape.lies)
 
 
 def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
@@ -77,7 +90,10 @@ def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
 
 
 def _footprint(shape: Shape, pose: Pose, vertical: int) -> tuple[float, float, float]:
-    """Return the heading of one of its level axes, its extent along this axis, and its extent across."""
+    """Return the heading of one of its level axes, its extent along this one, and that across."""
+    if shape.kind in _ALONG_Z:
+        axis_rad = math.atan2(pose.rotation[3 + _Z], pose.rotation[_Z])
+        return axis_rad - math.pi / 2.0, shape.size[0], shape.size[_Z]
     along, across = (axis for axis in range(3) if axis != vertical)
     heading_rad = math.atan2(pose.rotation[3 + along], pose.rotation[along])
     return heading_rad, shape.size[along], shape.size[across]
@@ -88,7 +104,7 @@ def _inside(inner: RoundPart, outer: RoundPart) -> bool:
 
 
 def _discs(shape: Shape) -> list[RoundPart]:
-    outline = obstacle(shape)
+    outline = _simple(shape)
     if isinstance(outline, Disc):
         return [RoundPart(outline.x, outline.y, outline.radius)]
     length, width = 2.0 * outline.half_x, 2.0 * outline.half_y

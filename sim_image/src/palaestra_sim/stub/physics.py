@@ -12,6 +12,7 @@ from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.camera_interface import Lens
 from palaestra_sim.scene.dynamic_solids import DynamicSolid
 from palaestra_sim.scene.frames import Frame
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
@@ -23,15 +24,32 @@ from palaestra_sim.scene.visuals import View
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
-from palaestra_sim.stub.outline import covering, obstacle
-from palaestra_sim.stub.rays import Fan, SlopedBeams, Upright
+from palaestra_sim.stub.others import OtherRobot
+from palaestra_sim.stub.outline import covering, obstacle, prismatic
+from palaestra_sim.stub.rays import Fan, Met, Rounded, SlopedBeams, Upright
+
+_Tall = tuple[Shape, tuple[float, float]]  # with its lower and its upper end
 
 
 class _Level(NamedTuple):
-    """The level beams of one robot, and the range of their heights in the robot's frame."""
+    """The level beams of one robot.
+
+    Attributes:
+        fan: meets what reaches from the lowest to the highest of them.
+        heights: between which they are, in the robot's frame.
+        rest: the same beams, for what some of them pass.
+    """
 
     fan: Fan
     heights: tuple[float, float]
+    rest: SlopedBeams
+
+    def cast(self, frame: tuple[float, float, float, float], height_m: float) -> Sequence[float]:
+        """Return how far each beam travels in meters."""
+        distances = self.fan.cast(frame)
+        if self.rest.free:
+            return distances
+        return list(map(min, distances, self.rest.cast(frame, height_m)))
 
 
 class StubPhysics:
@@ -43,6 +61,8 @@ class StubPhysics:
         self._moving: list[tuple[Figure, StubBody]] = []
         self._surroundings = PhysicsSettings()
         self._solids: tuple[Shape, ...] = ()
+        self._tall: list[_Tall] = []
+        self._parts: dict[StubBody, list[tuple[Shape, Pose]]] = {}
         self._level: dict[Figure, list[_Level]] = {}
         self._sloped: dict[Figure, list[SlopedBeams]] = {}
         self._view: View
@@ -51,7 +71,10 @@ class StubPhysics:
         """Return the body of a robot: upright cylinders between its lowest and highest point."""
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
-        return StubBody(build.base, outline, rim, build.heights)
+        body = StubBody(build.base, outline, rim, build.heights)
+        # Read now, in the robot's frame; later the places are those in the world.
+        self._parts[body] = [(shape, shape.pose.inverse) for shape in build.outline]
+        return body
 
     def begin(self, surroundings: PhysicsSettings) -> None:
         """Set the floors of the world; the stub has no forces."""
@@ -67,18 +90,22 @@ class StubPhysics:
         """Set the obstacles of each robot and of its rays."""
         del loose, doors  # the world checks refuse both, see `abilities`
         self._solids = tuple(solids)
+        self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
         self._level = {it: beams for it, beams in self._level.items() if it in figures}
         self._sloped = {it: beams for it, beams in self._sloped.items() if it in figures}
         for figure in figures:
             others = [(it, body) for it, body in self._moving if it is not figure and body.radius > 0.0]
-            self._face(figure, [body for _, body in others])
+            robots = [(body, OtherRobot(body, it.place, self._parts[body])) for it, body in others]
+            self._face(figure, robots)
             if not self._sloped.get(figure):
                 continue
-            uprights = [_upright(shape) for shape in solids if not _is_on(figure, shape)]
+            around = [shape for shape in solids if not _is_on(figure, shape)]
+            uprights = [_upright(shape) for shape in around if prismatic(shape)]
+            rounded: list[Met] = [_rounded(shape) for shape in around if not prismatic(shape)]
+            rounded += [robot for _, robot in robots]
             for sloped in self._sloped[figure]:
-                others_now = [_of_robot(it, body) for it, body in others]
-                sloped.face(uprights, others_now, self._surroundings.heights_m())
+                sloped.face(uprights, self._surroundings.heights_m(), rounded)
 
     def advance(self, step_s: float) -> None:
         """Move the bodies by one basic step."""
@@ -100,9 +127,9 @@ class StubPhysics:
             return lambda: sloped.cast_from(place.ground_pose)
         fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
         heights = [beam.height_m for beam in beams]
-        self._level.setdefault(figure, []).append(_Level(fan, (min(heights), max(heights))))
-        cast = fan.cast
-        return lambda: cast((body.x, body.y, body.c, body.s))
+        level = _Level(fan, (min(heights), max(heights)), SlopedBeams(beams))
+        self._level.setdefault(figure, []).append(level)
+        return lambda: level.cast((body.x, body.y, body.c, body.s), place.height_m)
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return the same function for beams that meet visible objects and pass through the robot itself."""
@@ -128,35 +155,47 @@ class StubPhysics:
         """Return the contact points of robots with obstacles and with each other now."""
         return contact_points(self._moving, self._solids)
 
-    def _face(self, figure: Figure, others: Sequence[StubBody]) -> None:
+    def _face(self, figure: Figure, others: Sequence[tuple[StubBody, OtherRobot]]) -> None:
         height = figure.place.height_m
         body = figure.body
         if isinstance(body, StubBody) and body.radius > 0.0:
-            in_the_way = _between(self._solids, body.heights, height)
-            body.face(_neighborhood(in_the_way, body.radius), others)
-        for fan, heights in self._level.get(figure, ()):
-            fan.face(_neighborhood(_between(self._solids, heights, height), fan.reach_m), others)
+            in_the_way = [shape for shape, _ in _between(self._tall, body.heights, height)]
+            body.face(_neighborhood(in_the_way, body.radius), [it for it, _ in others])
+        for level in self._level.get(figure, ()):
+            self._face_level(level, height, others)
+
+    def _face_level(
+        self, level: _Level, height: float, others: Sequence[tuple[StubBody, OtherRobot]]
+    ) -> None:
+        """Set the obstacles of level beams: for all at once what all of them meet, for each the others."""
+        low, high = level.heights[0] + height, level.heights[1] + height
+        whole, partly = [], []
+        rounded: list[Met] = [robot for _, robot in others if not robot.stands_along(low, high)]
+        for shape, (bottom, top) in _between(self._tall, level.heights, height):
+            if not prismatic(shape):
+                rounded.append(_rounded(shape))
+            elif bottom < low and high < top:
+                whole.append(shape)
+            else:
+                partly.append(_upright(shape))
+        along = [body for body, robot in others if robot.stands_along(low, high)]
+        level.fan.face(_neighborhood(whole, level.fan.reach_m), along)
+        level.rest.face(partly, (), rounded)
 
 
-def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
-    """Return the shapes that reach into a range of heights; to touch it, as a floor does, is not enough."""
+def _between(tall: Sequence[_Tall], heights: tuple[float, float], shift: float) -> list[_Tall]:
+    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
     low, high = heights[0] + shift, heights[1] + shift
-    found = []
-    for shape in solids:
-        bottom, top = shape.heights()
-        if bottom < high and top > low:
-            found.append(shape)
-    return found
-
-
-def _of_robot(figure: Figure, body: StubBody) -> Upright:
-    height = figure.place.height_m
-    return Upright(body, body.heights[0] + height, body.heights[1] + height)
+    return [(shape, ends) for shape, ends in tall if ends[0] < high and ends[1] > low]
 
 
 def _is_on(figure: Figure, shape: Shape) -> bool:
     """Return whether a shape is part of a robot; the robot's own rays pass through it."""
     return figure.place in shape.place.chain()
+
+
+def _rounded(shape: Shape) -> Rounded:
+    return Rounded(shape, shape.pose.inverse)
 
 
 def _upright(shape: Shape) -> Upright:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
-from palaestra_sim.scene.geometry import Pose
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.hits import first_hit
 from palaestra_sim.scene.sensor_rays import Beam, Ray
+from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.obstacles import FlatObstacle, Neighborhood
 
 _GROUND: Final = (0.0, 0.0, 1.0, 0.0)  # a frame in the format of `Fan.cast`
@@ -64,27 +66,59 @@ class Upright(NamedTuple):
     high_m: float
 
 
+class Rounded(NamedTuple):
+    """An obstacle whose outline is not the same at every height.
+
+    Attributes:
+        shape: as the world has it.
+        inward: the axes of the ground, in its frame.
+    """
+
+    shape: Shape
+    inward: Pose
+
+    def hit(self, origin: Vector, direction: Vector) -> float:
+        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        return first_hit(self.shape, self.inward.carry(origin), self.inward.turned(direction))
+
+
+class Met(Protocol):
+    """What rays meet at its surface."""
+
+    def hit(self, origin: Vector, direction: Vector) -> float:
+        """Return the meters from a point along a unit vector, both in the axes of the ground."""
+        ...
+
+
 class SlopedBeams:
-    """The beams of one robot that point up or down, cast one by one.
+    """The beams of one robot that may climb or fall, cast one by one.
 
     Their obstacles include floors, which extend to infinity.
     """
 
-    __slots__ = ("_beams", "_floors", "_others", "_solids", "distances")
+    __slots__ = ("_beams", "_floors", "_rounded", "_solids", "distances")
 
     def __init__(self, beams: Sequence[Beam]) -> None:
         self._beams = tuple(beams)
         self._solids: tuple[Upright, ...] = ()
-        self._others: tuple[Upright, ...] = ()
+        self._rounded: tuple[Met, ...] = ()
         self._floors: tuple[float, ...] = ()
         self.distances = [beam.reach_m for beam in beams]
 
+    @property
+    def free(self) -> bool:
+        """Whether there is no obstacle."""
+        return not (self._solids or self._rounded)
+
     def face(
-        self, solids: Sequence[Upright], others: Sequence[Upright], floors_m: Sequence[float] = (0.0,)
+        self,
+        solids: Sequence[Upright],
+        floors_m: Sequence[float] = (0.0,),
+        rounded: Sequence[Met] = (),
     ) -> None:
-        """Set the obstacles of the beams: fixed ones and robots, and the heights of floors."""
+        """Set the obstacles of the beams: upright ones and others, and the heights of floors."""
+        self._rounded = tuple(rounded)
         self._solids = tuple(solids)
-        self._others = tuple(others)
         self._floors = tuple(floors_m)
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
@@ -108,13 +142,26 @@ class SlopedBeams:
                 along = (floor - start) / beam.slope
                 if along >= 0.0:
                     nearest = min(nearest, along)
-        for outline, low, high in (*self._solids, *self._others):
+        for outline, low, high in self._solids:
             enter, leave = outline.crossing(frame, beam.ray)
             below, above = _between(low - start, high - start, beam.slope)
             enter = max(enter, below, 0.0)
             if enter <= min(leave, above):
                 nearest = min(nearest, enter)
-        return nearest * stretch
+        return self._round(beam, frame, height_m, nearest * stretch)
+
+    def _round(
+        self, beam: Beam, frame: tuple[float, float, float, float], height_m: float, nearest_m: float
+    ) -> float:
+        """Return how far a beam travels until it meets what is not upright, or until `nearest_m`."""
+        if not self._rounded:
+            return nearest_m
+        x, y, c, s = frame
+        px, py, ux, uy = beam.ray
+        stretch = math.hypot(1.0, beam.slope)
+        origin = (x + c * px - s * py, y + s * px + c * py, beam.height_m + height_m)
+        direction = ((c * ux - s * uy) / stretch, (s * ux + c * uy) / stretch, beam.slope / stretch)
+        return min(nearest_m, *(it.hit(origin, direction) for it in self._rounded))
 
 
 def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:

@@ -126,12 +126,14 @@ def _distance(sensor: ModelSensor) -> Measured:
     """Return a distance sensor, which reports its whole reach if it meets nothing."""
     model = sensor.model.model
     reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
+    table = LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)])
     device = DistanceSensor(
         name=sensor.name,
         model="",
         beams=(),
         weights=(),
-        table=LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)]),
+        table=table,
+        rows=table.rows,
         type=DistanceSensorType.LASER,
         aperture_rad=0.0,
     )

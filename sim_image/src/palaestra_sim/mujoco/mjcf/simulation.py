@@ -54,6 +54,7 @@ class MjcfSimulation:
         self.mode = mode
         self.quit_status: int | None = None
         self.forces = False  # masses and frictions are MuJoCo's own
+        self.unread_textures = 0  # of infra-red sensors, which no model has
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)

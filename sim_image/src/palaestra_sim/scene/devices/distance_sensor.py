@@ -20,9 +20,10 @@ from typing import Final
 
 from palaestra_sim.ros_interfaces import Row
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
-from palaestra_sim.scene.devices.sensor_response import table_rows, table_service
+from palaestra_sim.scene.devices.sensor_response import discrete, table_rows, table_service
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
+from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
@@ -31,8 +32,9 @@ _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a son
 _BEAMS_OF_SONAR: Final = 5  # for each ray
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-# For 1 to 10 rays: the rings, each with its number of rays, its rotation as a fraction of their spacing, and
-# its share of the aperture.
+_EMPTY: Final = ((0.0, 0.0, 0.0),)  # of one without rows, which measures 0
+# For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
+# aperture.
 _RINGS: Final = (
     ((1, 0.0, 0.0),),
     ((2, 0.5, 1.0),),
@@ -70,7 +72,12 @@ _TYPES: Final = {
 class DistanceSensor:
     """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
 
-    A sonar has five beams for each ray: the ray itself, and two pairs next to it.
+    A sonar has five beams for each ray: the ray itself, and two pairs beside it.
+
+    Attributes:
+        rows: of its lookup table, as the world has them.
+        sensitivity: how much the color counts for an infra-red sensor; 0: not at all.
+        resolution: of the value; -1: as fine as can be.
     """
 
     name: str
@@ -80,6 +87,9 @@ class DistanceSensor:
     table: LookupTable
     type: DistanceSensorType
     aperture_rad: float
+    rows: tuple[TableRow, ...] = ()
+    sensitivity: float = 1.0
+    resolution: float = -1.0
     value: float = math.nan
 
 
@@ -87,9 +97,8 @@ def _read(part: DevicePart) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
-    if part.number("resolution", -1.0) != -1.0:
-        part.lack("a distance sensor with a resolution")
-    table = lookup_table(*table_rows(part, _TABLE, "distances"))
+    rows = tuple(table_rows(part, _TABLE, "distances"))
+    table = lookup_table(*(rows or _EMPTY))
     aperture_rad = part.number("aperture", 1.5708)
     rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))  # as in Webots, which warns
     if rays > _MOST_RAYS:
@@ -102,8 +111,11 @@ def _read(part: DevicePart) -> DistanceSensor:
         beams=tuple(_beams(part.place.world_pose, cone, table.reach_m, sonar=type_name == "sonar")),
         weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
         table=table,
+        rows=rows,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
         aperture_rad=aperture_rad,
+        sensitivity=part.number("redColorSensitivity", 1.0),
+        resolution=part.number("resolution", -1.0),
     )
 
 
@@ -169,6 +181,21 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
+    sample = _fine(sensors, robot)
+    coarse = [sensor for sensor in sensors if sensor.resolution > 0.0]
+    if not coarse:
+        return sample
+
+    def sample_coarse() -> None:
+        sample()
+        for sensor in coarse:
+            sensor.value = discrete(sensor.value, sensor.resolution)
+
+    return sample_coarse
+
+
+def _fine(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
+    """Return the sample of sensors without their resolutions."""
     if any(sensor.type is DistanceSensorType.INFRA_RED for sensor in sensors):
         return _with_infrared(sensors, robot)
     cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
@@ -234,9 +261,10 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, divided by the average share of reflected light."""
+    """Return the average distance, and how much farther it seems by the share of light that returns."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
-    return _measured(sensor, [it.distance_m for it in glances]) / light
+    distance_m = _measured(sensor, [it.distance_m for it in glances])
+    return distance_m + (distance_m / light - distance_m) * sensor.sensitivity
 
 
 def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
@@ -245,7 +273,7 @@ def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
         ("get_min_value", "get_float", lambda _: {"value": low}),
         ("get_max_value", "get_float", lambda _: {"value": high}),
         ("get_aperture", "get_float", lambda _: {"value": sensor.aperture_rad}),
-        *table_service(sensor.table.rows),
+        *table_service(sensor.rows),
         ("get_type", "get_int", lambda _: {"value": int(sensor.type)}),
     )
 

@@ -1,0 +1,223 @@
+"""Textures as infra-red sensors see them: how much light a shape returns at the point that a ray meets.
+
+The red of the texture's pixel counts times that of the base color. The coordinates of a point in the texture
+are those that Webots takes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox, WbCylinder,
+WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.scene import picture_files
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.world.source import Source
+
+ReadFile = Callable[[Source, str], bytes]
+Coordinates = tuple[float, float]
+# A function of a point, whose box has the corners -1 and 1, to its place in a texture.
+Mapped = Callable[[Vector], Coordinates]
+_END: Final = 1.0 - 1e-7  # of half the height of a cylinder: beyond, a point is on an end
+_UP: Final = 2  # the axis
+_PIXEL: Final = 4  # blue, green, red, alpha
+_RED: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Image:
+    """The red of a texture: a byte for each pixel, row by row from the top left.
+
+    Attributes:
+        repeats: whether it repeats along u and along v; else its edge continues.
+    """
+
+    width: int
+    height: int
+    reds: bytes
+    repeats: tuple[bool, bool]
+
+    def at(self, place: Coordinates) -> float:
+        """Return the red at a place, 0 to 1; u is to the right and v is down."""
+        u, v = (_bounded(part, repeat=repeat) for part, repeat in zip(place, self.repeats, strict=True))
+        row = min(int(v * self.height), self.height - 1)
+        column = min(int(u * self.width), self.width - 1)
+        return self.reds[row * self.width + column] / 255.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paint:
+    """What a textured shape looks like to infra-red light.
+
+    Attributes:
+        red: of its base color, 0 to 1, as far as it is opaque.
+        roughness: without `rough`.
+        image, rough, hollow: its color, its roughness, and its occlusion.
+        mapped: from a point to a place in its textures.
+    """
+
+    red: float
+    roughness: float
+    image: Image
+    rough: Image | None
+    hollow: Image | None
+    mapped: Mapped
+
+    def reflection(self, point: Vector) -> float:
+        """Return the share of light that returns from a point, 0.2 to 1."""
+        place = self.mapped(point)
+        roughness = self.roughness if self.rough is None else self.rough.at(place)
+        occlusion = 0.0 if self.hollow is None else self.hollow.at(place)
+        red = self.red * self.image.at(place)
+        return 0.2 + 0.8 * red * (1.0 - 0.5 * roughness) * (1.0 - 0.5 * occlusion)
+
+
+class Textures:
+    """The textures of a world; each image is read when a ray needs it first.
+
+    Args:
+        read: returns the bytes of a file, from the file that names it and an address; None: there are none.
+    """
+
+    def __init__(self, read: ReadFile | None = None) -> None:
+        self._read = read
+        self._images: dict[tuple[str, str], tuple[int, int, bytes] | None] = {}
+
+    def paint(
+        self, look: SceneNode, geometry: str, opaque: float, tiles: Coordinates = (1.0, 1.0)
+    ) -> Paint | None:
+        """Return the paint of a shape; None if no texture of it counts, or none can be read.
+
+        Args:
+            look: its Appearance or PBRAppearance.
+            geometry: the type of its geometry.
+            opaque: 1 minus its transparency.
+            tiles: how often its texture repeats along u and v, from the lower left.
+        """
+        mapped = MAPPINGS.get(geometry)
+        node = texture_of(look)
+        image = None if mapped is None or node is None else self._image(node)
+        if mapped is None or image is None:
+            return None
+        transform = _transform(next(iter(look.nodes("textureTransform")), None))
+        red = 1.0  # of an Appearance, whose texture replaces the color
+        if look.type_name == "PBRAppearance":
+            red = min(1.0, max(0.0, (look.numbers("baseColor") or (1.0,))[0]))
+        return Paint(
+            red=red * opaque,
+            roughness=min(1.0, max(0.0, (look.numbers("roughness") or (0.0,))[0])),
+            image=image,
+            rough=self._of_field(look, "roughnessMap"),
+            hollow=self._of_field(look, "occlusionMap"),
+            mapped=lambda point: transform(_tiled(mapped(point), tiles)),
+        )
+
+    def _of_field(self, look: SceneNode, field: str) -> Image | None:
+        return next((self._image(node) for node in look.nodes(field)), None)
+
+    def _image(self, node: SceneNode) -> Image | None:
+        """Return the image of an ImageTexture; None if it cannot be read."""
+        address = node.text("url")
+        if address is None or node.origin is None or self._read is None:
+            return None
+        key = (node.origin.source.name, address)
+        if key not in self._images:
+            self._images[key] = self._decoded(node.origin.source, address)
+        found = self._images[key]
+        if found is None:
+            return None
+        width, height, reds = found
+        repeats = node.flag("repeatS", True), node.flag("repeatT", True)
+        return Image(width=width, height=height, reds=reds, repeats=repeats)
+
+    def _decoded(self, namer: Source, address: str) -> tuple[int, int, bytes] | None:
+        if self._read is None:
+            return None
+        try:
+            raster = picture_files.decode(self._read(namer, address))
+        except (OSError, UnsimulatedError):
+            return None
+        return None if raster is None else (raster.width, raster.height, bytes(raster.pixels[_RED::_PIXEL]))
+
+
+def texture_of(look: SceneNode) -> SceneNode | None:
+    """Return the ImageTexture of an appearance; None if it has none."""
+    field = {"Appearance": "texture", "PBRAppearance": "baseColorMap"}.get(look.type_name, "")
+    return next((node for node in look.nodes(field) if node.type_name == "ImageTexture"), None)
+
+
+def _bounded(part: float, *, repeat: bool) -> float:
+    if not math.isfinite(part):
+        return 0.0
+    return part % 1.0 if repeat else max(0.0, min(1.0, part))
+
+
+def _tiled(place: Coordinates, tiles: Coordinates) -> Coordinates:
+    return place[0] * tiles[0], 1.0 - (1.0 - place[1]) * tiles[1]
+
+
+def _on_plane(point: Vector) -> Coordinates:
+    x, y, _ = point
+    return (1.0 + x) / 2.0, (1.0 - y) / 2.0
+
+
+def _on_box(point: Vector) -> Coordinates:
+    """Return the place on the side that a point is on: each side has the whole texture."""
+    x, y, z = point
+    side = max(range(3), key=lambda axis: abs(point[axis]))
+    if side == _UP:
+        return (1.0 + x) / 2.0, (1.0 - math.copysign(1.0, z) * y) / 2.0
+    along = y if side == 0 else -x
+    return (1.0 + math.copysign(1.0, point[side]) * along) / 2.0, (1.0 - z) / 2.0
+
+
+def _on_cylinder(point: Vector) -> Coordinates:
+    x, y, z = point
+    if abs(z) > _END:
+        return (1.0 + x) / 2.0, (1.0 - math.copysign(1.0, z) * y) / 2.0
+    turn = math.asin(max(-1.0, min(1.0, -x)))
+    if y < 0.0:
+        turn = math.pi - turn
+    return turn / (2.0 * math.pi) % 1.0, (1.0 - z) / 2.0
+
+
+def _on_ball(point: Vector) -> Coordinates:
+    x, y, z = point
+    around = math.atan2(x, -y) / (2.0 * math.pi)
+    return 0.5 + around, 0.5 - math.asin(max(-1.0, min(1.0, z))) / math.pi
+
+
+MAPPINGS: Final[Mapping[str, Mapped]] = {
+    "Box": _on_box,
+    "Cylinder": _on_cylinder,
+    "Plane": _on_plane,
+    "Sphere": _on_ball,
+}
+"""By the type of the geometry; textures of others do not count."""
+
+
+def _transform(node: SceneNode | None) -> Callable[[Coordinates], Coordinates]:
+    """Return the effect of a TextureTransform: moved, turned and scaled about its center, with v down."""
+    if node is None:
+        return lambda place: place
+    move_u, move_v = _pair(node, "translation", (0.0, 0.0))
+    center_u, center_v = _pair(node, "center", (0.0, 0.0))
+    scale_u, scale_v = _pair(node, "scale", (1.0, 1.0))
+    rotation = (node.numbers("rotation") or (0.0,))[0]
+    c, s = math.cos(rotation), math.sin(rotation)
+
+    def transformed(place: Coordinates) -> Coordinates:
+        u, v = place[0] + move_u + center_u, place[1] - move_v - center_v - 1.0
+        u, v = c * u + s * v, c * v - s * u
+        return u * scale_u - center_u, v * scale_v + center_v + 1.0
+
+    return transformed
+
+
+def _pair(node: SceneNode, field: str, default: Coordinates) -> Coordinates:
+    numbers = node.numbers(field) or default
+    return (numbers[0], numbers[1]) if len(numbers) == len(default) else default

@@ -1,0 +1,224 @@
+"""Sensors with several rays, and pictures: averages, colors and pixels by formulas, at a wall."""
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tests.values import rays
+from tests.values.frames import frame, looking, quaternion, turn
+from tests.values.standing import MOUNT
+from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
+
+REACH_M = 8.0
+SIZE = (0.4, 30.0, 30.0)
+WALL = frame((20.0, 5.0, 40.0), (0, 0, 1), 0.5)  # in the axes of the ground
+APERTURE_RAD, WIDTH = 0.5, 0.6
+SENSITIVITY = 0.7
+RED, ROUGHNESS, TRANSPARENCY = 0.6, 0.5, 0.25
+LIGHT = 0.2 + 0.8 * RED * (1.0 - TRANSPARENCY) * (1.0 - ROUGHNESS / 2.0)
+DISTANCE = f"""DistanceSensor {{ name "NAME" {MOUNT.fields} type "TYPE" numberOfRays 5 aperture {APERTURE_RAD}
+  gaussianWidth {WIDTH} lookupTable [ 0 100 0, {REACH_M} 900 0 ] FIELDS }}"""
+TYPES = {
+    "generic": ("generic", ""),
+    "laser": ("laser", ""),
+    "sonar": ("sonar", ""),
+    "infra-red": ("infra-red", ""),
+    "sensitive": ("infra-red", f"redColorSensitivity {SENSITIVITY}"),
+    "coarse": ("generic", "resolution 25"),
+}
+NOTHING = f'DistanceSensor {{ name "nothing" {MOUNT.fields} lookupTable [ ] }}'
+# Where sensors are, and at which points they look, in the frame of the wall.
+LOOKS = [
+    looking((2.0, 0.3, -0.4), (0.2, 0.3, -0.4), 0.3),
+    looking((2.5, 1.0, 0.5), (0.2, 0.8, 0.7), 1.1),
+    looking((1.5, -2.0, 1.0), (0.2, -0.5, 0.0), -2.0),
+    looking((3.0, 0.0, 3.0), (0.2, 4.0, 1.0), 0.0),
+    looking((2.0, 0.0, 0.0), (4.0, 1.0, 1.0), 0.0),
+]
+
+
+@cached
+def simulation_of(setting):
+    """Return a simulation of a colored wall, and of a robot with a sensor of each type."""
+    look = f"""appearance PBRAppearance {{
+      baseColor {RED} 0.1 0.9 roughness {ROUGHNESS} transparency {TRANSPARENCY} }}"""
+    shape = f"Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }}"
+    wall = f"""Solid {{ {setting.put(WALL).fields} children [ Shape {{ {look} geometry {shape} }} ]
+      boundingObject {shape} }}"""
+    sensors = " ".join(
+        DISTANCE.replace("NAME", name).replace("TYPE", kind).replace("FIELDS", fields)
+        for name, (kind, fields) in TYPES.items()
+    )
+    return setting.load(wall + robot(sensors + NOTHING))
+
+
+def directions():
+    """Return the five rays of a sensor, (5, 3): its axis, and one to each side at half the aperture."""
+    half = APERTURE_RAD / 2.0
+    return [np.array([1.0, 0.0, 0.0])] + [
+        turn([1, 0, 0], q) @ [math.cos(half), math.sin(half), 0.0] for q in np.arange(4) * math.pi / 2.0
+    ]
+
+
+def distances(sensor, ways):
+    """Return how far rays travel from a frame in that of the wall, and how far each is off its normal."""
+    met = [min(rays.box(sensor.position, sensor.rotation @ way, SIZE), REACH_M) for way in ways]
+    off = [np.arccos(abs((sensor.rotation @ way)[0])) for way in ways]
+    return np.array(met), np.array(off)
+
+
+def expected(name, sensor):
+    """Return what a sensor of that name measures, in meters."""
+    met, off = distances(sensor, directions())
+    if name == "laser":
+        return met[0]
+    if name == "sonar":
+        return min([REACH_M, *met[off < math.pi / 8.0]])
+    weights = np.exp(-((np.array([0.0, *[APERTURE_RAD / 2.0] * 4]) / (APERTURE_RAD * WIDTH)) ** 2))
+    weights /= weights.sum()
+    average = met @ weights
+    light = np.where(met < REACH_M, LIGHT, 1.0) @ weights
+    if name == "infra-red":
+        return average / light
+    if name == "sensitive":
+        return average + (average / light - average) * SENSITIVITY
+    return average
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+@pytest.mark.parametrize("name", TYPES)
+def test_a_distance_sensor_measures_by_its_type(name, setting):
+    """The average, the one ray, the nearest that returns, or the average by color; then the lookup table."""
+    simulation = simulation_of(setting)
+    for sensor in LOOKS:
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS)
+        value = np.interp(expected(name, sensor), [0.0, REACH_M], [100.0, 900.0])
+        if name == "coarse":
+            value = 25.0 * np.round(value / 25.0)
+        assert device(simulation, name).value == pytest.approx(value, abs=0.01), sensor
+
+
+ROUND_RAD, HIGH_RAD = 1.2, 0.5
+LIDAR = f"""Lidar {{ name "lidar" {MOUNT.fields} horizontalResolution 5 numberOfLayers 4
+  fieldOfView {ROUND_RAD} verticalFieldOfView {HIGH_RAD} minRange 0.1 maxRange {REACH_M} }}"""
+
+
+@cached
+def scanned(setting):
+    """Return a simulation of the wall, and of a robot with a lidar of four layers."""
+    shape = f"Shape {{ geometry Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }} }}"
+    simulation = setting.load(f"Solid {{ {setting.put(WALL).fields} children [ {shape} ] }}" + robot(LIDAR))
+    enable(simulation)
+    return simulation
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting):
+    """Layers from the top down, their ends included; rays from the left, in the middle of their shares."""
+    simulation = scanned(setting)
+    for sensor in LOOKS:
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS)
+        lidar = device(simulation, "lidar")
+        for layer, up in enumerate(HIGH_RAD * np.array([0.5, 1 / 6, -1 / 6, -0.5])):
+            azimuths = ROUND_RAD * np.array([0.4, 0.2, 0.0, -0.2, -0.4])
+            ways = [
+                np.array([math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)])
+                for it in azimuths
+            ]
+            met, _ = distances(sensor, ways)
+            read = [min(each, REACH_M) for each in lidar.layers[layer]]
+            assert read == pytest.approx(list(met), rel=1e-5), (sensor, layer)
+            points = [
+                way * far if far < REACH_M else [math.inf] * 3 for way, far in zip(ways, met, strict=True)
+            ]
+            assert np.array(list(lidar.points(layer))) == pytest.approx(np.array(points), abs=1e-4)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_distance_sensor_without_a_lookup_table_measures_0(setting):
+    """Unlike other sensors, whose values stay as they are."""
+    simulation = simulation_of(setting)
+    kind, sensor = simulation.robots[0].parts.devices.rows["nothing"]
+    simulation.step(STEP_MS)
+
+    services = {path: handler for path, _, handler in kind.services(sensor)}
+    assert sensor.value == 0.0
+    assert services["get_lookup_table"](None) == {"value": []}
+
+
+WIDTH_PX, HEIGHT_PX, VIEW_RAD = 8, 6, 0.9
+EYES = f"""RangeFinder {{ name "depth" {MOUNT.fields} width {WIDTH_PX} height {HEIGHT_PX}
+  fieldOfView {VIEW_RAD} minRange 0.3 maxRange {REACH_M} }}
+Camera {{ name "camera" {MOUNT.fields} width 80 height 60 fieldOfView {VIEW_RAD}
+  recognition Recognition {{ }} }}"""
+BALL = frame((1.0, 0.0, 0.0), (0.3, 0.4, 0.5), 1.3)
+
+
+@cached
+def pictures_of(setting):
+    """Return a simulation of a wall before which a ball is, and of a robot with cameras."""
+    shape = f"Shape {{ geometry Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }} }}"
+    ball = f"""Solid {{ {setting.put(WALL @ BALL).fields} name "ball" model "ball" recognitionColors [ 1 0 0 ]
+      children [ Shape {{ geometry Sphere {{ radius 0.1 }} }} ] }}"""
+    wall = f"Solid {{ {setting.put(WALL).fields} children [ {shape} ] }}"
+    simulation = setting.load(wall + ball + robot(EYES))
+    enable(simulation)
+    return simulation
+
+
+def pixels():
+    """Yield row, column and direction of each pixel; a direction has length 1 along the axis of the lens."""
+    half = math.tan(VIEW_RAD / 2.0)
+    for row in range(HEIGHT_PX):
+        for column in range(WIDTH_PX):
+            left = half * (1.0 - (2 * column + 1) / WIDTH_PX)
+            up = half * HEIGHT_PX / WIDTH_PX * (1.0 - (2 * row + 1) / HEIGHT_PX)
+            yield row, column, np.array([1.0, left, up])
+
+
+MUJOCO = [setting for setting in SETTINGS if setting.physics == "mujoco"]
+
+
+@pytest.mark.parametrize("setting", MUJOCO, ids=str)
+def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
+    """MuJoCo: to the wall or to the ball, whichever is nearer; the stub draws nothing."""
+    simulation = pictures_of(setting)
+    ball = partial(rays.sphere, radius=0.1, center=BALL.position)
+    for sensor in LOOKS[:4]:
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS)
+        image = np.frombuffer(device(simulation, "depth").value, np.float32).reshape(HEIGHT_PX, WIDTH_PX)
+        for row, column, way in pixels():
+            ahead = sensor.rotation @ way / np.linalg.norm(way)
+            met = min(rays.box(sensor.position, ahead, SIZE), ball(sensor.position, ahead))
+            depth = met / np.linalg.norm(way)
+            aside = np.linalg.norm(np.cross(ahead, BALL.position - sensor.position))
+            if abs(aside - 0.1) < 0.02:
+                continue  # its edge, which is drawn with 20 corners
+            assert image[row, column] == pytest.approx(depth if depth < REACH_M else math.inf, rel=2e-3)
+
+
+@pytest.mark.parametrize("setting", MUJOCO, ids=str)
+def test_a_camera_recognizes_an_object_where_it_is(setting):
+    """MuJoCo: its place and rotation in the frame of the camera, and the middle of it in the picture."""
+    simulation = pictures_of(setting)
+    starts = [(2.0, 0.3, -0.4), (1.5, -1.0, 0.6), (3.0, 1.0, 1.0)]
+    for roll, start in enumerate(starts):
+        aim = np.add(BALL.position, [0.0, 0.1, -0.05])
+        sensor = looking(start, aim, 0.7 * roll)
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS)
+        (seen,) = device(simulation, "camera").recognition.value
+        inner = sensor.inverse @ BALL
+        assert seen["position"] == pytest.approx(inner.position, abs=1e-6)
+        facing = quaternion(inner.rotation)
+        assert seen["orientation"] == pytest.approx(facing, abs=1e-6)
+        scale = 40.0 / math.tan(VIEW_RAD / 2.0)
+        ahead, left, up = inner.position
+        middle = [40.0 - scale * left / ahead, 30.0 - scale * up / ahead, 0.0]
+        assert seen["position_on_image"] == pytest.approx(middle, abs=1.5)
+        assert seen["model"] == "ball"

@@ -1,0 +1,143 @@
+"""The rows of sensors that measure place, direction and surroundings, on a robot that stands still.
+
+A row has the device as a world file has it, without its place; and a formula of the frame of the sensor, in
+the axes of the world file. All devices are mounted at `MOUNT`, off the middle and turned, and the robot is
+put to each of `POSES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.values.frames import frame, quaternion
+from tests.values.worlds import Setting
+
+GRAVITY = 3.7  # m/s2, of this world
+REFERENCE = np.array([100.0, -20.0, 7.0])  # WorldInfo.gpsReference, in the axes of the file
+MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # of each sensor in its robot
+POSES = (  # of the robot, in the axes of the ground
+    frame((1.2, -0.7, 0.4), (0.3, -0.5, 0.8), 1.1),
+    frame((-2.0, 3.0, 1.5), (1.0, 0.0, 0.0), 2.2),
+    frame((0.1, 0.2, -3.0), (-0.6, 0.64, 0.48), -2.7),
+    frame((5.0, 5.0, 0.5), (0.0, 0.0, 1.0), 0.7),
+)
+BEACON = frame((2.0, 1.0, -0.5))  # where the other robot emits, in the axes of the ground
+SAID = "here"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A device and the value that a formula gives.
+
+    Attributes:
+        name: of the row and of its device.
+        types: the device types that it is a row of.
+        node: the text of the node, with `{place}` for its name and its place.
+        formula: of the frame of the sensor and the setting; numbers, (n,).
+        read: of the device, what is compared.
+        tolerance: absolute, in the unit of the value.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    node: str
+    formula: Callable
+    read: Callable = lambda device: device.value
+    tolerance: float = 1e-9
+
+
+def _through(table, value):
+    """Return a value through the rows of a lookup table: linear between them, constant beyond."""
+    inputs, outputs = zip(*table, strict=True)
+    return np.interp(value, inputs, outputs)
+
+
+def _gravity(sensor, setting):
+    """Return what an accelerometer at rest measures: the reaction to gravity, in its own axes."""
+    return sensor.rotation.T @ (GRAVITY * setting.up)
+
+
+def _beacon(sensor, setting: Setting):
+    """Return the way from a sensor to the beacon, in its own axes."""
+    return sensor.inverse @ setting.put(BEACON).position
+
+
+def _signal(sensor, setting):
+    way = _beacon(sensor, setting)
+    return np.array([1.0 / (way @ way), *(way / np.linalg.norm(way))])
+
+
+def _packet(receiver):
+    """Return strength and direction of the last packet."""
+    packet = receiver.queue[-1]
+    return [packet.strength, *packet.direction]
+
+
+ROWS = (
+    Row("accelerometer", ("Accelerometer",), "Accelerometer {{ {place} }}", _gravity),
+    Row(
+        "accelerometer table",
+        ("Accelerometer",),
+        "Accelerometer {{ {place} lookupTable [ -3 10 0, 0 20 0, 2 100 0 ] }}",
+        lambda sensor, setting: _through([(-3, 10), (0, 20), (2, 100)], _gravity(sensor, setting)),
+    ),
+    Row(
+        "accelerometer resolution",
+        ("Accelerometer",),
+        "Accelerometer {{ {place} resolution 0.5 }}",
+        lambda sensor, setting: 0.5 * np.round(_gravity(sensor, setting) / 0.5),
+    ),
+    Row(
+        "altimeter",
+        ("Altimeter",),
+        "Altimeter {{ {place} }}",
+        lambda sensor, setting: [(sensor.position + REFERENCE) @ setting.up],
+        read=lambda device: [device.value],
+    ),
+    Row(
+        "compass",
+        ("Compass",),
+        "Compass {{ {place} }}",
+        lambda sensor, setting: sensor.rotation.T @ setting.north,
+    ),
+    Row(
+        "compass axes",
+        ("Compass",),
+        "Compass {{ {place} yAxis FALSE }}",
+        lambda sensor, setting: (sensor.rotation.T @ setting.north) * [1.0, np.nan, 1.0],
+    ),
+    Row("gps", ("GPS",), "GPS {{ {place} }}", lambda sensor, _: sensor.position + REFERENCE),
+    Row(
+        "gps at rest",
+        ("GPS",),
+        "GPS {{ {place} }}",
+        lambda *_: np.zeros(4),
+        read=lambda device: [device.speed.value, *device.speed_vector.value],
+    ),
+    Row("gyro", ("Gyro",), "Gyro {{ {place} }}", lambda *_: np.zeros(3)),
+    Row(
+        "inertial unit",
+        ("InertialUnit",),
+        "InertialUnit {{ {place} }}",
+        lambda sensor, _: quaternion(sensor.rotation),
+    ),
+    Row(
+        "light sensor",
+        ("LightSensor",),
+        "LightSensor {{ {place} lookupTable [ 0 3 0, 1 1000 0 ] }}",
+        lambda *_: [3.0],  # there is no light
+        read=lambda device: [device.value],
+    ),
+    Row("receiver", ("Receiver", "Emitter"), "Receiver {{ {place} channel 3 }}", _signal, read=_packet),
+    Row(
+        "position sensor",
+        ("PositionSensor",),
+        """HingeJoint {{ jointParameters HingeJointParameters {{ position 0.3 axis 0 1 0 }}
+          device PositionSensor {{ name "position sensor" resolution 0.25 }} endPoint Solid {{ }} }}""",
+        lambda *_: [0.25],
+        read=lambda device: [device.value],
+    ),
+)
