@@ -1,4 +1,4 @@
-"""The metrics in docs/metrics.md as a reader sees them, and /metrics as Prometheus sees it."""
+"""The metrics in docs/reference/metrics.md as a reader sees them, and /metrics as Prometheus sees it."""
 
 import re
 import subprocess
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.control_plane.programs import programs
 
-PAGE = Path(__file__).parents[1] / "docs/metrics.md"
+PAGE = Path(__file__).parents[1] / "docs/reference/metrics.md"
 
 
 def documented(program):

@@ -19,3 +19,16 @@ def chapters(page: str) -> list[tuple[str, str]]:
 def blocks(page: str, kind: str) -> list[str]:
     """Return the blocks whose fence has exactly the text `kind`."""
     return [text for found, text in fenced(page) if found == kind]
+
+
+def links(page: str) -> list[str]:
+    """Return the target of every link and picture of a page that is a path or an anchor, in its order."""
+    prose = FENCED.sub("", page)
+    return re.findall(r"(?:\]\(|src=\")(?!https?:)([^)\s\"]+)", prose)
+
+
+def anchors(page: str) -> set[str]:
+    """Return what may stand behind `#` in a link to a page: its headings, as GitHub and GitLab spell them."""
+    headings = re.findall(r"^#{1,6} (.*)$", FENCED.sub("", page), re.MULTILINE)
+    texts = (re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading) for heading in headings)
+    return {re.sub(r"[^\w\- ]", "", text.strip().lower()).replace(" ", "-") for text in texts}

@@ -1,4 +1,4 @@
-"""The ways to install the chart that docs/install.md describes, as values."""
+"""The ways to install the chart that docs/howto/install.md describes, as values."""
 
 from typing import Any
 

@@ -10,23 +10,27 @@ from tests.pages import fenced
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(
-    [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", *ROOT.glob("docs/**/*.md")]
+    [
+        *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY", "CHANGELOG")),
+        ROOT / "charts/palaestra/README.md",
+        *ROOT.glob("docs/**/*.md"),
+    ]
 )
 
 
 def blocks(language, pages=PAGES):
     """Return every block of a language, with its page."""
     return [
-        pytest.param(text, id=f"{page.stem}-{number}")
+        pytest.param(text, id=f"{page.relative_to(ROOT).with_suffix('')}-{number}")
         for page in pages
         for number, (kind, text) in enumerate(fenced(page.read_text()))
         if kind == language
     ]
 
 
-@pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page.name != "README.md"]))
+@pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page != ROOT / "README.md"]))
 def test_python_runs(text):
-    """The README's own block is a file in examples/, which has its own test."""
+    """The README has no block of Python; that of a notebook is in examples/, with its own test."""
     exec(compile(text, "<page>", "exec"), {})
 
 
@@ -45,11 +49,3 @@ def test_every_verb_that_is_typed_exists(text):
     verbs = re.findall(r"^make (\w+)", text, re.MULTILINE)
 
     assert [verb for verb in verbs if f"\n{verb}:" not in makefile] == []
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_link_and_picture_is_there(page):
-    """Paths are relative to the page."""
-    targets = re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\"]+)", page.read_text())
-
-    assert [target for target in targets if not (page.parent / target).exists()] == []

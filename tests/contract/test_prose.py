@@ -24,7 +24,7 @@ def test_no_sentence_needs_a_second_reading(place):
 
 @pytest.mark.parametrize("reason", ROWS)
 def test_no_reason_needs_a_second_reading(reason, tmp_path):
-    """Each reason is a table cell in docs/operations.md, which the rules for pages exempt."""
+    """Each reason is a table cell in docs/reference/reasons.md, which the rules for pages exempt."""
     page = tmp_path / "row.md"
     row = ROWS[reason]
     page.write_text(f"{row.meaning}\n\n{row.remedy}\n")

@@ -1,4 +1,4 @@
-"""The README's examples match the project."""
+"""The examples of the README and of the first pages match the project."""
 
 import re
 from pathlib import Path
@@ -10,6 +10,9 @@ from tests.pages import blocks
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
+CLUSTER = (ROOT / "docs/start/cluster.md").read_text()
+NOTEBOOK = (ROOT / "docs/start/notebook.md").read_text()
+FIGURES = "".join((ROOT / f"docs/explain/{name}.md").read_text() for name in ("reliability", "tasks"))
 
 
 def block(language):
@@ -33,16 +36,50 @@ def test_the_job_shown_is_the_minimal_example():
     palaestra.api.load(text, "minimal.yaml")
 
 
-def test_the_script_shown_is_the_facade_example():
+def test_the_script_for_a_notebook_is_the_facade_example():
     """It has its own test."""
-    script = (ROOT / "examples/facade.py").read_text()
+    [script] = blocks(NOTEBOOK, "python with-a-simulator")
 
-    assert script.endswith(block("python") + "\n")
+    assert (ROOT / "examples/facade.py").read_text().endswith(script)
+
+
+def test_the_lines_shown_are_of_words_that_the_programs_print():
+    """They are from a real run; an event that was renamed would be of another release."""
+    folders = (ROOT / "trainer/src", ROOT / "operator/src")
+    sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
+    lines = block("text").splitlines()
+
+    events = [re.match(r"\[\w+ *\] (.+?) \w+=", line)[1] for line in lines if line.startswith("[")]
+    titles = [re.match(r"  (\w[\w ]+?)  ", line)[1] for line in lines if line.startswith("  ")]
+
+    assert len(events) == len(titles) == 3
+    assert [words for words in (*events, *titles) if f'"{words}"' not in sources] == []
+
+
+def test_every_figure_comes_with_the_command_that_measures_it():
+    """And stands on the page that has the measurement."""
+    bullets = re.findall(r"^- \*\*It .+`python -m (tests\.\w+ \w+)`$", README, re.MULTILINE)
+
+    assert [command for command in bullets if f"`python -m {command}`" not in FIGURES] == []
+    assert len(bullets) == 3
+    assert [figure for figure in ("0.64 s", "0.07 s", "all 30") if figure not in FIGURES] == []
+    assert "| `truncated` | 99 | 99 | 99 | 99 | 99 |" in FIGURES
+
+
+def test_the_citation_names_the_paper_as_the_readme_does():
+    """Tools read the file, people the README."""
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    paper = cited["preferred-citation"]
+    chart = yaml.safe_load((ROOT / "charts/palaestra/Chart.yaml").read_text())
+
+    assert f"*{paper['title']}* ({paper['year']})" in README
+    assert [author["family-names"] for author in paper["authors"]] == ["Haubold", "Linke"]
+    assert cited["version"] == chart["version"]
 
 
 def test_what_is_typed_for_a_cluster_fits_together():
     """The order is cluster, operator, job and end: each line needs the results of those before it."""
-    (shown,) = (block for block in blocks(README, "console") if block.startswith("make cluster "))
+    (shown,) = (block for block in blocks(CLUSTER, "console") if block.startswith("make cluster "))
     cluster, operator, job, end = (line.partition("#")[0].split() for line in shown.splitlines())
 
     installed = {each["kind"] for each in yaml.safe_load_all((ROOT / operator[-1]).read_text())}

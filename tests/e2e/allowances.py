@@ -4,7 +4,7 @@ from tests.e2e.cluster import Cluster
 from tests.e2e.namespace import OPERATOR, SYSTEM
 
 MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
-OF_THE_PAGE = "urgent"  # used in docs/queues.md
+OF_THE_PAGE = "urgent"  # used in docs/howto/queues.md
 OPTIONS = tuple(f"--allow-priority-class={name}" for name in (MISSING, LIMITED, URGENT, OF_THE_PAGE))
 
 

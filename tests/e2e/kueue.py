@@ -1,4 +1,4 @@
-"""Kueue in the cluster, as in docs/queues.md: the page's commands are run, and undone at the end.
+"""Kueue in the cluster, as in docs/howto/queues.md: the page's commands are run, and undone at the end.
 
 The page takes chart and image from a registry. Here Kueue's Go module provides both (tests/cluster/kueue.sh).
 The image has its registry name, so a cluster that reaches the registry can pull it as well.
@@ -16,7 +16,7 @@ from tests.e2e.namespace import LONG_S, Namespace
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "queues.md").read_text()
+PAGE = (ROOT / "docs/howto/queues.md").read_text()
 DOING, UNDOING = PAGE.split("## Take it away")
 GROUP = "kueue.x-k8s.io"
 VERSION = f"{GROUP}/v1beta2"

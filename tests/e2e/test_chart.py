@@ -1,6 +1,6 @@
 """A release of the chart for one namespace, while the cluster's operator is scaled to 0.
 
-The release for the whole cluster is that of docs/install.md, which tests/e2e/test_pages.py runs.
+The release for the whole cluster is that of docs/howto/install.md, which tests/e2e/test_pages.py runs.
 """
 
 import os

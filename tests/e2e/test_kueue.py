@@ -1,4 +1,4 @@
-"""docs/queues.md on the real cluster with a real Kueue: jobs are admitted, preempted and admitted again."""
+"""docs/howto/queues.md on the real cluster with a real Kueue: jobs are admitted and preempted."""
 
 import os
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""docs/your-environment.md on a cluster: an environment in a user's image, in the pod of a job."""
+"""docs/start/your-environment.md on a cluster: an environment in a user's image, in the pod of a job."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ from tests.pages import fenced
 
 pytestmark = pytest.mark.timeout(1200)
 
-PAGE = dict(fenced((ROOT / "docs/your-environment.md").read_text()))
+PAGE = dict(fenced((ROOT / "docs/start/your-environment.md").read_text()))
 IMAGE = "corridor:1"
 BUILD_S, LOAD_S = 600, 300
 # One rollout and one episode; the page's laptop part, in tests/integration/run, learns the task.

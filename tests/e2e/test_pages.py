@@ -1,6 +1,6 @@
-"""docs/install.md, docs/tools.md and docs/sweeps.md on the real cluster: every command unchanged.
+"""Pages about installing and training in a cluster, on the real cluster: every command unchanged.
 
-tests/e2e/test_kueue.py runs docs/queues.md, because it needs that page's cluster for longer.
+tests/e2e/test_kueue.py runs docs/howto/queues.md, because it needs that page's cluster for longer.
 """
 
 import os
@@ -32,9 +32,10 @@ TYPED_S = 600  # `helm test` trains, and a namespace is deleted with its pods
 READY_S = 180
 SESSION_S = 800  # a small training, with a pause
 RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
-INSTALL = (ROOT / "docs" / "install.md").read_text()
-TOOLS = (ROOT / "docs" / "tools.md").read_text()
-SWEEPS = (ROOT / "docs" / "sweeps.md").read_text()
+INSTALL = (ROOT / "docs/howto/install.md").read_text()
+FIRST = (ROOT / "docs/start/cluster.md").read_text()
+PYTHON = (ROOT / "docs/howto/python.md").read_text()
+SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
 NAMESPACES = (LAB, "robots", "drones")  # on the page, besides that of the operator
 TENSORBOARD = "palaestra-tensorboard"
@@ -181,9 +182,9 @@ def at_home(namespace, folder):
 @pytest.mark.beside
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
-def test_every_command_of_the_tools_works(namespace, tmp_path):
+def test_every_command_of_the_first_job_works(namespace, tmp_path):
     """They lead from an empty namespace to a policy on this machine and a deleted job."""
-    [session] = blocks(TOOLS, "sh")
+    [session] = blocks(FIRST, "sh")
 
     printed = at_home(namespace, tmp_path).type_in(session, SESSION_S)
 
@@ -195,9 +196,9 @@ def test_every_command_of_the_tools_works(namespace, tmp_path):
 @pytest.mark.beside
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
-def test_the_script_of_the_tools_trains(namespace, tmp_path):
+def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
     """It does the same from Python, with the job of the examples."""
-    [script] = blocks(TOOLS, "python with-a-cluster")
+    [script] = blocks(PYTHON, "python with-a-cluster")
     (tmp_path / "train.py").write_text(script)
 
     printed = at_home(namespace, tmp_path).type_in("python train.py", SESSION_S)

@@ -1,13 +1,13 @@
 """Record the generated files anew: `python -m tests.golden`.
 
 - `tests/golden/`: the plans of the examples and of the cases, see `plans.py`
-- `manifests/crd.yaml`, docs/trainingjob.md: made from the API's models
-- `docs/trainingjob.md`: the default hyperparameters of the algorithms
-- `docs/algorithms.md`: which algorithm works with which observations and actions
-- `docs/metrics.md`: every metric that the programs declare
-- `docs/simulators.md`: the devices of the stub
-- `docs/ros-interface.md`: the services and topics of a robot
-- `docs/judging.md`: the checks on a replica, in their order
+- `manifests/crd.yaml`, docs/reference/trainingjob.md: made from the API's models
+- `docs/reference/trainingjob.md`: the default hyperparameters of the algorithms
+- `docs/reference/algorithms.md`: which algorithm works with which observations and actions
+- `docs/reference/metrics.md`: every metric that the programs declare
+- `docs/reference/simulators.md`: the devices of the stub
+- `docs/reference/ros-interface.md`: the services and topics of a robot
+- `docs/explain/judging.md`: the checks on a replica, in their order
 - `charts/palaestra/README.md`: made from its values.yaml
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
 - `manifests/install.yaml`: the chart with its default values, where Helm is built

@@ -1,11 +1,11 @@
-"""Every kind of fault in short runs of two algorithms: each run ends as docs/reliability.md says."""
+"""Every kind of fault in short runs of two algorithms: each run ends as docs/explain/reliability.md says."""
 
 import re
 
 from tests.local_run import ROOT, running
 from tests.soak.jobs import ANY_NUMBER, LITTLE_DQN, LITTLE_PPO, make_job
 
-PAGE = ROOT / "docs/reliability.md"
+PAGE = ROOT / "docs/explain/reliability.md"
 ROW = re.compile(
     r"^\| [^|`]+ \| `(?P<fault>[^`]+)` \| (?P<reported>\w+) \|.*\| (?P<ending>\w+) \|$", re.MULTILINE
 )
@@ -42,7 +42,7 @@ def measure(scale):
         "faults": len(chosen),
         "runs": len(runs),
         "not_as_told": wrong,
-        "claims": {"every run ended as docs/reliability.md says": not wrong},
+        "claims": {"every run ended as docs/explain/reliability.md says": not wrong},
     }
 
 

@@ -1,4 +1,4 @@
-"""docs/algorithms.md: the table of algorithms, observations and actions, which is made from the code."""
+"""docs/reference/algorithms.md: the table of algorithms, observations and actions, made from the code."""
 
 from tools.algorithms.page import PAGE, page, refusal
 

@@ -1,4 +1,4 @@
-"""Which algorithm works with which observations and actions, in docs/algorithms.md.
+"""Which algorithm works with which observations and actions, in docs/reference/algorithms.md.
 
 The reasons are those that a person reads who tries it. tests/unit/trainer/algorithms/test_algorithms_grid.py
 trains in every cell that works.
@@ -11,13 +11,13 @@ from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
-PAGE = "docs/algorithms.md"
+PAGE = "docs/reference/algorithms.md"
 BEGIN = "<!-- generated: algorithms, observations and actions -->"
 WORKS = "works"
 
 
 def page(text: str) -> str:
-    """Return docs/algorithms.md, of which `text` is what it was, with the table made anew.
+    """Return docs/reference/algorithms.md, of which `text` is what it was, with the table made anew.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,1 +1,1 @@
-"""docs/simulators.md: the table of devices, which is made from the code."""
+"""docs/reference/simulators.md: the table of devices, which is made from the code."""

@@ -1,4 +1,4 @@
-"""The devices that the stub simulates, in docs/simulators.md: a row for each row of the stub's own table."""
+"""The devices of the stub, in docs/reference/simulators.md: a row for each row of the stub's own table."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from palaestra_sim.scene.devices.device_type import DeviceType
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.stub.physics import StubPhysics
 
-PAGE = "docs/simulators.md"
+PAGE = "docs/reference/simulators.md"
 BEGIN = "<!-- generated: devices of the stub -->"
 
 
 def page(text: str) -> str:
-    """Return docs/simulators.md, now `text`, with the table made anew.
+    """Return docs/reference/simulators.md, now `text`, with the table made anew.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,1 +1,1 @@
-"""docs/trainingjob.md: the table of default hyperparameters, which is made from the code."""
+"""docs/reference/trainingjob.md: the table of default hyperparameters, which is made from the code."""

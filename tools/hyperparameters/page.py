@@ -1,4 +1,4 @@
-"""The defaults of each algorithm, in docs/trainingjob.md.
+"""The defaults of each algorithm, in docs/reference/trainingjob.md.
 
 Here and not where the rest of that page is made, since the operator does not import the trainer.
 """
@@ -10,12 +10,12 @@ from typing import Any
 from palaestra.api.generated_sections import between_marks
 from palaestra_trainer.algorithms import ALGORITHMS
 
-PAGE = "docs/trainingjob.md"
+PAGE = "docs/reference/trainingjob.md"
 BEGIN = "<!-- generated: default hyperparameters -->"
 
 
 def page(text: str) -> str:
-    """Return docs/trainingjob.md, of which `text` is what it was, with the table made anew.
+    """Return docs/reference/trainingjob.md, of which `text` is what it was, with the table made anew.
 
     Raises:
         ValueError: a mark is missing.

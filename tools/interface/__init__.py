@@ -1,1 +1,1 @@
-"""The page docs/ros-interface.md: every service and topic of a robot, and which simulators have it."""
+"""docs/reference/ros-interface.md: each service and topic of a robot, and the simulators that have it."""

@@ -1,4 +1,4 @@
-"""docs/ros-interface.md: every service and topic, with its type, its md5, and the simulators that have it."""
+"""docs/reference/ros-interface.md: each service and topic, its type, md5, and the simulators that have it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import FAILING, device_name, groups, offered
 
-PAGE = "docs/ros-interface.md"
+PAGE = "docs/reference/ros-interface.md"
 BEGIN = "<!-- generated: services and topics -->"
 _TEST: Final = "test_ros_interface.py"
 _OURS: Final = frozenset(("palaestra",))
@@ -29,7 +29,7 @@ _HEAD: Final = ("| path | type | md5 | stub | MuJoCo | Webots | tested by |", "|
 
 
 def page(text: str) -> str:
-    """Return docs/ros-interface.md, now `text`, with its tables made anew.
+    """Return docs/reference/ros-interface.md, now `text`, with its tables made anew.
 
     Raises:
         ValueError: a mark is missing.

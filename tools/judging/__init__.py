@@ -1,1 +1,1 @@
-"""docs/judging.md: the list of checks on a replica, which is made from the code."""
+"""docs/explain/judging.md: the list of checks on a replica, which is made from the code."""

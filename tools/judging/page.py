@@ -1,16 +1,16 @@
-"""The checks on a replica, in docs/judging.md: a row for each row of the operator's own list."""
+"""The checks on a replica, in docs/explain/judging.md: a row for each row of the operator's own list."""
 
 from __future__ import annotations
 
 from palaestra.api.generated_sections import between_marks
 from palaestra.decide.replica_policy import JUDGED
 
-PAGE = "docs/judging.md"
+PAGE = "docs/explain/judging.md"
 BEGIN = "<!-- generated: checks on a replica -->"
 
 
 def page(text: str) -> str:
-    """Return docs/judging.md, now `text`, with the list made anew.
+    """Return docs/explain/judging.md, now `text`, with the list made anew.
 
     Raises:
         ValueError: a mark is missing.

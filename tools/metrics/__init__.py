@@ -1,1 +1,1 @@
-"""docs/metrics.md: the part of it that is made from the code."""
+"""docs/reference/metrics.md: the part of it that is made from the code."""

@@ -1,4 +1,4 @@
-"""The tables of docs/metrics.md, made from the families that the programs declare.
+"""The tables of docs/reference/metrics.md, made from the families that the programs declare.
 
 Here and in no program, since operator and trainer know nothing of each other.
 """
@@ -12,7 +12,7 @@ from palaestra_protocol.metrics import Family, Label, MetricType
 from palaestra_sim.sidecar import metric_definitions as sidecar
 from palaestra_trainer import metric_definitions as trainer
 
-PAGE = "docs/metrics.md"
+PAGE = "docs/reference/metrics.md"
 SERIES = "<!-- generated: how many series -->"
 PROCESS = 6  # process_*, as prometheus_client tells them of each program
 MOST_NAMED = 10  # values of a label that are written out
@@ -55,7 +55,7 @@ PROGRAMS = (
 
 
 def page(text: str) -> str:
-    """Return docs/metrics.md, of which `text` is what it was, with its tables made anew.
+    """Return docs/reference/metrics.md, of which `text` is what it was, with its tables made anew.
 
     Raises:
         ValueError: a mark is missing.

@@ -35,8 +35,8 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
 
     Args:
         job: the path of a file, YAML text, plain data or the model.
-        changes: values by the path of their field, as in docs/trainingjob.md. The path may leave out `spec.`:
-            `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
+        changes: values by the path of their field, as in docs/reference/trainingjob.md. The path may
+            leave out `spec.`: `{"trainer.algorithm.hyperparameters.learning_rate": 1e-3}`.
 
     Raises:
         SpecErrors: a path or a value is wrong; the error lists every problem.

@@ -1,7 +1,8 @@
 """Families of metrics, as data.
 
-Each program declares its families in one table, from which its /metrics and docs/metrics.md are generated. So
-the page always matches the exported metrics, and the number of a program's series can be computed.
+Each program declares its families in one table, from which its /metrics and docs/reference/metrics.md are
+generated. So the page always matches the exported metrics, and the number of a program's series can be
+computed.
 
 Frequent events, thousands a second, are counted in plain Python (`Tally`) and read at a scrape. Counting one
 takes a tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond, and over one to

@@ -46,7 +46,7 @@ _EPILOG = """\
 Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. If
 PALAESTRA_SIMULATOR_LEFT_OUT is set, as by a sidecar, writes the nodes that it leaves out into that file.
 
-faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/simulators.md has them all.
+faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/reference/faults.md has them.
 PALAESTRA_STUB_FAULTS holds faults with spaces between, PALAESTRA_STUB_FAULT_SEED the value of --fault-seed,
 PALAESTRA_SIMULATOR_START the value of --fault-life.
 

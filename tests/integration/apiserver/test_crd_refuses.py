@@ -272,7 +272,7 @@ MAY_NOT_CHANGE = [
 
 @pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
 def test_what_may_change_changes(apply, path, value):
-    """This is the complete list in docs/trainingjob.md."""
+    """This is the complete list in docs/reference/trainingjob.md."""
     job = make_job()
     apply(job)
 

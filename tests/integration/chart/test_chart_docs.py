@@ -1,4 +1,4 @@
-"""All commands of docs/install.md work as written, from top to bottom."""
+"""All commands of docs/howto/install.md work as written, from top to bottom."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from tests.integration.chart.conftest import DEFINITION
 from tests.pages import blocks
 from tests.terminal import Terminal
 
-PAGE = (ROOT / "docs" / "install.md").read_text()
+PAGE = (ROOT / "docs/howto/install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
 REGISTRY = blocks(PAGE, "sh with-a-registry")
 # No job ends without nodes. The tests with the operator cover `palaestra try`, and `make e2e` covers `helm

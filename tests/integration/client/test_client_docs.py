@@ -1,4 +1,4 @@
-"""The script and the commands in docs/tools.md work as written."""
+"""The script in docs/howto/python.md and the commands in docs/reference/commands.md work as written."""
 
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +12,8 @@ from tests.unit.cli.test_cli_cluster import COMMANDS
 from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs/tools.md").read_text()
+COMMANDS_PAGE = (ROOT / "docs/reference/commands.md").read_text()
+PAGE = (ROOT / "docs/howto/python.md").read_text()
 
 
 def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
@@ -29,7 +30,7 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
 
     with ThreadPoolExecutor(1) as pool:
-        ended = pool.submit(exec, compile(script, "docs/tools.md", "exec"), {})
+        ended = pool.submit(exec, compile(script, "docs/howto/python.md", "exec"), {})
         eventually(lambda: place.get(TRAINING_JOBS, "tiny") or ended.done())
         tell("tiny", "Succeeded", step=2_000, successRate=1.0)
         ended.result(30)
@@ -40,4 +41,4 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
 
 def test_every_command_of_the_page_exists_and_every_command_is_on_it():
     """Each command has a row in the table."""
-    assert set(re.findall(r"^\| `palaestra (\w+)", PAGE, re.MULTILINE)) == set(COMMANDS)
+    assert set(re.findall(r"^\| `palaestra (\w+)", COMMANDS_PAGE, re.MULTILINE)) == set(COMMANDS)

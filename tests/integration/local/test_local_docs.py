@@ -1,4 +1,4 @@
-"""The commands of the pages about training from Python and about sweeps work as written."""
+"""The commands of the pages about a first run, training from Python and sweeps work as written."""
 
 from pathlib import Path
 
@@ -7,19 +7,35 @@ import pytest
 from palaestra.cli import main
 from palaestra.sweeps.grid import trials
 from palaestra.sweeps.model import SweepSpec, load
+from tests.local_run import PALAESTRA
 from tests.pages import blocks
+from tests.terminal import Terminal
 
 ROOT = Path(__file__).parents[3]
-SWEEPS = (ROOT / "docs/sweeps.md").read_text()
+SWEEPS = (ROOT / "docs/howto/sweeps.md").read_text()
+LAPTOP = (ROOT / "docs/start/laptop.md").read_text()
+TYPED_S = 300
 
 
-def test_the_script_of_the_page_about_tools_trains(tmp_path, monkeypatch, capsys):
+@pytest.mark.timeout(400)
+def test_the_first_run_of_the_page_about_a_laptop_trains_and_is_measured(tmp_path):
+    """These are the first two commands that a new reader types."""
+    (tmp_path / "manifests").symlink_to(ROOT / "manifests")
+    [commands] = blocks(LAPTOP, "sh")
+
+    printed = Terminal(tmp_path, path=PALAESTRA.parent).type_in(commands, TYPED_S)
+
+    assert (tmp_path / "runs/tiny/0/model.zip").exists()
+    assert '"episodes": 5' in printed
+
+
+def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsys):
     """The script uses the example that users have, in a separate folder."""
-    [script] = blocks((ROOT / "docs/tools.md").read_text(), "python with-a-run")
+    [script] = blocks((ROOT / "docs/howto/python.md").read_text(), "python with-a-run")
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     monkeypatch.chdir(tmp_path)
 
-    exec(compile(script, "docs/tools.md", "exec"), {})
+    exec(compile(script, "docs/howto/python.md", "exec"), {})
 
     assert "True " in capsys.readouterr().out.splitlines()[-1]
     assert (tmp_path / "runs/tiny/0/model.zip").exists()

@@ -1,4 +1,4 @@
-"""The scrape configuration of docs/metrics.md, in a real Prometheus.
+"""The scrape configuration of docs/reference/metrics.md, in a real Prometheus.
 
 Debian's Prometheus is built without discovery in Kubernetes, so the tests play the discovered pods: each port
 of the recorded plan's pod and of the chart's. Each target has the labels for the role `pod` from https:
@@ -25,7 +25,7 @@ PLAN = ROOT / "tests/golden/minimal.cluster.yaml"
 @pytest.fixture
 def written():
     """Write the configuration of one scrape, as a user copies it."""
-    pages = blocks((ROOT / "docs/metrics.md").read_text(), "yaml")
+    pages = blocks((ROOT / "docs/reference/metrics.md").read_text(), "yaml")
     [text] = [each for each in pages if "scrape_configs" in each]
     [scrape] = yaml.safe_load(text)["scrape_configs"]
     return scrape

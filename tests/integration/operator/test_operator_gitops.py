@@ -1,6 +1,6 @@
 """GitOps tools judge a job by the rules of kstatus: Helm 4 waits by them, as Flux does.
 
-The commands are those of docs/gitops.md.
+The commands are those of docs/howto/gitops.md.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +16,7 @@ from tests.pages import blocks
 from tests.terminal import Terminal
 from tests.waiting import DEADLINE_S, eventually
 
-PAGE = (Path(__file__).parents[3] / "docs" / "gitops.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs/howto/gitops.md").read_text()
 [TYPED] = blocks(PAGE, "sh")
 UPGRADE = TYPED.splitlines()[-1]
 TYPED_S = 60

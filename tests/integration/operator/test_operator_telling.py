@@ -69,7 +69,7 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
 
 def test_the_metrics_are_those_of_the_page(place, start):
-    """Each family in docs/metrics.md has its type, there are no others, and promtool finds no fault."""
+    """Each family in docs/reference/metrics.md has its type, there are no others, and promtool finds none."""
     operator = start()
     place.train()
     place.pods()

@@ -18,7 +18,7 @@ from tests.pages import fenced
 from tests.soak import resume
 from tests.soak.jobs import make_job
 
-PAGE = dict(fenced((ROOT / "docs/randomization.md").read_text()))
+PAGE = dict(fenced((ROOT / "docs/howto/randomization.md").read_text()))
 EXAMPLES = ROOT / "examples"
 SEEING = {"driver": "mujoco", "world": {"builtin": "seeing"}}
 PPO = {"n_steps": 32, "batch_size": 32, "n_epochs": 1}

@@ -1,4 +1,7 @@
-"""The metrics of a real run's programs, compared with docs/metrics.md; the operator's tests have theirs."""
+"""The metrics of a real run's programs, compared with docs/reference/metrics.md.
+
+The operator's metrics have their test with the operator.
+"""
 
 import re
 import urllib.request

@@ -1,4 +1,4 @@
-"""The worlds of docs/randomization.md, which change in every episode, with its seed and with training.
+"""The worlds of docs/howto/randomization.md, which change in every episode, with its seed and with training.
 
 The tests in test_run_exact_resume.py train, interrupt and resume their jobs.
 """
@@ -14,7 +14,7 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 from tests.pages import fenced
 
-PAGE = dict(fenced((Path(__file__).parents[3] / "docs/randomization.md").read_text()))
+PAGE = dict(fenced((Path(__file__).parents[3] / "docs/howto/randomization.md").read_text()))
 EXAMPLE = Path(__file__).parents[3] / "examples/curriculum.py"
 CYLINDERS = [f"CYLINDER_{number}" for number in range(4)]
 

@@ -1,8 +1,8 @@
 """Short forms of `make soak`: failures during a run do not end it.
 
 Each test runs a part of tests/soak in its smallest size and shows that this part works. The figures in
-docs/reliability.md come from the full sizes. The test in test_run_exact_resume.py compares a resumed run with
-an uninterrupted one.
+docs/explain/reliability.md come from the full sizes. The test in test_run_exact_resume.py compares a resumed
+run with an uninterrupted one.
 """
 
 import os
@@ -29,8 +29,8 @@ def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follo
 
     This one compares their names, because their texts may differ.
     """
-    text = (ROOT / "docs/simulators.md").read_text().partition("### The kinds")[2]
-    known = FAULT.findall(text.partition("### When")[0])
+    text = (ROOT / "docs/reference/faults.md").read_text().partition("## The kinds")[2]
+    known = FAULT.findall(text.partition("## When")[0])
 
     assert [fault for fault, _, _ in kinds.rows()] == known
 

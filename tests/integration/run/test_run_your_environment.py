@@ -1,4 +1,4 @@
-"""docs/your-environment.md on this machine: from an empty folder to a trained policy."""
+"""docs/start/your-environment.md on this machine: from an empty folder to a trained policy."""
 
 import json
 from importlib.metadata import version
@@ -10,7 +10,7 @@ from tests.local_run import PALAESTRA
 from tests.pages import blocks, fenced
 from tests.terminal import Terminal
 
-TEXT = (Path(__file__).parents[3] / "docs/your-environment.md").read_text()
+TEXT = (Path(__file__).parents[3] / "docs/start/your-environment.md").read_text()
 PAGE = dict(fenced(TEXT))
 FILES = ("python corridor.py", "python try.py", "yaml job.yaml")
 TYPED_S = 500

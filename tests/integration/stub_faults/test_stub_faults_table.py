@@ -1,4 +1,4 @@
-"""The table of faults in docs/simulators.md: each line occurs, and its report is the one in the table."""
+"""The table of faults in docs/reference/faults.md: each line occurs, with the report in the table."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from palaestra_sim.faults.parser import KINDS
 
-PAGE = Path(__file__).parents[3] / "docs/simulators.md"
+PAGE = Path(__file__).parents[3] / "docs/reference/faults.md"
 ROW = re.compile(
     r"^\| (?P<title>[^|]+) \| `(?P<fault>[^`]+)` \| [^|]+ \| (?P<report>[^|]+) \|$", re.MULTILINE
 )
@@ -17,7 +17,7 @@ DELAY_S = 0.05
 
 def rows():
     """Return the lines of the table as fault and report."""
-    text = PAGE.read_text().partition("### The kinds")[2].partition("### When")[0]
+    text = PAGE.read_text().partition("## The kinds")[2].partition("## When")[0]
     return [pytest.param(row["fault"], row["report"], id=row["fault"]) for row in ROW.finditer(text)]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.pages import blocks
 
-PAGE = Path(__file__).parents[3] / "docs/environments.md"
+PAGE = Path(__file__).parents[3] / "docs/howto/use-a-policy.md"
 
 HALL = """
     import gymnasium

@@ -27,7 +27,7 @@ def carried_out(*program, folder=None, **variables):
 
 
 def test_the_facade_example_drives_and_reads():
-    """The script runs as in the README."""
+    """The script runs as on the page about notebooks."""
     result = carried_out(EXAMPLES / "facade.py")
 
     assert result.stdout.startswith("Pose(x_m=0.03")
@@ -37,7 +37,7 @@ def test_the_facade_example_drives_and_reads():
 
 def test_the_blocks_of_the_page_about_facades_are_one_script():
     """The script is a separate process, because it also starts the ROS master."""
-    page = (ROOT / "docs/facades.md").read_text()
+    page = (ROOT / "docs/howto/facades.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
 
@@ -46,9 +46,9 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
     assert result.stderr == ""
 
 
-def test_the_blocks_of_the_page_about_environments_are_one_script():
+def test_the_blocks_of_the_page_about_a_training_loop_are_one_script():
     """These blocks are a user's own training loop."""
-    page = (ROOT / "docs/environments.md").read_text()
+    page = (ROOT / "docs/howto/training-loop.md").read_text()
 
     result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
 

@@ -1,4 +1,4 @@
-"""Clients with rospy and roscpp use every service and topic in docs/ros-interface.md."""
+"""Clients with rospy and roscpp use every service and topic in docs/reference/ros-interface.md."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from tools.interface.everything import FAILING, offered, world
 DEADLINE_S = 120.0  # of what takes seconds, on a busy machine
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
-PAGE = (ROOT / "docs/ros-interface.md").read_text()
+PAGE = (ROOT / "docs/reference/ros-interface.md").read_text()
 STEPPED = {"robot/time_step"}
 
 

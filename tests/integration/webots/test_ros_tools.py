@@ -1,4 +1,4 @@
-"""The blocks of docs/simulators.md about ROS's own tools and rospy, with a stub and a real master."""
+"""The blocks of docs/howto/ros-tools.md about ROS's own tools and rospy, with a stub and a real master."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from palaestra_protocol.ros.rostypes import message_type, service_type
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs/simulators.md").read_text()
+PAGE = (ROOT / "docs/howto/ros-tools.md").read_text()
 DEADLINE_S = 60.0  # of what takes moments, on a busy machine
 PRINT_MD5 = """
 import webots_ros.msg, webots_ros.srv

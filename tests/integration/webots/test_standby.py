@@ -95,7 +95,7 @@ def pair(master, tmp_path):
 
 
 def test_a_killed_simulator_is_replaced_by_the_one_that_stood_by(pair, capsys):
-    """The signal is SIGKILL, as from the kernel for too much memory. The figure is in docs/reliability.md."""
+    """SIGKILL is the kernel's signal for too much memory. The figure is in docs/explain/reliability.md."""
     it = pair().begin()
     os.kill(pid_of(it.first), signal.SIGKILL)
 

@@ -29,7 +29,9 @@ EXAMPLES = [
 ]
 
 
-@pytest.mark.parametrize("name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/trainingjob.md"])
+@pytest.mark.parametrize(
+    "name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/reference/trainingjob.md"]
+)
 def test_the_committed_file_is_current(name, repository) -> None:
     """`make golden` writes these files again."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]
@@ -108,7 +110,7 @@ def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository
 
 def test_the_page_shows_the_smallest_example(repository) -> None:
     """A reader can copy the example from the page, and it works."""
-    text = (repository / "docs/trainingjob.md").read_text(encoding="utf-8")
+    text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
     shown = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)
 
     assert shown
@@ -117,7 +119,7 @@ def test_the_page_shows_the_smallest_example(repository) -> None:
 
 def test_the_page_quotes_the_real_messages(repository, problems) -> None:
     """The example messages on the page must be real messages."""
-    text = (repository / "docs/trainingjob.md").read_text(encoding="utf-8")
+    text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     (role,) = problems({"simulators.1.role": "Eval"})
     (steps,) = problems({"steps": 1})
@@ -159,7 +161,7 @@ def test_a_table_tells_type_default_and_what_is_required() -> None:
 
 def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
     """The introduction is written by people and must stay."""
-    text = (repository / "docs/trainingjob.md").read_text(encoding="utf-8")
+    text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     made = page(text.replace("spec.storage", "spec.tsorage"))
 

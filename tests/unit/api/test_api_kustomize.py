@@ -1,4 +1,4 @@
-"""kubectl's kustomize builds the kustomize files of docs/trainingjob.md."""
+"""kubectl's kustomize builds the kustomize files of docs/howto/gitops.md."""
 
 import subprocess
 from pathlib import Path
@@ -9,7 +9,7 @@ import yaml
 from tests.control_plane.programs import programs
 from tests.pages import blocks
 
-PAGE = Path(__file__).parents[3] / "docs" / "trainingjob.md"
+PAGE = Path(__file__).parents[3] / "docs/howto/gitops.md"
 JOB = """\
 apiVersion: palaestra.dev/v1alpha1
 kind: TrainingJob

@@ -49,7 +49,7 @@ def test_a_row_is_one_line_of_a_table(reason) -> None:
 
 def test_operations_has_a_row_for_each_reason(repository) -> None:
     """A reader of a status looks up its reason there and finds what to do."""
-    text = (repository / "docs" / "operations.md").read_text()
+    text = (repository / "docs/reference/reasons.md").read_text()
 
     assert reasons_table() in text
     assert reasons_page(text) == text

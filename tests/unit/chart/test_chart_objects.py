@@ -353,7 +353,7 @@ def test_runbooks_are_links_if_a_value_has_the_address():
 
     (groups,) = (each["spec"]["groups"] for each in made if each["kind"] == "PrometheusRule")
     links = [each["annotations"]["runbook_url"] for group in groups for each in group["rules"]]
-    assert all(link.startswith(f"{address}/docs/operations.md#palaestra") for link in links)
+    assert all(link.startswith(f"{address}/docs/howto/alerts.md#") for link in links)
     assert links
 
 
@@ -421,7 +421,7 @@ def test_the_notes_tell_what_to_type_next(mode):
 def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 - skips without Helm
     """People asked which of two different timeouts for one command was right."""
     root = CHART.parents[1]
-    pages = [(root / "docs" / "install.md").read_text(), (CHART / "README.md").read_text()]
+    pages = [(root / "docs/howto/install.md").read_text(), (CHART / "README.md").read_text()]
     pages.append(helm("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--dry-run=client"))
 
     given = [set(re.findall(r"helm test .*--timeout (\S+)", page)) for page in pages]
@@ -431,7 +431,7 @@ def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 
 
 def test_the_token_of_the_notebooks_can_stand_in_an_address():
     """The server refused a link whose token had a `+`, `/` or `=` of base64, because `?token=` ends there."""
-    page = (CHART.parents[1] / "docs" / "install.md").read_text()
+    page = (CHART.parents[1] / "docs/howto/install.md").read_text()
     [command] = re.findall(r'--from-literal=token="\$\((.+)\)"', page)
 
     token = subprocess.run(["bash", "-c", command], check=True, capture_output=True, text=True).stdout

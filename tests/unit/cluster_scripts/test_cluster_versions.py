@@ -75,7 +75,7 @@ def test_kubeadm_is_configured_with_the_bundled_etcd(tmp_path):
 
 def test_the_page_about_queues_installs_the_kueue_that_is_tested():
     """Another version may have other kinds, and was never tested."""
-    page = (CLUSTER.parents[1] / "docs/queues.md").read_text()
+    page = (CLUSTER.parents[1] / "docs/howto/queues.md").read_text()
     version = images.version_of("kueue", "sigs.k8s.io/kueue").removeprefix("v")
 
     assert re.findall(r"(?:--version|Tested with) (\d+\.\d+\.\d+)", page) == [version, version]

@@ -9,7 +9,7 @@ import pytest
 from tests.monitoring.questions import DASHBOARDS, alerts, filled, panels, questions, values_of
 
 ROOT = Path(__file__).parents[3]
-METRICS = ROOT / "docs/metrics.md"
+METRICS = ROOT / "docs/reference/metrics.md"
 TARGET = frozenset({"namespace", "pod", "container", "training_job", "replica", "simulator"})
 OURS = re.compile(r"\bpalaestra_\w+")
 COLUMNS = 24
@@ -88,15 +88,15 @@ def test_a_query_keeps_no_label_that_its_metrics_lack_and_names_none_that_it_dro
 
 
 def labels_told():
-    """Return the labels of each metric in docs/metrics.md."""
+    """Return the labels of each metric in docs/reference/metrics.md."""
     rows = re.findall(r"^\| `(palaestra_\w+)` \|[^|]*\|([^|]*)\|", METRICS.read_text(), re.MULTILINE)
     return {name: re.findall(r"`(\w+)`:", labels) for name, labels in rows}
 
 
 def test_an_alert_leads_to_what_to_do_about_it():
     """The reader of a notification has only its link."""
-    headings = re.findall(r"^### (\w+)$", (ROOT / "docs/operations.md").read_text(), re.MULTILINE)
+    headings = re.findall(r"^## (\w+)$", (ROOT / "docs/howto/alerts.md").read_text(), re.MULTILINE)
 
     for rule in alerts():
         assert rule["alert"] in headings
-        assert rule["annotations"]["runbook_url"] == f"docs/operations.md#{rule['alert'].lower()}"
+        assert rule["annotations"]["runbook_url"] == f"docs/howto/alerts.md#{rule['alert'].lower()}"

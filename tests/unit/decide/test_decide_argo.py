@@ -1,4 +1,4 @@
-"""The health check for Argo CD in docs/gitops.md, run unchanged in the Lua version of Argo CD."""
+"""The health check for Argo CD in docs/howto/gitops.md, run unchanged in the Lua version of Argo CD."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from lupa import lua51
 
 from tests.pages import blocks
 
-[CHECK] = blocks((Path(__file__).parents[3] / "docs" / "gitops.md").read_text(), "lua")
+[CHECK] = blocks((Path(__file__).parents[3] / "docs/howto/gitops.md").read_text(), "lua")
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""One list is the order in which a replica is checked; docs/judging.md shows it."""
+"""One list is the order in which a replica is checked; docs/explain/judging.md shows it."""
 
 from palaestra.decide.replica_policy import JUDGED, CheckKind
 from tools.judging import page

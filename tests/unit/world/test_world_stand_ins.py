@@ -19,7 +19,7 @@ from palaestra_sim.world import (
 )
 from palaestra_sim.world.expressions import parse_formula
 
-PAGE = Path(__file__).parents[3] / "docs/simulators.md"
+PAGE = Path(__file__).parents[3] / "docs/reference/simulators.md"
 # The most frequent types in public worlds, besides robots and devices.
 COMMON = """
 RectangleArena Floor WoodenBox StraightRoadSegment Wall HighwayPole CurvedRoadSegment

@@ -22,7 +22,7 @@ def generated_files(root: Path) -> dict[str, str]:
 
     Only the tables of the two pages are generated; the rest of each page is read from `root`.
     """
-    reference, operations = "docs/trainingjob.md", "docs/operations.md"
+    reference, operations = "docs/reference/trainingjob.md", "docs/reference/reasons.md"
     return {
         "manifests/crd.yaml": _HEADER + crd_text(),
         "charts/palaestra/crd.yaml": _HEADER + crd_text(),
@@ -32,7 +32,7 @@ def generated_files(root: Path) -> dict[str, str]:
 
 
 def reasons_page(text: str) -> str:
-    """Return the page docs/operations.md, now `text`, with its table of reasons updated.
+    """Return the page docs/reference/reasons.md, now `text`, with its table of reasons updated.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,7 +1,7 @@
 """All reasons of conditions, replicas and events, with their messages.
 
 A reason is one word for programs. Its message is a template, which the facts complete to a sentence for
-people: the fact and the remedy. `meaning` and `remedy` are columns of docs/operations.md.
+people: the fact and the remedy. `meaning` and `remedy` are columns of docs/reference/reasons.md.
 """
 
 from dataclasses import dataclass
@@ -191,7 +191,7 @@ ROWS: dict[Reason, ReasonText] = {
         'label it palaestra.dev/for-jobs: "true" and bind the role palaestra-job-secrets in this namespace',
         "a job may use only Secrets with the label, and the operator must be allowed to check it",
         "ask the owner of the Secret to set the label and to bind the role `palaestra-job-secrets`: see "
-        "Secrets below",
+        "[secrets](../howto/secrets.md)",
     ),
     Reason.CLAIM_MISSING: ReasonText(
         "{field}: PersistentVolumeClaim {name} does not exist in this namespace; "
@@ -210,14 +210,15 @@ ROWS: dict[Reason, ReasonText] = {
         "other controllers act on labels and annotations of pods, so an author of TrainingJobs without "
         "permission to create pods must not set them; an installation allows only the keys that it names",
         "add the key, or its domain with a `/` at the end, to `jobs.allowedPodLabels` or "
-        "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)); the job then starts",
+        "`jobs.allowedPodAnnotations` ([install](../howto/install.md#what-pods-may-carry)); "
+        "the job then starts",
     ),
     Reason.SCHEDULING_NOT_ALLOWED: ReasonText(
         "{field}: {fact} is not allowed in this cluster; {remedy}",
         "a priority, a runtime class, a toleration or an affinity to other pods affects what others run; an "
         "installation allows only those that it names",
         "allow what the message names with the value of the chart that it names "
-        "([install](install.md#what-pods-may-ask-for)); the job then starts",
+        "([install](../howto/install.md#what-pods-may-ask-for)); the job then starts",
     ),
     Reason.NO_KUEUE: ReasonText(
         "spec.scheduling.queueName: this cluster has no Kueue; install it, or create a job without a queue",
@@ -243,7 +244,7 @@ ROWS: dict[Reason, ReasonText] = {
         "the replica has trained, and its claim does not exist or its run directory is empty; the operator "
         "suspends it and creates no new claim, because it would train from step 0",
         "restore the claim under its name, or the run directory; after you have restored a run directory, or "
-        "to train from step 0 again, run `palaestra restart NAME` ([a lost run](operations.md#a-lost-run))",
+        "to train from step 0 again, run `palaestra restart NAME` ([a lost run](../howto/lost-run.md))",
     ),
     Reason.RUN_RESTARTED: ReasonText(
         "the run that was at step {step} is lost; the replica begins with what its run directory holds, at "
@@ -258,7 +259,7 @@ ROWS: dict[Reason, ReasonText] = {
     Reason.QUEUED: ReasonText(
         "waits in queue {queue} for Kueue{taken}{why}{again}",
         "Kueue has not admitted the replica yet, or has evicted it; the text after the colon is Kueue's",
-        "wait, or change what the message names: see [queues](queues.md#train-in-a-queue)",
+        "wait, or change what the message names: see [queues](../howto/queues.md#train-in-a-queue)",
         warning=False,
     ),
     Reason.SUSPENDING: ReasonText(
@@ -343,7 +344,7 @@ ROWS: dict[Reason, ReasonText] = {
         "no pod can be created: {words}{remedy}",
         "the API server refuses a pod or its claim because of a quota, a LimitRange, Pod Security, a webhook "
         "or a missing PriorityClass; the message quotes it",
-        "raise the quota, or allow what the message names ([queues and quotas](queues.md#quotas)); "
+        "raise the quota, or allow what the message names ([queues and quotas](../howto/queues.md#quotas)); "
         "the creation is retried automatically",
     ),
     Reason.RESTART_POLICY_DROPPED: ReasonText(
@@ -471,7 +472,7 @@ ROWS: dict[Reason, ReasonText] = {
         "ends the pod {seconds} s after the trainer; inject native sidecars, or none",
         "a mesh or an agent has added a container to the pod, and it does not end with the trainer; "
         "the result is the trainer's",
-        "inject native sidecars or none: see [install](install.md#containers-that-others-add)",
+        "inject native sidecars or none: see [install](../howto/install.md#containers-that-others-add)",
     ),
     Reason.SUCCEEDED: ReasonText(
         "{what}", "the training is complete", "fetch `model.zip` from the run directory", warning=False

@@ -1,4 +1,4 @@
-"""The field tables of docs/trainingjob.md, generated from the schema of the CRD."""
+"""The field tables of docs/reference/trainingjob.md, generated from the schema of the CRD."""
 
 import json
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
 
 
 def page(text: str) -> str:
-    """Return the page docs/trainingjob.md, now `text`, with its tables updated.
+    """Return the page docs/reference/trainingjob.md, now `text`, with its tables updated.
 
     Raises:
         ValueError: a mark is missing.

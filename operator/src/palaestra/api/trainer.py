@@ -146,11 +146,11 @@ class Algorithm(ApiModel):
     name: Annotated[str, Field(min_length=1, max_length=256, pattern=ALGORITHM)] = "DQN"
     """DQN, PPO, A2C, SAC, TD3 and DDPG are from Stable-Baselines3, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO and
     MaskablePPO from sb3-contrib; REINFORCE is Palaestra's. `module:Class` is a class that is compatible with
-    Stable-Baselines3. docs/algorithms.md has the observations and actions that each takes."""
+    Stable-Baselines3. docs/reference/algorithms.md has the observations and actions that each takes."""
 
     hyperparameters: FreeObject = Field(default={})
     """Keyword arguments of the algorithm's class, spelled as in Python (`learning_rate`, not
-    `learningRate`); docs/trainingjob.md lists the defaults."""
+    `learningRate`); docs/reference/trainingjob.md lists the defaults."""
 
     normalize: Normalize | None = None
     """Normalization of observations and rewards; `{}`: both; absent: neither."""

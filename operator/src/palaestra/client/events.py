@@ -25,7 +25,7 @@ class Event:
         time: of the last occurrence.
         warning: whether its type is Warning.
         about: kind and name of the object: `Pod/job-0-x7k2p`.
-        reason: one word; docs/operations.md explains those about the TrainingJob.
+        reason: one word; docs/reference/reasons.md explains those about the TrainingJob.
         message: one sentence.
         count: number of occurrences.
         container: the container of the pod in `about`; empty: the whole pod, or another object.

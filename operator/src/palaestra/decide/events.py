@@ -25,7 +25,7 @@ _BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no recon
 
 
 def happening(reason: Reason, message: str, replica: int | None = None) -> EmittedEvent:
-    """Return the event for a reason, of the type in docs/operations.md."""
+    """Return the event for a reason, of the type in docs/reference/reasons.md."""
     kind = EventType.WARNING if ROWS[reason].warning else EventType.NORMAL
     return EmittedEvent(type=kind, reason=reason, message=message, replica=replica)
 

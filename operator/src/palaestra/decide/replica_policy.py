@@ -1,7 +1,7 @@
 """The ordered list of checks on a replica that has not ended.
 
-`make golden` writes the list into docs/judging.md. Each reconcile runs all checks, because a check may also
-return the time after which it will hold. The class of a check that holds sets the consequence:
+`make golden` writes the list into docs/explain/judging.md. Each reconcile runs all checks, because a
+check may also return the time after which it will hold. The class of a check that holds sets the consequence:
 
 - ended: the replica has ended for the reason of the first one that holds; the others are ignored.
 - final: the first one that holds stops the replica for good, by a mark on its Job.

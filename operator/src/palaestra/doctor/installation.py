@@ -65,7 +65,7 @@ def judged_images(container: Object) -> CheckResult:
     return warning(
         "images",
         f"{', '.join(tags)}: a tag may be moved to another image, which a job's next pod would use",
-        "set the chart's values images.<name>.digest, see docs/install.md",
+        "set the chart's values images.<name>.digest, see docs/howto/install.md",
     )
 
 

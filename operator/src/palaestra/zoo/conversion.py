@@ -69,12 +69,13 @@ def _note_the_environment(draft: Draft) -> None:
         draft.note(
             "defaults",
             f"for {_OWN_DEFAULTS}, hyperparameters that the entry leaves out have defaults of Palaestra; "
-            "docs/trainingjob.md lists them, so write the values that you want",
+            "docs/reference/trainingjob.md lists them, so write the values that you want",
         )
     elif draft.environment not in OWN_TASKS:
         draft.note(
             "environment",
-            f"{draft.environment} must accept robot or scene to use a simulator (docs/your-environment.md); "
+            f"{draft.environment} must accept robot or scene to use a simulator "
+            "(docs/reference/environment-rules.md); "
             "change environment.id, simulators[].world and trainer.robot to yours",
         )
 

@@ -1,4 +1,4 @@
-"""The kinds of faults, as data; docs/simulators.md describes the effect of each on a client."""
+"""The kinds of faults, as data; docs/reference/faults.md describes the effect of each on a client."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Rays that meet visible shapes: infra-red DistanceSensors, and lidars if the physics does not render. Pure.
 
 A ray stops at the first surface that faces it. It passes through the robot that carries the sensor, and
-through shapes that contain its origin. Source of the reflection: docs/reference/distancesensor.md of Webots,
+through shapes that contain its origin. Source of the reflection: reference/distancesensor.md of Webots,
 "Infra-Red Sensors".
 """
 

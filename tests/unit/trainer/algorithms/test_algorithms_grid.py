@@ -165,7 +165,7 @@ def test_the_job_names_the_algorithms_of_the_table():
 
 
 def test_what_is_refused_is_refused_before_a_model_is_made(play):
-    """The message is the sentence in the table of docs/algorithms.md."""
+    """The message is the sentence in the table of docs/reference/algorithms.md."""
     for cell in (("RecurrentPPO", "Box", "MultiBinary"), ("PPO", "Tuple", "Box"), ("CrossQ", "image", "Box")):
         assert play("refused", cell)[0] == 2
 

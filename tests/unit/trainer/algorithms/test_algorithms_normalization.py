@@ -211,7 +211,7 @@ def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp
 
     loaded = sb3.PPO.load(tmp_path / "model.zip")
     page = {}
-    exec(shown_in("environments.md", "eyes_of"), page)
+    exec(shown_in("howto/use-a-policy.md", "eyes_of"), page)
     seen = page["eyes_of"](tmp_path / "model.zip")(observation)
 
     assert np.array_equal(seen, model.get_vec_normalize_env().normalize_obs(observation))

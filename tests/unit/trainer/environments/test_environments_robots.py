@@ -117,7 +117,7 @@ def test_a_robot_of_joints_without_motors_is_refused():
 
 
 def test_what_ships_inherits_what_the_page_says():
-    """docs/robots.md has the table."""
+    """docs/howto/robots.md has the table."""
     assert issubclass(TurtleBot3Burger, DifferentialDrive)
     assert all(issubclass(robot_class(name), RobotAbc) for name in SHIPPED)
 

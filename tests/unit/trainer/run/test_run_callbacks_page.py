@@ -1,4 +1,4 @@
-"""The code in docs/callbacks.md is run unchanged."""
+"""The code in docs/howto/callbacks.md is run unchanged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra.plan import ClusterLayout, Images, identified, plan
 from palaestra_trainer.configuration import parse
 from tests.pages import blocks
 
-PAGE = (Path(__file__).parents[4] / "docs" / "callbacks.md").read_text()
+PAGE = (Path(__file__).parents[4] / "docs/howto/callbacks.md").read_text()
 
 
 @pytest.fixture

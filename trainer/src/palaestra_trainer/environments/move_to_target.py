@@ -84,7 +84,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
     | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
-    The default is all parts except `position` and `to_reach`; docs/environments.md describes its cost.
+    The default is all parts except `position` and `to_reach`; docs/explain/tasks.md describes its cost.
 
     ## Reward
 

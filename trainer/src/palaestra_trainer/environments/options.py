@@ -14,7 +14,7 @@ from palaestra_trainer.robots.geometry import Movement
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
 # `Sparse` has a reward for time-up, so time-up terminates its episodes. `Dense` has no such reward, so its
-# episodes are truncated: see docs/environments.md.
+# episodes are truncated: see docs/explain/tasks.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 

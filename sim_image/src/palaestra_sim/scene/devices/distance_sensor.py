@@ -2,7 +2,7 @@
 
 Several rays form a cone around the first axis. A sonar measures the nearest hit. The others measure the
 average, in which a ray counts less the farther it is off the axis. Infra-red rays meet visible shapes, the
-others boundingObjects; a darker shape appears farther away. Source: docs/reference/distancesensor.md
+others boundingObjects; a darker shape appears farther away. Source: reference/distancesensor.md
 and WbDistanceSensor.cpp of Webots.
 
 A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four additional

@@ -1,0 +1,131 @@
+"""Each page of docs/ is reached from docs/README.md and says for whom it is; each address exists."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from palaestra.api.reasons import Reason
+from tests.contract.test_docs import PAGES, ROOT
+from tests.pages import anchors, chapters, links
+
+DOCS = ROOT / "docs"
+ENTRY = DOCS / "README.md"
+RECORDS = set(DOCS.glob("decisions/0*.md"))  # they have a form of their own
+FIRST = re.compile(
+    r"# [^\n]+\n\n(This page is for [^\n]+\. (?:At its end you (?:have|can|know) |Look up )[^\n]+\.)\n"
+)
+ADDRESS = re.compile(r"docs/[\w./-]+\.md(?:#[\w-]+)?")
+DOORS = ("Train on my laptop", "My own task, robot or world", "Run in a cluster", "Operate a cluster")
+TROUBLE = (DOCS / "howto/troubleshooting.md").read_text()
+
+
+def named(page):
+    """Return the pages that a page links to."""
+    return {(page.parent / link.partition("#")[0]).resolve() for link in links(page.read_text())}
+
+
+def missing(page, target):
+    """Return whether a link or an address of a page leads nowhere."""
+    path, _, anchor = target.partition("#")
+    file = (page.parent / path).resolve() if path else page
+    return not file.exists() or bool(anchor and anchor not in anchors(file.read_text()))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_leads_to_a_file_and_every_anchor_to_a_heading(page):
+    """A page that was renamed or split takes its readers along."""
+    assert [target for target in links(page.read_text()) if missing(page, target)] == []
+
+
+def test_every_address_outside_the_pages_leads_to_a_page_and_its_heading():
+    """Messages, alerts, fields and docstrings name pages; files of an old release keep theirs."""
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    texts = {
+        name: (ROOT / name).read_text()
+        for name in listed.split()
+        if Path(name).suffix in {".py", ".yaml", ".toml", ".sh", ".md", ".tpl", ".txt"}
+        and not name.startswith("tests/fixtures/")
+        and (ROOT / name).is_file()
+    }
+
+    found = {(name, address) for name, text in texts.items() for address in ADDRESS.findall(text)}
+
+    assert len(found) > 50
+    assert sorted((name, address) for name, address in found if missing(ROOT / "x", address)) == []
+
+
+def test_every_page_is_reached_from_the_entry():
+    """A page that nobody finds is not documentation."""
+    reached, front = set(), {ENTRY}
+    while front:
+        reached |= front
+        front = {
+            page for at in front for page in named(at) if page.suffix == ".md" and page.is_file()
+        } - reached
+        front = {page for page in front if DOCS in page.parents}
+
+    assert set(DOCS.glob("**/*.md")) - reached == set()
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_door_leads_along_three_to_five_pages(door):
+    """A path in reading order; a list of everything is what the reader came from."""
+    text = dict(chapters(ENTRY.read_text()))[door]
+
+    assert re.findall(r"^(\d)\. \[.+\]\(.+\): .+\.$", text, re.MULTILINE) == [
+        str(n + 1) for n in range(text.count("]("))
+    ]
+    assert 3 <= text.count("](") <= 5
+
+
+@pytest.mark.parametrize(
+    "page",
+    sorted({*DOCS.glob("**/*.md")} - RECORDS),
+    ids=lambda page: str(page.relative_to(DOCS)),
+)
+def test_a_page_begins_with_whom_it_is_for_and_what_they_take_away(page):
+    """One line decides whether to read on."""
+    assert FIRST.match(page.read_text())
+
+
+def test_the_list_of_decisions_has_them_all_with_their_titles():
+    """A decision that is missing in the list is taken again."""
+    page = (DOCS / "decisions/README.md").read_text()
+    titles = {path.name: re.sub(r"^# \d+[.:] ", "", path.read_text().partition("\n")[0]) for path in RECORDS}
+
+    assert re.findall(r"^\| \[\d{4}\]\((.+?)\) \| (.+) \|$", page, re.MULTILINE) == sorted(titles.items())
+
+
+def quoted():
+    """Return the messages of Palaestra in the headings of the page about troubles on a laptop."""
+    text = dict(chapters(TROUBLE))["On a laptop"]
+    headings = re.findall(r"^### (`+) ?(.+?) ?\1", text, re.MULTILINE)
+    return [message for _, message in headings if message not in OF_OTHERS]
+
+
+OF_OTHERS = {"palaestra: command not found", "exit code 2"}
+SOURCES = [
+    ROOT / "tools/setup.sh",
+    *(path for name in ("operator", "trainer", "sim_image") for path in (ROOT / name / "src").rglob("*.py")),
+]
+
+
+@pytest.mark.parametrize("message", quoted())
+def test_a_message_that_troubleshooting_explains_is_printed_by_a_program(message):
+    """People search for what they see; `…` stands for names, numbers and what the system adds."""
+    text = "\n".join(path.read_text() for path in SOURCES)
+    joined = re.sub(r'"\s*f?"', "", text)  # a long message is several literals
+    words = re.split(r"…|\(ModuleNotFoundError: No module named|Address already in use", message)
+
+    assert [part for part in words if part.strip(" :;).`") and part.strip(" :;).") not in joined] == []
+
+
+def test_troubleshooting_names_only_reasons_that_there_are():
+    """A reason that was renamed would be searched for in vain."""
+    rows = re.findall(r"^\| (`[A-Z]\w+`(?:, `[A-Z]\w+`)*) \|", TROUBLE, re.MULTILINE)
+    reasons = {reason for row in rows for reason in re.findall(r"\w+", row)}
+
+    assert len(reasons) > 8
+    assert reasons <= {str(reason) for reason in Reason}
