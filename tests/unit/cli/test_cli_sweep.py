@@ -39,7 +39,7 @@ def test_an_option_for_a_cluster_without_one_is_refused(file, option, capsys):
     """A user who meant a cluster would notice hours later that the training runs here."""
     assert main(["sweep", str(file), option]) == 2
 
-    assert capsys.readouterr().err.startswith("--cluster: is missing; give it too")
+    assert capsys.readouterr().err.startswith("--cluster: is missing; add it")
 
 
 def test_a_job_that_cannot_be_read_is_named(file, capsys):

@@ -76,13 +76,13 @@ def add(commands: Commands) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     if options.cluster:
-        return connected(_there)(options)
+        return connected(_in_cluster)(options)
     if options.namespace or options.context or options.kubeconfig:
         raise PalaestraError("--cluster: is missing; add it, or remove the options that choose a cluster")
-    return _here(options)
+    return _on_this_machine(options)
 
 
-def _here(options: argparse.Namespace) -> int:
+def _on_this_machine(options: argparse.Namespace) -> int:
     sweep = _loaded(options.file)
     folder = options.dir.absolute() / sweep.metadata.name
     place = LocalBackend(folder, options.at_once)
@@ -108,7 +108,7 @@ def _carried_out(search: Search, place: LocalBackend, folder: Path, objective: O
         place.stop()
 
 
-def _there(client: Client, options: argparse.Namespace) -> int:
+def _in_cluster(client: Client, options: argparse.Namespace) -> int:
     sweep = _loaded(options.file)
     folder = options.dir.absolute() / sweep.metadata.name
     default = None if sweep.spec.optuna is None else SEARCHED_AT_ONCE
