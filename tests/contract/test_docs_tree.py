@@ -108,6 +108,7 @@ def quoted():
 OF_OTHERS = {"palaestra: command not found", "exit code 2"}
 SOURCES = [
     ROOT / "tools/setup.sh",
+    ROOT / "tools/test-packages.sh",
     *(path for name in ("operator", "trainer", "sim_image") for path in (ROOT / name / "src").rglob("*.py")),
 ]
 
