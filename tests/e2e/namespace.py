@@ -23,6 +23,7 @@ LOOK_EVERY_S = 0.5
 # A pod may wait until the pods of other tests leave room on the only node, which takes five minutes on a slow
 # machine.
 SHORT_S, LONG_S = 180.0, 900.0
+NO_RESTARTS = dict.fromkeys(("trainer", "simulator", "disruption", "suspension", "operator"), 0)
 JOB = "palaestra.dev/job"
 NAME_BYTES = 40
 

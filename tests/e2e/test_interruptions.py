@@ -3,7 +3,7 @@
 import pytest
 
 from tests.e2e.jobs import make_claim, make_slow_job
-from tests.e2e.namespace import LONG_S, named
+from tests.e2e.namespace import LONG_S, NO_RESTARTS, named
 
 pytestmark = [pytest.mark.beside, pytest.mark.after_the_kills, pytest.mark.timeout(900)]
 
@@ -60,7 +60,7 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
     assert namespace.wait_for_end("amid", LONG_S) == "Succeeded"
     replica = namespace.replica("amid")
     assert replica["step"] == STEPS
-    assert replica["restarts"] == {"trainer": 0, "simulator": 0, "disruption": 0, "suspension": 0, counted: 1}
+    assert replica["restarts"] == {**NO_RESTARTS, counted: 1}
     assert replica["attempt"] == 2
     assert [named(pod) for pod in namespace.pods("amid", live=False)] == [second]
 

@@ -19,7 +19,7 @@ from tests.e2e.kueue import (
     words,
     workload,
 )
-from tests.e2e.namespace import LONG_S
+from tests.e2e.namespace import LONG_S, NO_RESTARTS
 
 pytestmark = [pytest.mark.changes_the_cluster, pytest.mark.timeout(900), pytest.mark.usefixtures("robots")]
 
@@ -127,10 +127,8 @@ def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
 
 def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
     """Kueue causes both, and neither is a failure."""
-    none = dict.fromkeys(("trainer", "simulator", "disruption", "suspension"), 0)
-
-    assert story.ends["everyday"]["restarts"] == {**none, "suspension": 1}
-    assert story.ends["patient"]["restarts"] == story.ends["urgent"]["restarts"] == none
+    assert story.ends["everyday"]["restarts"] == {**NO_RESTARTS, "suspension": 1}
+    assert story.ends["patient"]["restarts"] == story.ends["urgent"]["restarts"] == NO_RESTARTS
     assert {name: end["attempt"] for name, end in story.ends.items()} == {
         "everyday": 2,
         "patient": 1,

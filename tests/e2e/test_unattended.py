@@ -3,7 +3,7 @@
 import pytest
 
 from tests.e2e.evictions import EVERY_STEPS, EVICTIONS, NAME, STEPS
-from tests.e2e.namespace import LONG_S, named
+from tests.e2e.namespace import LONG_S, NO_RESTARTS, named
 
 
 @pytest.mark.comes_late
@@ -19,5 +19,5 @@ def test_each_of_several_evictions_costs_at_most_a_checkpoint_interval(evictions
     replica = namespace.replica(NAME)
     assert replica["step"] == STEPS
     assert replica["attempt"] == EVICTIONS + 1
-    assert replica["restarts"] == {"trainer": 0, "simulator": 0, "disruption": EVICTIONS, "suspension": 0}
+    assert replica["restarts"] == {**NO_RESTARTS, "disruption": EVICTIONS}
     assert [named(pod) for pod in namespace.pods(NAME, live=False)] == [evicted.last]

@@ -242,8 +242,8 @@ def test_a_plugin_may_give_a_certificate(authority, tmp_path):
         (f"echo '{given(clientKeyData='k')}'", {}, "gave neither"),
         (f"echo '{given(clientCertificateData='c')}'", {}, "gave a certificate without its key"),
         (f"echo '{given(clientCertificateData='c', clientKeyData='k')}'", {}, "cannot be used together"),
-        (f"echo '{given(token='t', expirationTimestamp='soon')}'", {}, "is no time: 'soon'"),
-        (f"echo '{given(token='t').replace('/v1', '/v1beta1')}'", {}, "answers in apiVersion"),
+        (f"echo '{given(token='t', expirationTimestamp='soon')}'", {}, "is not a time: 'soon'"),
+        (f"echo '{given(token='t').replace('/v1', '/v1beta1')}'", {}, "returned apiVersion"),
         (
             "",
             {"command": "no-such-plugin", "installHint": "Get it\nat home"},

@@ -271,7 +271,7 @@ def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
     again, _ = desk.run()
 
     assert (code, again) == (1, 0)
-    assert "failed: DeadlineExceeded: spec.activeDeadlineSeconds is over" in out
+    assert "failed: DeadlineExceeded: spec.activeDeadlineSeconds has passed" in out
 
 
 def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
