@@ -72,8 +72,15 @@ class Paint:
         place = self.mapped(point)
         roughness = self.roughness if self.rough is None else self.rough.at(place)
         occlusion = 0.0 if self.hollow is None else self.hollow.at(place)
-        red = self.red * self.image.at(place)
-        return 0.2 + 0.8 * red * (1.0 - 0.5 * roughness) * (1.0 - 0.5 * occlusion)
+        return returned_light(self.red * self.image.at(place), roughness, occlusion)
+
+
+def returned_light(red: float, roughness: float, occlusion: float = 0.0) -> float:
+    """Return the share of infra-red light that a surface returns, 0.2 to 1; all arguments are 0 to 1.
+
+    Source: reference/distancesensor.md of Webots, Infra-Red Sensors.
+    """
+    return 0.2 + 0.8 * red * (1.0 - 0.5 * roughness) * (1.0 - 0.5 * occlusion)
 
 
 class Textures:
@@ -126,7 +133,7 @@ class Textures:
             return None
         key = (node.origin.source.name, address)
         if key not in self._images:
-            self._images[key] = self._decoded(node.origin.source, address)
+            self._images[key] = _decoded(self._read, node.origin.source, address)
         found = self._images[key]
         if found is None:
             return None
@@ -134,20 +141,20 @@ class Textures:
         repeats = node.flag("repeatS", True), node.flag("repeatT", True)
         return Image(width=width, height=height, reds=reds, repeats=repeats)
 
-    def _decoded(self, namer: Source, address: str) -> tuple[int, int, bytes] | None:
-        if self._read is None:
-            return None
-        try:
-            raster = picture_files.decode(self._read(namer, address))
-        except (OSError, UnsimulatedError):
-            return None
-        return None if raster is None else (raster.width, raster.height, bytes(raster.pixels[_RED::_PIXEL]))
-
 
 def texture_of(look: SceneNode) -> SceneNode | None:
     """Return the ImageTexture of an appearance; None if it has none."""
     field = {"Appearance": "texture", "PBRAppearance": "baseColorMap"}.get(look.type_name, "")
     return next((node for node in look.nodes(field) if node.type_name == "ImageTexture"), None)
+
+
+def _decoded(read: ReadFile, namer: Source, address: str) -> tuple[int, int, bytes] | None:
+    """Return width, height and the red of each pixel of an image; None if it cannot be read."""
+    try:
+        raster = picture_files.decode(read(namer, address))
+    except (OSError, UnsimulatedError):
+        return None
+    return None if raster is None else (raster.width, raster.height, bytes(raster.pixels[_RED::_PIXEL]))
 
 
 def _bounded(part: float, *, repeat: bool) -> float:

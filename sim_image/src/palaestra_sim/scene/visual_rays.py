@@ -17,7 +17,7 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Pose, Vector, dot, minus, turn
 from palaestra_sim.scene.meshes import Mesh, nearest_triangle
 from palaestra_sim.scene.sensor_rays import Beam
-from palaestra_sim.scene.textures import Paint, Textures
+from palaestra_sim.scene.textures import Paint, Textures, returned_light
 from palaestra_sim.scene.visuals import Drawn, View
 
 _PARALLEL: Final = 1e-12
@@ -121,7 +121,7 @@ class _Target:
 def reflection(thing: Drawn) -> float:
     """Return the share of infra-red light that a shape returns, 0.2 to 1."""
     red, _, _, opaque = thing.color
-    return 0.2 + 0.8 * red * opaque * (1.0 - 0.5 * thing.roughness)
+    return returned_light(red * opaque, thing.roughness)
 
 
 def _ray(beam: Beam) -> tuple[Vector, Vector, float]:
