@@ -13,8 +13,10 @@
 - `signals`: the signals that a program handles
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
 - `xmlrpc`: XML-RPC as ROS uses it, with limits for time and size
+- `tcp_server`: the base of both servers: one port, with a thread for each connection
 - `connection_limits`: the connections that these servers keep
 
 This package imports none of the others. All modules except `connection_limits`, `http`, `imports`,
-`shadowing`, `signals`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and bytes.
+`shadowing`, `signals`, `tcp_server`, `ros.sockets` and the server and client of `xmlrpc` are pure: values and
+bytes.
 """

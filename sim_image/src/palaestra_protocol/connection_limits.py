@@ -16,7 +16,7 @@ MOST_OF_PEER = 16
 
 
 @dataclass(slots=True)
-class _Place:
+class _Slot:
     """The slot of one connection: its peer's address, and whether the server is processing its request."""
 
     peer: str
@@ -24,18 +24,18 @@ class _Place:
 
 
 class ConnectionSlots:
-    """The connections that have a place; safe to use from several threads.
+    """The connections that have a slot; safe to use from several threads.
 
     Args:
-        most: how many connections have a place.
-        most_of_peer: how many of them one peer may have.
+        most: number of slots.
+        most_of_peer: number of slots that one peer may take.
     """
 
     def __init__(self, most: int = MOST_CONNECTIONS, most_of_peer: int = MOST_OF_PEER) -> None:
         self._most = most
         self._most_of_peer = most_of_peer
         self._lock = threading.Lock()
-        self._taken: dict[socket.socket, _Place] = {}  # the oldest first
+        self._taken: dict[socket.socket, _Slot] = {}  # the oldest first
 
     def take(self, connection: socket.socket, peer: str) -> bool:
         """Return whether a new connection got a slot; if all are taken, close the oldest idle connection."""
@@ -45,14 +45,14 @@ class ConnectionSlots:
                 if idle is None:
                     return False
                 self._drop(idle)
-            self._taken[connection] = _Place(peer)
+            self._taken[connection] = _Slot(peer)
             return True
 
     def answering(self, connection: socket.socket, *, now: bool) -> None:
         """Record whether the server is processing the request of a connection."""
         with self._lock:
-            if place := self._taken.get(connection):
-                place.answering = now
+            if slot := self._taken.get(connection):
+                slot.answering = now
 
     def leave(self, connection: socket.socket) -> None:
         """Free the slot of a connection, if it still has one."""
@@ -60,14 +60,14 @@ class ConnectionSlots:
             self._taken.pop(connection, None)
 
     def clear(self) -> None:
-        """Close every connection, also those whose request is being answered."""
+        """Close every connection, also those whose request is being processed."""
         with self._lock:
             for connection in list(self._taken):
                 self._drop(connection)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
         """Return the connections of which one must be closed for `peer`; None if a slot is free."""
-        of_peer = [one for one, place in self._taken.items() if place.peer == peer]
+        of_peer = [one for one, slot in self._taken.items() if slot.peer == peer]
         if len(of_peer) >= self._most_of_peer:
             return of_peer
         return list(self._taken) if len(self._taken) >= self._most else None

@@ -10,28 +10,21 @@ Requests are not logged, because probes and scrapes come every few seconds.
 import io
 import ipaddress
 import json
-import logging
 import socket
-import socketserver
-import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
-from types import TracebackType
 from typing import Any, NamedTuple, Self, cast
 
 from palaestra_protocol.connection_limits import MOST_CONNECTIONS, ConnectionSlots
 from palaestra_protocol.numbers import MOST_PORT
+from palaestra_protocol.tcp_server import TcpServer
 
 MOST_REQUEST_BYTES = 2**17  # enough to send 414 for a path of 64 KiB, the longest of http.server
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
-_POLL_S = 0.1  # maximum duration of `close`
-
-log = logging.getLogger(__name__)
 
 
 class Address(NamedTuple):
@@ -93,8 +86,8 @@ def probe_response(trouble: str | None = None) -> Response:
     )
 
 
-class Server(socketserver.ThreadingTCPServer):
-    """A server on one port, which is bound at once; it responds from `start` until `close`.
+class Server(TcpServer):
+    """A server on one port; see `TcpServer`.
 
     Args:
         address: where to listen. `0.0.0.0` and `::` both mean every address of the machine, IPv6 and IPv4,
@@ -107,8 +100,6 @@ class Server(socketserver.ThreadingTCPServer):
         OSError: the address is in use, or does not belong to this machine.
     """
 
-    allow_reuse_address = True
-    daemon_threads = True
     request_queue_size = MOST_CONNECTIONS
 
     def __init__(
@@ -118,11 +109,8 @@ class Server(socketserver.ThreadingTCPServer):
         host = _every_host() if self._every else address.host
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.routes = routes
-        self.name = name
         self.deadline_s = deadline_s
-        self.places = ConnectionSlots()
-        self._thread: threading.Thread | None = None
-        super().__init__((host, address.port), _Handler)
+        super().__init__((host, address.port), _Handler, name=name, slots=ConnectionSlots())
 
     @property
     def address(self) -> Address:
@@ -134,54 +122,6 @@ class Server(socketserver.ThreadingTCPServer):
         if self._every and self.address_family == socket.AF_INET6:
             self.socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         super().server_bind()
-
-    def start(self) -> None:
-        """Start to serve requests, in new threads."""
-        self._thread = threading.Thread(
-            target=self.serve_forever, kwargs={"poll_interval": _POLL_S}, name=self.name, daemon=True
-        )
-        self._thread.start()
-
-    def close(self) -> None:
-        """Accept no more connections and free the address."""
-        if self._thread is not None:
-            self.shutdown()
-            self._thread.join()
-        self.server_close()
-
-    def __enter__(self) -> Self:
-        """Start to serve requests."""
-        self.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop serving requests and free the address."""
-        self.close()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection, or close the connection if no slot is available for it."""
-        if self.places.take(request, client_address[0]):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Serve one connection."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self.places.leave(request)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
-        """Log an error of a route; a client that disconnects is not logged."""
-        error = sys.exception()
-        if not isinstance(error, OSError):
-            log.error("%s: a request failed: %r", self.name, error)
 
 
 def _is_every(host: str) -> bool:
@@ -242,11 +182,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _called(self, route: Route, body: bytes) -> Response:
         """Return the response of a route; until then the connection keeps its slot."""
-        self._server.places.answering(self.connection, now=True)
+        self._server.slots.answering(self.connection, now=True)
         try:
             return route(body)
         finally:
-            self._server.places.answering(self.connection, now=False)
+            self._server.slots.answering(self.connection, now=False)
 
     def _send(self, response: Response) -> None:
         self.connection.settimeout(self._server.deadline_s)

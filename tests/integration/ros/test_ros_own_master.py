@@ -15,7 +15,7 @@ from tests.local_run import left_of
 from tests.waiting import eventually
 
 PROGRAM = Path(sys.executable).with_name("palaestra-ros-master")
-OWNED = [sys.executable, "-P", "-m", "palaestra_trainer.launching.master_process"]
+OWNED = [sys.executable, "-P", "-m", "palaestra_trainer.ros_master", "--until-stdin-closes"]
 PATIENCE_S = 60.0
 OWNER = f"""
 import subprocess, sys

@@ -1,6 +1,7 @@
 """XML-RPC as ROS 1 uses it, between peers that are not trusted.
 
 - `documents`: requests and responses, as bytes; pure
-- `server`: one port that answers calls
+- `responses`: the response of every ROS call; pure
+- `server`: one port that serves calls
 - `client`: one call, with a deadline
 """

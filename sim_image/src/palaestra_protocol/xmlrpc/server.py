@@ -1,26 +1,23 @@
 """A port that answers XML-RPC: the ROS master's, and that of a node.
 
 Connections stay open for more calls, as the clients of ROS expect. Their number, the length of a request and
-every wait are limited: a new connection takes the place of one without a request (`connection_limits`).
+every wait are limited: a new connection replaces an idle one (`connection_limits`).
 Several calls may come in one request (`system.multicall`); they are made in their order.
 """
 
 from __future__ import annotations
 
 import io
-import logging
 import socket
-import socketserver
-import sys
-import threading
 import time
 import xmlrpc.client
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
 from typing import Any, cast
 
 from palaestra_protocol.connection_limits import ConnectionSlots
+from palaestra_protocol.tcp_server import TcpServer
 from palaestra_protocol.xmlrpc.documents import (
     FAULT,
     UnreadableDocument,
@@ -33,10 +30,7 @@ MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter of up to a 
 MOST_CONNECTIONS = 256  # each has a thread; a simulator keeps one connection for each robot
 REQUEST_S = 10.0  # from the first byte of a request to its last, and again for the response
 IDLE_S = 60.0  # between two requests
-_POLL_S = 0.05  # how long `close` takes at most
 _MULTICALL = "system.multicall"
-
-log = logging.getLogger(__name__)
 
 _LOOPBACK = frozenset({"localhost", "127.0.0.1"})
 
@@ -44,27 +38,31 @@ Method = Callable[[tuple[Any, ...]], Any]
 """Returns the value of a call with these parameters."""
 
 
+def host_name(environment: Mapping[str, str]) -> str:
+    """Return the name of this machine for other nodes, by the rules of ROS: ROS_HOSTNAME, ROS_IP, its own."""
+    return environment.get("ROS_HOSTNAME") or environment.get("ROS_IP") or socket.gethostname()
+
+
 def bind_address(host: str) -> str:
     """Return the address on which a ROS node of that host name listens: loopback, or every interface."""
     return "127.0.0.1" if host in _LOOPBACK else ""
 
 
-class RpcServer(socketserver.ThreadingTCPServer):
-    """One port: bound when made, answering from `start` until `close`.
+class RpcServer(TcpServer):
+    """A server on one port; see `TcpServer`.
 
     Args:
-        address: host and port on which it listens; port 0 takes one that is free.
+        address: host and port on which it listens; port 0 stands for any free port.
         find: returns the method of a name, or None. Methods are called in several threads.
         request_s: see REQUEST_S.
         idle_s: see IDLE_S.
 
     Raises:
-        OSError: the address is in use, or is not an address of this machine.
+        OSError: the address is in use, or does not belong to this machine.
     """
 
-    allow_reuse_address = True
-    daemon_threads = True
     request_queue_size = 128
+    poll_s = 0.05
 
     def __init__(
         self,
@@ -75,55 +73,22 @@ class RpcServer(socketserver.ThreadingTCPServer):
         idle_s: float = IDLE_S,
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
-        self.places = ConnectionSlots(MOST_CONNECTIONS, MOST_CONNECTIONS)
         self.request_s = request_s
         self.idle_s = idle_s
         self._find = find
-        self._thread: threading.Thread | None = None
-        super().__init__(address, _Handler)
+        super().__init__(
+            address, _Handler, name="XML-RPC", slots=ConnectionSlots(MOST_CONNECTIONS, MOST_CONNECTIONS)
+        )
 
     @property
     def port(self) -> int:
         """The port on which it listens."""
         return int(self.socket.getsockname()[1])
 
-    def start(self) -> None:
-        """Begin to answer, in threads of its own."""
-        self._thread = threading.Thread(target=self.serve_forever, args=(_POLL_S,), daemon=True)
-        self._thread.start()
-
     def close(self) -> None:
         """Accept no more connections, close those that are open, and free the port."""
-        if self._thread is not None:
-            self.shutdown()
-            self._thread.join()
-        self.server_close()
-        self.places.clear()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection a thread, or close it if there is no place for it."""
-        if not self.places.take(request, client_address[0]):
-            self.shutdown_request(request)
-            return
-        try:
-            super().process_request(request, client_address)
-        except RuntimeError:  # no more threads
-            self.places.leave(request)
-            raise
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Answer one connection."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self.places.leave(request)
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """Log an error of this program; that a client goes away is not one."""
-        del request, client_address
-        error = sys.exception()
-        if not isinstance(error, OSError):
-            log.error("XML-RPC: a request failed: %r", error)
+        super().close()
+        self.slots.clear()
 
     def respond(self, data: bytes) -> bytes:
         """Return the response to a request."""
@@ -202,12 +167,12 @@ class _Handler(BaseHTTPRequestHandler):
         return cast("RpcServer", self.server)
 
     def _responded(self, body: bytes) -> bytes:
-        """Return the response; until it is made, the connection keeps its place."""
-        self._server.places.answering(self.connection, now=True)
+        """Return the response; until then the connection keeps its slot."""
+        self._server.slots.answering(self.connection, now=True)
         try:
             return self._server.respond(body)
         finally:
-            self._server.places.answering(self.connection, now=False)
+            self._server.slots.answering(self.connection, now=False)
 
     def _refuse(self, status: HTTPStatus) -> None:
         self.close_connection = True

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import http.client
 import os
-import socket
 import xmlrpc.client
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from palaestra_protocol.xmlrpc.responses import FAILED, OK
 from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address
 
-_OK = 1
-_FAILED = 0
 _TIMEOUT_S = 5.0
 
 
@@ -102,7 +100,7 @@ class Master:
                 self.call(method, *rest)
             return
         for (method, _), answer in zip(gathered, answers, strict=True):
-            self._checked(method, answer[0] if isinstance(answer, list) else [_FAILED, str(answer), 0])
+            self._checked(method, answer[0] if isinstance(answer, list) else [FAILED, str(answer), 0])
 
     def _sent(self, method: str, *arguments: Any) -> Any:
         try:
@@ -115,7 +113,7 @@ class Master:
             code, text, value = answer
         except (TypeError, ValueError) as error:
             raise MasterUnreachable(f"no ROS master at {self._uri}: {error}") from error
-        if code != _OK:
+        if code != OK:
             raise MasterUnreachable(f"the ROS master refused {method}: {text}")
         return value
 
@@ -175,27 +173,22 @@ class SlaveApi:
     def _answers(self) -> dict[str, Callable[..., list[Any]]]:
         return {
             "requestTopic": self._request_topic,
-            "getPid": lambda _caller: [_OK, "", os.getpid()],
-            "getMasterUri": lambda _caller: [_OK, "", self._master_uri],
-            "getBusStats": lambda _caller: [_OK, "", [[], [], []]],
-            "getBusInfo": lambda _caller: [_OK, "", self._bus.connections()],
-            "getSubscriptions": lambda _caller: [_OK, "", []],
-            "getPublications": lambda _caller: [_OK, "", self._bus.publications()],
-            "publisherUpdate": lambda _caller, _topic, _publishers: [_OK, "", 0],
-            "paramUpdate": lambda _caller, _key, _value: [_OK, "", 0],
+            "getPid": lambda _caller: [OK, "", os.getpid()],
+            "getMasterUri": lambda _caller: [OK, "", self._master_uri],
+            "getBusStats": lambda _caller: [OK, "", [[], [], []]],
+            "getBusInfo": lambda _caller: [OK, "", self._bus.connections()],
+            "getSubscriptions": lambda _caller: [OK, "", []],
+            "getPublications": lambda _caller: [OK, "", self._bus.publications()],
+            "publisherUpdate": lambda _caller, _topic, _publishers: [OK, "", 0],
+            "paramUpdate": lambda _caller, _key, _value: [OK, "", 0],
             "shutdown": self._shutdown,
         }
 
     def _request_topic(self, _caller: str, topic: str, _protocols: list[Any]) -> list[Any]:
         if all(topic != name for name, _ in self._bus.publications()):
-            return [_FAILED, f"this node does not publish {topic}", 0]
-        return [_OK, "", ["TCPROS", self._host, self._port]]
+            return [FAILED, f"this node does not publish {topic}", 0]
+        return [OK, "", ["TCPROS", self._host, self._port]]
 
     def _shutdown(self, _caller: str, reason: str = "") -> list[Any]:
         self._on_shutdown(reason)
-        return [_OK, "", 0]
-
-
-def host_name() -> str:
-    """Return the name for other nodes, by the rules of ROS: ROS_HOSTNAME, ROS_IP, the host's name."""
-    return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
+        return [OK, "", 0]

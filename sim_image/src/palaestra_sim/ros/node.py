@@ -8,6 +8,7 @@ robot or for the end of a pause.
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -16,10 +17,10 @@ from typing import Any, Final
 
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
 from palaestra_protocol.ros.tcpros import encode_header, frame
-from palaestra_protocol.xmlrpc.server import bind_address
+from palaestra_protocol.xmlrpc.server import bind_address, host_name
 from palaestra_sim.ros.links import Connection, Endpoint, HeaderRefused, Lingering, RosLink
 from palaestra_sim.ros.loop import Loop
-from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, host_name
+from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi
 from palaestra_sim.ros.topics import PublishedTopic, Publisher
 
 LATER: Final = object()
@@ -55,7 +56,7 @@ class RosNode:
         self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
         self._connected = 0
         self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
-        host = host_name()
+        host = host_name(os.environ)
         self._listener = socket.create_server((bind_address(host), 0), backlog=_BACKLOG)
         self._listener.setblocking(False)
         port = self._listener.getsockname()[1]

@@ -19,8 +19,8 @@ def ensure_master() -> None:
     try:
         Master("/palaestra").ping()
     except MasterLost:
-        module = [sys.executable, "-P", "-m", "palaestra_trainer.launching.master_process"]
-        uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
+        program = [sys.executable, "-P", "-m", "palaestra_trainer.ros_master", "--until-stdin-closes"]
+        uri = first_line(start_child(program, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start palaestra-ros-master") from None
         os.environ["ROS_MASTER_URI"] = uri

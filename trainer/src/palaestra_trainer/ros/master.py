@@ -6,8 +6,9 @@ import os
 from typing import Any
 from urllib.parse import urlsplit
 
+from palaestra_protocol.xmlrpc.responses import OK, RpcResponse
 from palaestra_trainer.errors import MasterLost, UnreadableAnswer
-from palaestra_trainer.ros.xmlrpc import OK, RpcResponse, call
+from palaestra_trainer.ros.xmlrpc import call
 
 DEFAULT_URI = "http://localhost:11311"
 _TIMEOUT_S = 5.0

@@ -7,7 +7,6 @@ a topic's publishers needs no action. `rosnode kill` cannot end it: signals end 
 from __future__ import annotations
 
 import os
-import socket
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +14,10 @@ from typing import Any
 
 import structlog
 
-from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address
+from palaestra_protocol.xmlrpc.responses import FAILED, OK
+from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address, host_name
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros.master import Master
-
-_OK = 1
-_FAILED = 0
 
 log = structlog.get_logger(__name__)
 
@@ -74,7 +71,7 @@ def _made(name: str) -> _Node:
     full_name = f"/{namespace}/{name}_{os.getpid()}" if namespace else f"/{name}_{os.getpid()}"
     master = Master(full_name)
     master.ping()
-    host = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
+    host = host_name(os.environ)
     try:
         server = RpcServer((bind_address(host), 0), _answers(master.uri).get)
     except OSError as error:
@@ -95,18 +92,18 @@ def _answers(master_uri: str) -> dict[str, Method]:
         "getPublications": _constant(list),
         "publisherUpdate": _constant(lambda: 0),
         "paramUpdate": _constant(lambda: 0),
-        "requestTopic": lambda _: [_FAILED, "this node publishes no topic", 0],
+        "requestTopic": lambda _: [FAILED, "this node publishes no topic", 0],
         "shutdown": _asked_to_end,
     }
 
 
 def _constant(value: Callable[[], Any]) -> Method:
     """Return a call whose value does not depend on its parameters."""
-    return lambda _: [_OK, "", value()]
+    return lambda _: [OK, "", value()]
 
 
 def _asked_to_end(parameters: tuple[Any, ...]) -> list[Any]:
     log.warning(
         "the ROS node was asked to end, and continues; send a signal to the process", asked=parameters
     )
-    return [_OK, "this process ends only at a signal", 0]
+    return [OK, "this process ends only at a signal", 0]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from palaestra_protocol.ros.rostypes import message_type
+from palaestra_protocol.xmlrpc.responses import OK
 from palaestra_trainer.errors import (
     MasterLost,
     SimulatorDead,
@@ -19,7 +20,7 @@ from palaestra_trainer.errors import (
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node, node_uri
 from palaestra_trainer.ros.tcpros_client import TcprosClient
-from palaestra_trainer.ros.xmlrpc import OK, call
+from palaestra_trainer.ros.xmlrpc import call
 
 DEADLINE_S = 0.5
 _CONNECT_S = 5.0

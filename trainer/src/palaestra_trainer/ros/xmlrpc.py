@@ -1,27 +1,18 @@
 """One XML-RPC call to the ROS master or to a node, with a deadline and a checked response.
 
-rosgraph's own client would wait forever. The peer may send any bytes; what is no answer becomes
-`UnreadableAnswer` here.
+rosgraph's own client would wait forever. The peer may send any bytes; an invalid response raises
+`UnreadableAnswer`.
 """
 
 from __future__ import annotations
 
 import xmlrpc.client
-from typing import Any, NamedTuple
+from typing import Any
 
 from palaestra_protocol.xmlrpc import client
 from palaestra_protocol.xmlrpc.documents import UnreadableDocument
+from palaestra_protocol.xmlrpc.responses import RpcResponse
 from palaestra_trainer.errors import UnreadableAnswer
-
-OK = 1
-
-
-class RpcResponse(NamedTuple):
-    """The response to a ROS call: 1 for success, a text for people, a value."""
-
-    code: int
-    text: str
-    value: Any
 
 
 def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcResponse:

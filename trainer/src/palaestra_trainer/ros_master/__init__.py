@@ -3,7 +3,7 @@
 - `names`: names of ROS, relative to a node or not
 - `registrations`: which node publishes, subscribes and serves what
 - `parameters`: the tree of parameters
-- `responses`: what every call returns, and the checks of its arguments
+- `arguments`: the checks of the arguments of calls
 - `api`: the calls of the Master API and the Parameter Server API, and the updates that they cause
 - `updates`: sends these updates to the nodes
 - `serving`: the master on a port

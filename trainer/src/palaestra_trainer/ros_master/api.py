@@ -12,14 +12,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from palaestra_protocol.xmlrpc.documents import MOST_DEPTH
-from palaestra_trainer.ros_master.names import parts, resolved
-from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, changes
-from palaestra_trainer.ros_master.registrations import Kind, Registrations
-from palaestra_trainer.ros_master.responses import (
-    FAILED,
-    OK,
-    WRONG,
-    MasterResponse,
+from palaestra_protocol.xmlrpc.responses import FAILED, OK, WRONG, RpcResponse
+from palaestra_trainer.ros_master.arguments import (
     WrongArgument,
     name_of,
     text_of,
@@ -27,6 +21,9 @@ from palaestra_trainer.ros_master.responses import (
     type_name_of,
     uri_of,
 )
+from palaestra_trainer.ros_master.names import parts, resolved
+from palaestra_trainer.ros_master.parameters import Parameters, as_subscribed, changes
+from palaestra_trainer.ros_master.registrations import Kind, Registrations
 
 MASTER = "/master"  # the name in which the master calls nodes
 _REPLACED = "new node registered with same name"  # rosmaster's words, which people search for
@@ -53,12 +50,12 @@ class Update(NamedTuple):
 class _Call:
     """A call of the API: its function, and the value of a response that refuses its arguments."""
 
-    def __init__(self, function: Callable[..., MasterResponse], nothing: Any) -> None:
+    def __init__(self, function: Callable[..., RpcResponse], nothing: Any) -> None:
         self.nothing = nothing
         self._function = function
         self._names = tuple(inspect.signature(function).parameters)
 
-    def respond(self, arguments: tuple[Any, ...]) -> MasterResponse:
+    def respond(self, arguments: tuple[Any, ...]) -> RpcResponse:
         """Return the response.
 
         Raises:
@@ -94,7 +91,7 @@ class MasterApi:
         """Return whether the master has such a call."""
         return method in self._calls
 
-    def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[MasterResponse, list[Update]]:
+    def call(self, method: str, arguments: tuple[Any, ...]) -> tuple[RpcResponse, list[Update]]:
         """Return the response to a call, and the updates to send, in their order.
 
         Raises:
@@ -105,104 +102,98 @@ class MasterApi:
         try:
             response = made.respond(arguments)
         except WrongArgument as error:
-            response = MasterResponse(WRONG, f"{method}: {error}", made.nothing)
+            response = RpcResponse(WRONG, f"{method}: {error}", made.nothing)
         return response, self._updates
 
     def stop_updates(self, update: Update) -> None:
         """Unsubscribe a node that has refused an update of a parameter."""
         self._nodes.unregister(Kind.PARAMETER, update.subject, update.node, update.uri)
 
-    def _get_uri(self, _caller: str) -> MasterResponse:
-        return MasterResponse(OK, "the URI of this master", self._uri)
+    def _get_uri(self, _caller: str) -> RpcResponse:
+        return RpcResponse(OK, "the URI of this master", self._uri)
 
-    def _get_pid(self, _caller: str) -> MasterResponse:
-        return MasterResponse(OK, "the process of this master", self._pid)
+    def _get_pid(self, _caller: str) -> RpcResponse:
+        return RpcResponse(OK, "the process of this master", self._pid)
 
-    def _register_service(
-        self, caller: str, service: Any, service_api: Any, caller_api: Any
-    ) -> MasterResponse:
+    def _register_service(self, caller: str, service: Any, service_api: Any, caller_api: Any) -> RpcResponse:
         name = topic_or_service("service", service, caller)
         address, uri = uri_of("service_api", service_api), uri_of("caller_api", caller_api)
         self._shut_down(caller, self._nodes.register_service(name, caller, uri, address))
-        return MasterResponse(OK, f"{caller} serves {name}", 1)
+        return RpcResponse(OK, f"{caller} serves {name}", 1)
 
-    def _unregister_service(self, caller: str, service: Any, service_api: Any) -> MasterResponse:
+    def _unregister_service(self, caller: str, service: Any, service_api: Any) -> RpcResponse:
         name = topic_or_service("service", service, caller)
         address = uri_of("service_api", service_api)
         return _removed(caller, name, removed=self._nodes.unregister_service(name, caller, address))
 
-    def _lookup_service(self, caller: str, service: Any) -> MasterResponse:
+    def _lookup_service(self, caller: str, service: Any) -> RpcResponse:
         name = topic_or_service("service", service, caller)
         address = self._nodes.address_of(name)
         if address is None:
-            return MasterResponse(WRONG, f"no node serves {name}", "")
-        return MasterResponse(OK, f"{name} is served", address)
+            return RpcResponse(WRONG, f"no node serves {name}", "")
+        return RpcResponse(OK, f"{name} is served", address)
 
-    def _register_subscriber(
-        self, caller: str, topic: Any, topic_type: Any, caller_api: Any
-    ) -> MasterResponse:
+    def _register_subscriber(self, caller: str, topic: Any, topic_type: Any, caller_api: Any) -> RpcResponse:
         name, type_name = topic_or_service("topic", topic, caller), type_name_of("topic_type", topic_type)
         uri = uri_of("caller_api", caller_api)
         self._shut_down(caller, self._nodes.register(Kind.SUBSCRIBER, name, caller, uri))
         self._nodes.declare_type(name, type_name, published=False)
-        return MasterResponse(OK, f"{caller} subscribes to {name}", self._nodes.uris(Kind.PUBLISHER, name))
+        return RpcResponse(OK, f"{caller} subscribes to {name}", self._nodes.uris(Kind.PUBLISHER, name))
 
-    def _unregister_subscriber(self, caller: str, topic: Any, caller_api: Any) -> MasterResponse:
+    def _unregister_subscriber(self, caller: str, topic: Any, caller_api: Any) -> RpcResponse:
         name, uri = topic_or_service("topic", topic, caller), uri_of("caller_api", caller_api)
         return _removed(caller, name, removed=self._nodes.unregister(Kind.SUBSCRIBER, name, caller, uri))
 
-    def _register_publisher(
-        self, caller: str, topic: Any, topic_type: Any, caller_api: Any
-    ) -> MasterResponse:
+    def _register_publisher(self, caller: str, topic: Any, topic_type: Any, caller_api: Any) -> RpcResponse:
         name, type_name = topic_or_service("topic", topic, caller), type_name_of("topic_type", topic_type)
         uri = uri_of("caller_api", caller_api)
         self._shut_down(caller, self._nodes.register(Kind.PUBLISHER, name, caller, uri))
         self._nodes.declare_type(name, type_name, published=True)
         self._announce(name)
-        return MasterResponse(OK, f"{caller} publishes {name}", self._nodes.uris(Kind.SUBSCRIBER, name))
+        return RpcResponse(OK, f"{caller} publishes {name}", self._nodes.uris(Kind.SUBSCRIBER, name))
 
-    def _unregister_publisher(self, caller: str, topic: Any, caller_api: Any) -> MasterResponse:
+    def _unregister_publisher(self, caller: str, topic: Any, caller_api: Any) -> RpcResponse:
         name, uri = topic_or_service("topic", topic, caller), uri_of("caller_api", caller_api)
         removed = self._nodes.unregister(Kind.PUBLISHER, name, caller, uri)
         if removed:
             self._announce(name)
         return _removed(caller, name, removed=removed)
 
-    def _lookup_node(self, caller: str, node: Any) -> MasterResponse:
+    def _lookup_node(self, caller: str, node: Any) -> RpcResponse:
         name = name_of("node", node, caller)
         uri = self._nodes.uri_of(name)
         if uri is None:
-            return MasterResponse(WRONG, f"no node {name} is registered", "")
-        return MasterResponse(OK, f"{name} is registered", uri)
+            return RpcResponse(WRONG, f"no node {name} is registered", "")
+        return RpcResponse(OK, f"{name} is registered", uri)
 
-    def _get_published_topics(self, caller: str, subgraph: Any) -> MasterResponse:
+    def _get_published_topics(self, caller: str, subgraph: Any) -> RpcResponse:
         if not isinstance(subgraph, str):
             raise WrongArgument(f"subgraph: {subgraph!r} is not a text; give a namespace, or an empty text")
         namespace = as_subscribed(resolved(subgraph, caller)) if subgraph else ""
         names = (name for name in self._nodes.names(Kind.PUBLISHER) if name.startswith(namespace))
-        return MasterResponse(
+        return RpcResponse(
             OK, "topics with publishers", [(name, self._nodes.type_of(name)) for name in names]
         )
 
-    def _get_topic_types(self, _caller: str) -> MasterResponse:
-        return MasterResponse(OK, "topics and their types", self._nodes.types())
+    def _get_topic_types(self, _caller: str) -> RpcResponse:
+        return RpcResponse(OK, "topics and their types", self._nodes.types())
 
-    def _get_system_state(self, _caller: str) -> MasterResponse:
+    def _get_system_state(self, _caller: str) -> RpcResponse:
         kinds = (Kind.PUBLISHER, Kind.SUBSCRIBER, Kind.SERVICE)
-        return MasterResponse(
+        return RpcResponse(
             OK, "publishers, subscribers, services", [self._nodes.listed(kind) for kind in kinds]
         )
 
-    def _delete_param(self, caller: str, key: Any) -> MasterResponse:
+    def _delete_param(self, caller: str, key: Any) -> RpcResponse:
         name = resolved(text_of("key", key), caller)
         try:
             self._parameters.delete(name)
         except KeyError:
-            return MasterResponse(WRONG, f"{name} is not set", 0)
+            return RpcResponse(WRONG, f"{name} is not set", 0)
         self._report_changes(name, {}, but=None)
-        return MasterResponse(OK, f"{name} is deleted", 0)
+        return RpcResponse(OK, f"{name} is deleted", 0)
 
-    def _set_param(self, caller: str, key: Any, value: Any) -> MasterResponse:
+    def _set_param(self, caller: str, key: Any, value: Any) -> RpcResponse:
         name = resolved(text_of("key", key), caller)
         if len(parts(name)) > MOST_DEPTH:
             raise WrongArgument(f"key: has more than {MOST_DEPTH} parts; use a shorter name")
@@ -213,42 +204,42 @@ class MasterApi:
         except TypeError as error:
             raise WrongArgument(f"value: {error}") from error
         self._report_changes(name, value, but=caller)
-        return MasterResponse(OK, f"{name} is set", 0)
+        return RpcResponse(OK, f"{name} is set", 0)
 
-    def _get_param(self, caller: str, key: Any) -> MasterResponse:
+    def _get_param(self, caller: str, key: Any) -> RpcResponse:
         name = resolved(text_of("key", key), caller)
         try:
-            return MasterResponse(OK, f"{name} is set", self._parameters.get(name))
+            return RpcResponse(OK, f"{name} is set", self._parameters.get(name))
         except KeyError:
-            return MasterResponse(WRONG, f"{name} is not set", 0)
+            return RpcResponse(WRONG, f"{name} is not set", 0)
 
-    def _search_param(self, caller: str, key: Any) -> MasterResponse:
+    def _search_param(self, caller: str, key: Any) -> RpcResponse:
         wanted = text_of("key", key)
         try:
             found = self._parameters.search(wanted, caller)
         except ValueError as error:
-            return MasterResponse(FAILED, str(error), 0)
+            return RpcResponse(FAILED, str(error), 0)
         if found is None:
-            return MasterResponse(WRONG, f"{wanted} is not set at {caller} or above", "")
-        return MasterResponse(OK, f"{wanted} is {found}", found)
+            return RpcResponse(WRONG, f"{wanted} is not set at {caller} or above", "")
+        return RpcResponse(OK, f"{wanted} is {found}", found)
 
-    def _subscribe_param(self, caller: str, caller_api: Any, key: Any) -> MasterResponse:
+    def _subscribe_param(self, caller: str, caller_api: Any, key: Any) -> RpcResponse:
         uri, name = uri_of("caller_api", caller_api), resolved(text_of("key", key), caller)
         value = self._parameters.get(name) if self._parameters.has(name) else {}
         self._shut_down(caller, self._nodes.register(Kind.PARAMETER, as_subscribed(name), caller, uri))
-        return MasterResponse(OK, f"{caller} subscribes to {name}", value)
+        return RpcResponse(OK, f"{caller} subscribes to {name}", value)
 
-    def _unsubscribe_param(self, caller: str, caller_api: Any, key: Any) -> MasterResponse:
+    def _unsubscribe_param(self, caller: str, caller_api: Any, key: Any) -> RpcResponse:
         uri, name = uri_of("caller_api", caller_api), resolved(text_of("key", key), caller)
         self._nodes.unregister(Kind.PARAMETER, as_subscribed(name), caller, uri)
-        return MasterResponse(OK, f"{caller} does not subscribe to {name}", 1)
+        return RpcResponse(OK, f"{caller} does not subscribe to {name}", 1)
 
-    def _has_param(self, caller: str, key: Any) -> MasterResponse:
+    def _has_param(self, caller: str, key: Any) -> RpcResponse:
         name = resolved(text_of("key", key), caller)
-        return MasterResponse(OK, name, self._parameters.has(name))
+        return RpcResponse(OK, name, self._parameters.has(name))
 
-    def _get_param_names(self, _caller: str) -> MasterResponse:
-        return MasterResponse(OK, "names of all parameters", self._parameters.names())
+    def _get_param_names(self, _caller: str) -> RpcResponse:
+        return RpcResponse(OK, "names of all parameters", self._parameters.names())
 
     def _shut_down(self, node: str, uri: str | None) -> None:
         if uri is not None:
@@ -267,10 +258,10 @@ class MasterApi:
                     self._updates.append(Update(uri, "paramUpdate", change.name, change.value, node))
 
 
-def _removed(node: str, name: str, *, removed: bool) -> MasterResponse:
+def _removed(node: str, name: str, *, removed: bool) -> RpcResponse:
     if removed:
-        return MasterResponse(OK, f"{node} is not registered for {name} any more", 1)
-    return MasterResponse(OK, f"{node} was not registered for {name} at this address", 0)
+        return RpcResponse(OK, f"{node} is not registered for {name} any more", 1)
+    return RpcResponse(OK, f"{node} was not registered for {name} at this address", 0)
 
 
 # By the name on the wire: the method, and the value of a response that refuses its arguments.

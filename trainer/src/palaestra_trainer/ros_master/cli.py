@@ -7,13 +7,13 @@ import ipaddress
 import logging
 import os
 import signal
-import socket
 import sys
 import threading
 from collections.abc import Sequence
 
 from palaestra_protocol.http import Address
 from palaestra_protocol.signals import obeyed
+from palaestra_protocol.xmlrpc.server import host_name
 from palaestra_trainer.ros_master.serving import MasterServer
 
 LOOPBACK = "127.0.0.1"
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number in obeyed((signal.SIGTERM, signal.SIGINT, signal.SIGHUP)):
         signal.signal(number, lambda *_: ended.set())
     if options.until_stdin_closes:
-        end_with_owner()
+        threading.Thread(target=_end_with_owner, daemon=True).start()
     host, port = options.listen
     try:
         master = MasterServer(host, port, _name(host))
@@ -49,12 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ended.wait()
 
 
-def end_with_owner() -> None:
-    """End this process as soon as its standard input closes, as it does when its owner is killed."""
-    threading.Thread(target=_end_with_owner, daemon=True).start()
-
-
 def _end_with_owner() -> None:
+    """End this process when its standard input closes; the kernel closes it when the owner is killed."""
     while os.read(sys.stdin.fileno(), 1024):
         pass
     os._exit(0)  # the connections' threads are not waited for
@@ -84,9 +80,7 @@ def _name(host: str) -> str:
     """Return the name under which nodes reach the master; they choose theirs in the same way."""
     if host == LOOPBACK:
         return "localhost"
-    own = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
-    if own:
-        return own
-    if ipaddress.ip_address(host).is_unspecified:
-        return socket.gethostname()
+    chosen = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
+    if chosen or ipaddress.ip_address(host).is_unspecified:
+        return host_name(os.environ)
     return f"[{host}]" if ":" in host else host

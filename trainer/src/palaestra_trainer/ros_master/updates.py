@@ -15,8 +15,8 @@ from typing import Any
 
 from palaestra_protocol.xmlrpc.client import call
 from palaestra_protocol.xmlrpc.documents import UnreadableDocument
+from palaestra_protocol.xmlrpc.responses import WRONG
 from palaestra_trainer.ros_master.api import MASTER, Update
-from palaestra_trainer.ros_master.responses import WRONG
 
 DEADLINE_S = 5.0
 MOST_THREADS = 128  # nodes beyond these wait for their turn

@@ -1,26 +1,14 @@
-"""What every call of ROS returns, and the checks of its arguments."""
+"""The checks of the arguments of calls."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from palaestra_trainer.ros_master.names import SEPARATOR, resolved
 from palaestra_trainer.ros_master.registrations import ANY_TYPE
 
-OK = 1
-FAILED = 0
-WRONG = -1  # the caller's mistake
-
 _SCHEMES = ("http://", "rosrpc://")
 _ILLEGAL = (":", " ")
-
-
-class MasterResponse(NamedTuple):
-    """The response to every ROS call: 1 for success, a text for people, a value."""
-
-    code: int
-    text: str
-    value: Any
 
 
 class WrongArgument(ValueError):

@@ -1,0 +1,101 @@
+"""A TCP server with a limited number of connections, each in its own thread: the base of all our servers.
+
+A subclass has a handler that reads a request. While it processes one, it marks its connection in `slots`.
+"""
+
+import logging
+import socketserver
+import sys
+import threading
+from types import TracebackType
+from typing import Any, Self
+
+from palaestra_protocol.connection_limits import ConnectionSlots
+
+log = logging.getLogger(__name__)
+
+
+class TcpServer(socketserver.ThreadingTCPServer):
+    """A server on one port, which is bound at once; it responds from `start` until `close`.
+
+    Attributes:
+        poll_s: maximum duration of `close`.
+
+    Args:
+        address: host and port on which it listens; port 0 stands for any free port.
+        handler: serves one connection.
+        name: for its thread and its log.
+        slots: of its connections.
+
+    Raises:
+        OSError: the address is in use, or does not belong to this machine.
+    """
+
+    allow_reuse_address = True
+    daemon_threads = True
+    poll_s = 0.1
+
+    def __init__(
+        self,
+        address: tuple[str, int],
+        handler: type[socketserver.BaseRequestHandler],
+        *,
+        name: str,
+        slots: ConnectionSlots,
+    ) -> None:
+        self.name = name
+        self.slots = slots
+        self._thread: threading.Thread | None = None
+        super().__init__(address, handler)
+
+    def start(self) -> None:
+        """Start to serve requests, in new threads."""
+        self._thread = threading.Thread(
+            target=self.serve_forever, args=(self.poll_s,), name=self.name, daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Accept no more connections and free the address."""
+        if self._thread is not None:
+            self.shutdown()
+            self._thread.join()
+        self.server_close()
+
+    def __enter__(self) -> Self:
+        """Start to serve requests."""
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop serving requests and free the address."""
+        self.close()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Start a thread for a connection, or close the connection if no slot is available for it."""
+        if not self.slots.take(request, client_address[0]):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except RuntimeError:  # the system refuses another thread
+            self.slots.leave(request)
+            raise
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve one connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.slots.leave(request)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
+        """Log an error of this program; a client that disconnects is not logged."""
+        error = sys.exception()
+        if not isinstance(error, OSError):
+            log.error("%s: a request failed: %r", self.name, error)
