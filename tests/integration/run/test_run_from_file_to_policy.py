@@ -144,7 +144,7 @@ def test_a_finished_run_is_reported_and_not_repeated(finished):
     code, output = finished.run.start().end()
 
     assert code == 0
-    assert "finished already; more spec.trainer.steps prolong it, --fresh begins anew" in output
+    assert "finished already; more spec.trainer.steps prolong it, --fresh starts a new run" in output
     assert (finished.run.directory / "attempts.jsonl").read_text() == before
 
 

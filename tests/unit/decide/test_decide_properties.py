@@ -332,9 +332,9 @@ def test_what_is_written_is_within_the_bounds_of_the_definition(history):
     """An API server refuses the whole status if one text is too long or one number too large."""
     for _, _, _, decision in decisions(history):
         assert accept(raw(as_data(decision.status))).status == decision.status
-        for happening in decision.events:
-            assert happening.message.isprintable()
-            assert len(happening.message) <= LONGEST_MESSAGE
+        for event in decision.events:
+            assert event.message.isprintable()
+            assert len(event.message) <= LONGEST_MESSAGE
 
 
 @settings(max_examples=30)

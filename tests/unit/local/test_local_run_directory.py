@@ -79,7 +79,7 @@ def test_what_a_prolonged_run_cannot_change_is_refused(tmp_path, changes, line):
 
     first, remedy = str(refused.value).splitlines()
     assert first == line
-    assert "begin anew with --fresh" in remedy
+    assert "start a new run with --fresh" in remedy
 
 
 def test_a_new_directory_takes_any_job(tmp_path):

@@ -11,7 +11,7 @@ from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, PodReference
 from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, NothingLost, QueueDecides
-from palaestra.client.events import Event, happenings
+from palaestra.client.events import Event, events_about
 from palaestra.client.fetch import fetch
 from palaestra.client.not_found_errors import asked
 from palaestra.client.wait_progress import News, current, why
@@ -217,7 +217,7 @@ class Client:
         Raises:
             NoSuchJob: no job has this name.
         """
-        return happenings(self.api, self.get(name))
+        return events_about(self.api, self.get(name))
 
     def suspend(self, name: str) -> TrainingJob:
         """Suspend a job: its pods save a checkpoint and are deleted; raises the same errors as `resume`."""

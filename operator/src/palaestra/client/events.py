@@ -40,7 +40,7 @@ class Event:
     container: str = ""
 
 
-def happenings(api: Api, job: TrainingJob) -> tuple[Event, ...]:
+def events_about(api: Api, job: TrainingJob) -> tuple[Event, ...]:
     """Return the events of a job; by default Kubernetes deletes events after an hour.
 
     Raises:
@@ -48,9 +48,7 @@ def happenings(api: Api, job: TrainingJob) -> tuple[Event, ...]:
     """
     events = api.list(EVENTS, job.metadata.namespace)
     return tuple(
-        sorted(
-            (_read(event) for event in events if concerns(event, job)), key=lambda happening: happening.time
-        )
+        sorted((_read(event) for event in events if concerns(event, job)), key=lambda event: event.time)
     )
 
 

@@ -24,7 +24,7 @@ _BY_ACTION = {Reason.PLANNED, Reason.RESUMED, Reason.EXPIRED}
 _BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no reconcile saw it end
 
 
-def happening(reason: Reason, message: str, replica: int | None = None) -> EmittedEvent:
+def emitted(reason: Reason, message: str, replica: int | None = None) -> EmittedEvent:
     """Return the event for a reason, of the type in docs/reference/reasons.md."""
     kind = EventType.WARNING if ROWS[reason].warning else EventType.NORMAL
     return EmittedEvent(type=kind, reason=reason, message=message, replica=replica)
@@ -52,16 +52,16 @@ def of_actions(actions: Sequence[Action], replicas: Sequence[ReplicaStatus] = ()
             case Create(object=thing, replica=replica):
                 created.setdefault(replica, []).append(f"{thing['kind']} {thing['metadata']['name']}")
             case Stop(reason=reason, message=message, replica=replica):
-                yield happening(reason, message, replica)
+                yield emitted(reason, message, replica)
             case SetSuspend(suspend=False, replica=replica):
                 what = "resumes from the last checkpoint" if replica in saved else "continues"
-                yield happening(Reason.RESUMED, say(Reason.RESUMED, what=what), replica)
+                yield emitted(Reason.RESUMED, say(Reason.RESUMED, what=what), replica)
             case Discard() | Replace() | SetSuspend():  # an event reports the replica's end or reason
                 continue
             case Delete():
-                yield happening(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
+                yield emitted(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
     for replica, names in created.items():
-        yield happening(Reason.PLANNED, say(Reason.PLANNED, objects=", ".join(names)), replica)
+        yield emitted(Reason.PLANNED, say(Reason.PLANNED, objects=", ".join(names)), replica)
 
 
 def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[EmittedEvent]:
@@ -70,7 +70,7 @@ def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[Emi
     silent = now is None or (kind in _ENDS and now.status is ConditionStatus.FALSE)
     if now is None or silent or (before is not None and _same(before, now)):
         return
-    yield happening(Reason(now.reason), now.message)
+    yield emitted(Reason(now.reason), now.message)
 
 
 def _same(one: Condition, other: Condition) -> bool:
@@ -83,7 +83,7 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitt
         return
     reason = Reason(new.reason)
     if reason not in _BY_ACTION | _BY_ATTEMPT:
-        yield happening(reason, new.message, new.index)
+        yield emitted(reason, new.message, new.index)
 
 
 def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
@@ -92,22 +92,22 @@ def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emitt
     if last is None or last.reason not in _BY_ATTEMPT:
         return
     if before is None or (before.attempt, before.reason) != (last.attempt, last.reason):
-        yield happening(Reason(last.reason), last.message, new.index)
+        yield emitted(Reason(last.reason), last.message, new.index)
 
 
 def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
     """Yield an event for each container that ran out of memory, unless an event of the replica reports it."""
     before = {kill.container: kill.times for kill in old.memory_kills} if old is not None else {}
-    reported = {happening.message for happening in _of_replica(old, new)}
+    reported = {event.message for event in _of_replica(old, new)}
     for kill in new.memory_kills:
         whose = Reason.TRAINER_OUT_OF_MEMORY if kill.container == TRAINER else Reason.SIMULATOR_OUT_OF_MEMORY
         message = say(whose, container=kill.container, limit=limit_of(kill.limit), times=kill.times)
         if kill.times > before.get(kill.container, 0) and message not in reported:
-            yield happening(whose, message, new.index)
+            yield emitted(whose, message, new.index)
 
 
 def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[EmittedEvent]:
     """Yield an event if a person has given a lost run up since the old status."""
     before = old.lost.restarted if old is not None and old.lost is not None else None
     if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
-        yield happening(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)
+        yield emitted(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)

@@ -18,7 +18,7 @@ from palaestra.decide.conditions import (
     reconciliation,
 )
 from palaestra.decide.decision import Decision
-from palaestra.decide.events import happening, of_actions, of_change
+from palaestra.decide.events import emitted, of_actions, of_change
 from palaestra.decide.ttl import expired, expires
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.json_access import count, part, text
@@ -68,7 +68,7 @@ def reject(raw: Mapping[str, Any], refused: JobRefused, now: datetime) -> Decisi
     """
     now = whole(now)
     explanation = Explanation(reason=refused.reason, message=refused.message)
-    warning = happening(refused.reason, refused.message)
+    warning = emitted(refused.reason, refused.message)
     try:
         old = _status(raw)
     except JobRefused:

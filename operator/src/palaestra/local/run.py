@@ -114,7 +114,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
         if before is not None and before.finished and not run_directory.is_prolonged(path, record):
             say(
                 f"{job.metadata.name}-{replica}: finished already; "
-                "more spec.trainer.steps prolong it, --fresh begins anew"
+                "more spec.trainer.steps prolong it, --fresh starts a new run"
             )
             _tell(before, path)
             return before

@@ -121,7 +121,7 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     if changes and not _learned_nothing(directory):
         raise RunRefused(
             "\n".join(changes) + f"\n{directory}: holds a run of the job as it was; "
-            "change the file back, give the job another name, or begin anew with --fresh"
+            "change the file back, give the job another name, or start a new run with --fresh"
         )
 
 

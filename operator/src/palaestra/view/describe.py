@@ -25,20 +25,19 @@ def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
     return lines
 
 
-def happened(happenings: Sequence[Event], now: datetime) -> list[str]:
+def happened(events: Sequence[Event], now: datetime) -> list[str]:
     """Return the lines about events: age, type, reason, object with container, message."""
-    if not happenings:
+    if not events:
         return ["none that the cluster still has"]
     rows = [
         (
-            short((now - happening.time).total_seconds())
-            + (f" (x{happening.count})" if happening.count > 1 else ""),
-            "Warning" if happening.warning else "Normal",
-            happening.reason,
-            f"{happening.about} ({happening.container})" if happening.container else happening.about,
-            " ".join(happening.message.split()),
+            short((now - event.time).total_seconds()) + (f" (x{event.count})" if event.count > 1 else ""),
+            "Warning" if event.warning else "Normal",
+            event.reason,
+            f"{event.about} ({event.container})" if event.container else event.about,
+            " ".join(event.message.split()),
         )
-        for happening in happenings
+        for event in events
     ]
     return lines_of([("AGE", "TYPE", "REASON", "ABOUT", "MESSAGE"), *rows])
 

@@ -140,7 +140,7 @@ def test_a_damage_ends_the_attempt_before_anything_starts_or_is_deleted(
     assert code == 2
     said = last_word().reason
     assert re.match(rf"ConfigurationWrong: {begun.path / name}: ", said)
-    assert "move the run directory away to begin anew" in said
+    assert "move the run directory away to start a new run" in said
     assert content_of(begun.path) == before
     assert not any(member.log for member in members.values())
 

@@ -139,7 +139,7 @@ def newest(folder: Path) -> SavedCheckpoint | None:
     elif damage:
         raise ConfigurationError(
             f"{folder}: no checkpoint in it can be read ({damage}); restore one from a copy, or move the run "
-            "directory away to begin anew"
+            "directory away to start a new run"
         )
     return rest
 

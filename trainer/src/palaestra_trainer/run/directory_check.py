@@ -20,7 +20,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.best_model import BEST
 from palaestra_trainer.run_directory import RunDirectory
 
-REMEDY = "restore it from a copy, or move the run directory away to begin anew"
+REMEDY = "restore it from a copy, or move the run directory away to start a new run"
 _DATA = "data"
 _Count = Annotated[int, Field(ge=0)]
 _Rate = Annotated[float, Field(ge=0.0, le=1.0)] | None
