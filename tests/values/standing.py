@@ -56,7 +56,7 @@ def _through(table, value):
 
 
 def _gravity(sensor, setting):
-    """Return what an accelerometer at rest measures: the reaction to gravity, in its own axes."""
+    """Return the reading of an accelerometer at rest: the reaction to gravity, in its own axes."""
     return sensor.rotation.T @ (GRAVITY * setting.up)
 
 

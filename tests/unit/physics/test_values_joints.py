@@ -176,7 +176,7 @@ TURNS = [
 
 @pytest.mark.parametrize("mounted", TURNS, ids=lambda it: it.fields[20:])
 def test_a_sensor_of_force_measures_its_own_weight_in_its_own_axes(mounted):
-    """MuJoCo: with three axes the force on its robot, with one what presses against x; the stub has none."""
+    """MuJoCo: with three axes the force on its robot, with one that along x; the stub simulates no forces."""
     weight = mounted.rotation.T @ [0.0, 0.0, -2.0 * 9.81]
     rotation = mounted.fields.partition("rotation")[2]
     for kind, expected in (("force-3d", weight), ("force", [max(0.0, -weight[0])])):

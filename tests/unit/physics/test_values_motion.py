@@ -105,7 +105,7 @@ def drive(simulation, start, speeds):
 
 
 def here(simulation, setting):
-    """Return where the robot is, in the axes of the ground."""
+    """Return the position of the robot in the axes of the ground."""
     place = simulation.tree.of_def("R").place
     *axis, angle_rad = place.rotation
     posed = frame(place.translation, axis, angle_rad or 1e-15)

@@ -45,7 +45,7 @@ def simulation_of(setting, shape, outlined):
 
 
 def places_of(shape, setting):
-    """Return where the shape stands, in the axes of the ground, above the floor at height 0."""
+    """Return the pose of the shape in the axes of the ground, above the floor at height 0."""
     if shape.type == "Plane":
         return [frame((0.0, 0.0, 0.0)) @ pose for pose in UPRIGHT[:1]]
     poses = poses_of(shape, setting)
@@ -82,13 +82,13 @@ def mismatches(shape, setting, outlined, measure):
 
 
 def outlines(simulation, shape, sensor):
-    """Yield what the sensors of boundingObjects read, and what they should."""
+    """Yield the readings of sensors that meet boundingObjects, and the right values."""
     for name in ("laser", "generic"):
         yield name, device(simulation, name).value, expected(shape.formula, sensor)
 
 
 def sights(simulation, shape, sensor):
-    """Yield what the sensors of visible shapes read, and what they should."""
+    """Yield the readings of sensors that meet visible shapes, and the right values."""
     formula = shape.seen or shape.formula
     yield "infrared", device(simulation, "infrared").value, expected(formula, sensor)
     for ray, turned in zip(device(simulation, "lidar").layers[0], (0.2, 0.0, -0.2), strict=True):

@@ -63,14 +63,14 @@ def directions():
 
 
 def distances(sensor, ways):
-    """Return how far rays travel from a frame in that of the wall, and how far each is off its normal."""
+    """Return the distances of rays from a frame to the wall, and the angle of each to its normal."""
     met = [min(rays.box(sensor.position, sensor.rotation @ way, SIZE), REACH_M) for way in ways]
     off = [np.arccos(abs((sensor.rotation @ way)[0])) for way in ways]
     return np.array(met), np.array(off)
 
 
 def expected(name, sensor):
-    """Return what a sensor of that name measures, in meters."""
+    """Return the measurement of a sensor of that name in meters."""
     met, off = distances(sensor, directions())
     if name == "laser":
         return met[0]

@@ -20,7 +20,7 @@ def simulation_of(setting):
 
 @cached
 def readings_at(setting, index):
-    """Return what each row reads with the robot at one of the poses: by name."""
+    """Return the readings of all rows, by name, with the robot at one of the poses."""
     simulation = simulation_of(setting)
     move(simulation, "R", setting.put(POSES[index]))
     device(simulation, "beacon", 1).send(SAID)

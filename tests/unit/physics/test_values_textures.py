@@ -144,14 +144,14 @@ CASES = [
 
 
 def read(simulation, start, target):
-    """Return what the sensor reads from a point of the shape's frame, looking at another one."""
+    """Return the reading of a sensor at a point of the shape's frame that looks at another point."""
     move(simulation, "R", PLACE @ looking(start, target, 0.3) @ MOUNT.inverse)
     simulation.step(STEP_MS)
     return device(simulation, "eye").value
 
 
 def met(distance, start, target):
-    """Return how far a ray travels, and the point that it meets, both in the frame of the shape."""
+    """Return the distance of a ray and the point that it meets, both in the frame of the shape."""
     ahead = np.subtract(target, start) / np.linalg.norm(np.subtract(target, start))
     way = distance(np.array(start), ahead)
     return way, start + way * ahead

@@ -74,11 +74,13 @@ def _seen_from_below(visible: VisualModel, origin: Any) -> Any:
 
 @contextmanager
 def _without(visible: VisualModel, geoms: Any) -> Iterator[None]:
-    """Hide some geoms, which were seen before."""
+    """Hide some geoms until the end of the context; those that were hidden before stay hidden."""
     shown = geoms[visible.model.geom_group[geoms] == 0]
     visible.model.geom_group[shown] = PASSED
-    yield
-    visible.model.geom_group[shown] = 0
+    try:
+        yield
+    finally:
+        visible.model.geom_group[shown] = 0
 
 
 def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any]) -> Any:
@@ -112,7 +114,7 @@ def _cast(visible: VisualModel, origin: Any, directions: Any, passed: list[Any])
 
 
 def _beyond(visible: VisualModel, origin: Any, direction: Any, distance_m: float) -> float:
-    """Return how far a ray travels that met a triangle from behind, which is not drawn; -1 without end."""
+    """Return the distance to the next visible surface behind the back of a triangle; -1 without one."""
     normal = np.empty(3)
     for _ in range(_MOST_TRIANGLES):
         distance_m += _PAST_M

@@ -27,7 +27,7 @@ def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
 
 
 def _span(shape: Shape, origin: Vector, direction: Vector) -> tuple[float, float]:
-    """Return from where to where along a line it is in a convex shape; enter > leave: it never is."""
+    """Return the two distances at which a line enters and leaves a convex shape; enter > leave: it misses."""
     half = shape.size[0] / 2.0, shape.size[1] / 2.0, shape.size[2] / 2.0
     match shape.kind:
         case "ball":
@@ -59,7 +59,7 @@ def _in_capsule(origin: Vector, direction: Vector, radius: float, straight: floa
 
 
 def _in_slab(origin: float, direction: float, half: float) -> tuple[float, float]:
-    """Return from where to where along a line it is between two planes."""
+    """Return the two distances at which a line enters and leaves the space between two planes."""
     if direction == 0.0:
         return (-math.inf, math.inf) if abs(origin) <= half else _NEVER
     ends = (-half - origin) / direction, (half - origin) / direction
@@ -67,7 +67,7 @@ def _in_slab(origin: float, direction: float, half: float) -> tuple[float, float
 
 
 def _in_ball(origin: Sequence[float], direction: Sequence[float], radius: float) -> tuple[float, float]:
-    """Return from where to where along a line it is in a ball, or in a circle of the plane."""
+    """Return the two distances at which a line enters and leaves a ball, or a circle of the plane."""
     square = sum(part * part for part in direction)
     half_linear = sum(part * at for part, at in zip(direction, origin, strict=True))
     constant = sum(at * at for at in origin) - radius * radius

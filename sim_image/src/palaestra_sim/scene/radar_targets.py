@@ -153,6 +153,6 @@ def _around(boxes: Sequence[Bounds]) -> Bounds | None:
 
 
 def _entry(shape: Shape, start: Vector, direction: Vector) -> float:
-    """Return how far a ray travels until it meets a shape; infinite if it never does."""
+    """Return the distance in meters at which a ray meets a shape; infinite if it misses."""
     frame = shape.pose.inverse
     return first_hit(shape, frame.carry(start), frame.turned(direction))

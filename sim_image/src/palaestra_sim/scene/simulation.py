@@ -348,7 +348,7 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Arrange the world anew, if `place` is part of a solid or floor, or a robot has another height."""
+        """Arrange the world again if `place` is part of a solid or floor, or a robot has another height."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
         lifted = self._heights != self._heights_now()
@@ -357,7 +357,7 @@ class Simulation:
             self._arrange()
 
     def _heights_now(self) -> list[float]:
-        """Return how high the robots that nothing but a client lifts are, in meters."""
+        """Return the heights in meters of the robots that only a client can lift."""
         return [robot.place.height_m for robot in self.robots if robot.body is not None]
 
     def _arrange(self) -> None:

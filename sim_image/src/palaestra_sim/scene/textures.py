@@ -143,7 +143,7 @@ class Textures:
 
 
 def texture_of(look: SceneNode) -> SceneNode | None:
-    """Return the ImageTexture of an appearance; None if it has none."""
+    """Return the ImageTexture of an appearance, None if it has no texture."""
     field = {"Appearance": "texture", "PBRAppearance": "baseColorMap"}.get(look.type_name, "")
     return next((node for node in look.nodes(field) if node.type_name == "ImageTexture"), None)
 

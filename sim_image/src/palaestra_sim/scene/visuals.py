@@ -126,7 +126,7 @@ class View:
         return tuple(drawn(self.root))
 
     def unread_textures(self) -> int:
-        """Return how many shapes have a texture that is not read, or not in its place."""
+        """Return the number of shapes with a texture that infra-red sensors do not see."""
         paint = self.textures.paint
         textured = (thing for thing in self.things() if thing.textured)
         return sum(it.look is None or paint(it.look, it.geometry, 1.0) is None for it in textured)
@@ -199,7 +199,7 @@ def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 
 def _stand_in_look(node: SceneNode, but: str) -> _Look:
-    """Return the first look that a stand-in has, but for that in one field; without color if it has none."""
+    """Return the first look of a stand-in outside of one field; without one, a look without color."""
     looks = (
         item
         for name, content in node.fields.items()

@@ -210,7 +210,7 @@ class Hull:
                 reach[i] = min(reach[i], max(enter, 0.0))
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
-        """Return where a ray enters and leaves the polygon, in meters along it; enter > leave: it misses."""
+        """Return the meters at which a ray enters and leaves the polygon; enter > leave: it misses."""
         x, y, c, s = frame
         px, py, ux, uy = ray
         at_x, at_y = x + c * px - s * py, y + s * px + c * py

@@ -45,7 +45,7 @@ class _Level(NamedTuple):
     rest: SlopedBeams
 
     def cast(self, frame: tuple[float, float, float, float], height_m: float) -> Sequence[float]:
-        """Return how far each beam travels in meters."""
+        """Return the distance in meters that each beam travels."""
         distances = self.fan.cast(frame)
         if self.rest.free:
             return distances

@@ -153,7 +153,7 @@ class SlopedBeams:
     def _round(
         self, beam: Beam, frame: tuple[float, float, float, float], height_m: float, nearest_m: float
     ) -> float:
-        """Return how far a beam travels until it meets what is not upright, or until `nearest_m`."""
+        """Return the distance at which a beam meets a shape that is not upright; at most `nearest_m`."""
         if not self._rounded:
             return nearest_m
         x, y, c, s = frame

@@ -82,7 +82,7 @@ class Parameters:
         self._root = _without(self._root, path)
 
     def search(self, key: str, node: str) -> str | None:
-        """Return the name of the parameter nearest to a node; None if there is none.
+        """Return the name of the parameter nearest to a node, None if no parameter matches.
 
         The search goes from the node's own name up to the root, until it finds the first part of `key`.
 
@@ -110,7 +110,7 @@ class Parameters:
 
 
 def changes(name: str, value: Any, subscribed: list[str]) -> Iterator[Change]:
-    """Yield what has changed for each subscribed name when `name` was set, or deleted with `{}`.
+    """Yield the change of each subscribed name after `name` was set, or deleted with `{}`.
 
     Args:
         name: of the parameter or namespace.

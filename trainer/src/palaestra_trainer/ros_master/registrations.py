@@ -44,7 +44,7 @@ class Registrations:
         self._types: dict[str, str] = {}
 
     def register(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
-        """Register a node, and return the URI of an older node of its name; None: there is none.
+        """Register a node, and return the URI of an older node of its name, None if no node had it.
 
         Args:
             kind: not SERVICE, which `register_service` is for.
@@ -64,7 +64,7 @@ class Registrations:
         return replaced
 
     def unregister(self, kind: Kind, name: str, node: str, uri: str) -> bool:
-        """Return whether that node was registered; it is not any more.
+        """Remove a registration; return whether that node had it.
 
         Args:
             kind: not SERVICE.
@@ -82,7 +82,7 @@ class Registrations:
         return True
 
     def unregister_service(self, service: str, node: str, address: str) -> bool:
-        """Return whether that node served `service` at that address; it does not any more."""
+        """Remove the registration of a service; return whether that node served it at that address."""
         if node not in self._nodes or self._service_uris.get(service) != (node, address):
             return False
         del self._service_uris[service]
