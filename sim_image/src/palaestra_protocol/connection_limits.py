@@ -66,7 +66,7 @@ class ConnectionSlots:
                 self._drop(connection)
 
     def _crowd(self, peer: str) -> list[socket.socket] | None:
-        """Return the connections of which one must be closed for `peer`; None if a slot is free."""
+        """Return the connections from which one must be closed for `peer`; None if a slot is free."""
         of_peer = [one for one, slot in self._taken.items() if slot.peer == peer]
         if len(of_peer) >= self._most_of_peer:
             return of_peer

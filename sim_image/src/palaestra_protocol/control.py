@@ -21,15 +21,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Self
+from typing import Annotated
 
-from palaestra_protocol.fields import (
-    MOST_NAME,
-    Fields,
-    ProtocolError,
-    clipped,
-    decoded,
-    enumerated,
+from palaestra_protocol.fields import MOST_NAME, ProtocolError, decoded
+from palaestra_protocol.messages import (
+    Choice,
+    Flag,
+    JsonMessage,
+    JsonRequest,
+    Lines,
+    Maybe,
+    Number,
+    Part,
+    PartList,
+    Text,
+    Whole,
 )
 
 __all__ = [
@@ -44,6 +50,8 @@ __all__ = [
 
 STANDBY = "/standby"  # prefix of the paths for the second simulator
 LEFT_OUT_FILE = "PALAESTRA_SIMULATOR_LEFT_OUT"
+VIEW_SOCKET = "PALAESTRA_SIMULATOR_VIEW"
+VIEW_SCENE, VIEW_STATE, VIEW_CAMERA = b"scene", b"state", b"camera"
 MOST_LEFT_OUT = 16  # lines
 LONGEST_LEFT_OUT = 200  # characters of such a line
 MOST_DEADLINE_S = 3600.0
@@ -63,84 +71,42 @@ class SidecarState(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RobotName:
+class RobotName(JsonMessage):
     """The names of a robot in the world.
 
     `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
     the scene. `definition` is its DEF name; "": it has none.
     """
 
-    robot: str
-    ros_name: str
-    supervisor: bool
-    definition: str = ""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return {
-            "robot": clipped(self.robot, MOST_NAME),
-            "ros_name": clipped(self.ros_name, MOST_NAME),
-            "supervisor": self.supervisor,
-            "definition": clipped(self.definition, MOST_NAME),
-        }
-
-    @classmethod
-    def from_json(cls, content: object, path: str = "") -> Self:
-        """Return the object that `to_json` wrote.
-
-        Raises:
-            ProtocolError: `content` is anything else.
-        """
-        fields = Fields(content, path)
-        return cls(
-            robot=fields.text("robot", MOST_NAME),
-            ros_name=fields.text("ros_name", MOST_NAME, least=1),
-            supervisor=fields.flag("supervisor"),
-            definition=fields.text("definition", MOST_NAME),
-        )
+    robot: Annotated[str, Text(MOST_NAME)]
+    ros_name: Annotated[str, Text(MOST_NAME, least=1)]
+    supervisor: Annotated[bool, Flag()]
+    definition: Annotated[str, Text(MOST_NAME)] = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LastExit:
+class LastExit(JsonMessage):
     """The last end of the simulator: its exit code, or its signal such as "SIGBUS".
 
     If neither is set, it could not be started, or its end was not observed. `expected` is true if the end was
     announced; otherwise it was a fault.
     """
 
-    code: int | None
-    signal: str | None
-    expected: bool
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return {"code": self.code, "signal": self.signal, "expected": self.expected}
-
-    @classmethod
-    def from_json(cls, content: object, path: str = "") -> Self:
-        """Return the object that `to_json` wrote.
-
-        Raises:
-            ProtocolError: `content` is anything else.
-        """
-        fields = Fields(content, path)
-        return cls(
-            code=fields.whole("code", 0, 255) if fields.has("code") else None,
-            signal=fields.text("signal", 32, least=1) if fields.has("signal") else None,
-            expected=fields.flag("expected"),
-        )
+    code: Annotated[int | None, Maybe(Whole(0, 255))] = None
+    signal: Annotated[str | None, Maybe(Text(32, least=1))] = None
+    expected: Annotated[bool, Flag()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatorState:
+class SimulatorState(JsonMessage):
     """A sidecar's report on its simulator.
 
     Attributes:
-        state: of the simulator.
+        state: the state of the simulator.
         driver: stub, webots or command.
         world: the path of its world.
         robots: the robots of that world that have a ROS node.
-        pid: of the simulator's first process; None while it does not run.
+        pid: the process ID of the simulator's first process; None while it does not run.
         starts: number of starts since the sidecar started.
         faults: number of ends without an announcement.
         last_exit: its last end; None if it has not ended yet.
@@ -149,98 +115,26 @@ class SimulatorState:
         left_out: the nodes that the simulator left out of its world at its last start, in lines for people.
     """
 
-    state: SidecarState
-    driver: str
-    world: str
-    robots: tuple[RobotName, ...] = ()
-    pid: int | None = None
-    starts: int = 0
-    faults: int = 0
-    last_exit: LastExit | None = None
-    detail: str = ""
-    rss_bytes: int | None = None
-    left_out: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
-        return {
-            "state": self.state.value,
-            "driver": clipped(self.driver, MOST_NAME),
-            "world": clipped(self.world, MOST_PATH),
-            "robots": [robot.to_json() for robot in self.robots[:MOST_ROBOTS]],
-            "pid": self.pid,
-            "starts": self.starts,
-            "faults": self.faults,
-            "last_exit": None if self.last_exit is None else self.last_exit.to_json(),
-            "detail": clipped(self.detail),
-            "rss_bytes": self.rss_bytes,
-            "left_out": enumerated(self.left_out, LONGEST_LEFT_OUT, MOST_LEFT_OUT),
-        }
-
-    @classmethod
-    def from_json(cls, content: object, path: str = "") -> Self:
-        """Return the object that `to_json` wrote.
-
-        Raises:
-            ProtocolError: `content` is anything else.
-        """
-        fields = Fields(content, path)
-        return cls(
-            state=fields.choice("state", SidecarState),
-            driver=fields.text("driver", MOST_NAME),
-            world=fields.text("world", MOST_PATH),
-            robots=fields.parts("robots", RobotName.from_json, MOST_ROBOTS),
-            pid=fields.whole("pid", 1, MOST_PID) if fields.has("pid") else None,
-            starts=fields.whole("starts"),
-            faults=fields.whole("faults"),
-            last_exit=fields.part("last_exit", LastExit.from_json) if fields.has("last_exit") else None,
-            detail=fields.text("detail"),
-            rss_bytes=fields.whole("rss_bytes") if fields.has("rss_bytes") else None,
-            left_out=left_out(fields, LONGEST_LEFT_OUT),
-        )
+    state: Annotated[SidecarState, Choice(SidecarState)]
+    driver: Annotated[str, Text(MOST_NAME)]
+    world: Annotated[str, Text(MOST_PATH)]
+    robots: Annotated[tuple[RobotName, ...], PartList(RobotName, MOST_ROBOTS)] = ()
+    pid: Annotated[int | None, Maybe(Whole(1, MOST_PID))] = None
+    starts: Annotated[int, Whole()] = 0
+    faults: Annotated[int, Whole()] = 0
+    last_exit: Annotated[LastExit | None, Maybe(Part(LastExit))] = None
+    detail: Annotated[str, Text()] = ""
+    rss_bytes: Annotated[int | None, Maybe(Whole())] = None
+    left_out: Annotated[tuple[str, ...], Maybe(Lines(LONGEST_LEFT_OUT, MOST_LEFT_OUT))] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StopRequest:
+class StopRequest(JsonRequest):
     """An announcement that the simulator will end, within `deadline_s` seconds (0: kill it now)."""
 
-    deadline_s: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return {"deadline_s": self.deadline_s}
-
-    @classmethod
-    def from_json(cls, content: object, path: str = "") -> Self:
-        """Return the object that `to_json` wrote.
-
-        Raises:
-            ProtocolError: `content` is anything else, or has an additional field.
-        """
-        fields = Fields(content, path)
-        fields.only("deadline_s")
-        return cls(deadline_s=fields.number("deadline_s", 0.0, MOST_DEADLINE_S))
+    deadline_s: Annotated[float, Number(0.0, MOST_DEADLINE_S)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlainRequest:
+class PlainRequest(JsonRequest):
     """A request without parameters: start, ready."""
-
-    @classmethod
-    def from_json(cls, content: object, path: str = "") -> Self:
-        """Return the request.
-
-        Raises:
-            ProtocolError: `content` is anything but an empty object.
-        """
-        Fields(content, path).only()
-        return cls()
-
-
-def left_out(fields: Fields, most: int) -> tuple[str, ...]:
-    """Return the lines in the field `left_out`, of at most `most` characters each; () if it is absent.
-
-    Raises:
-        ProtocolError: it is anything else.
-    """
-    return fields.texts("left_out", most, MOST_LEFT_OUT) if fields.has("left_out") else ()

@@ -5,7 +5,8 @@ characters that cannot be encoded. Each value is read by a method that checks it
 other value raises `ProtocolError`. Unknown fields are ignored in responses, because a newer release may add
 some. In requests they are refused, because there they are mistakes.
 
-Writers keep the same bounds with `clipped`, `enumerated` and `known`.
+Writers keep the same bounds with `clipped`, `enumerated` and `known`. `palaestra_protocol.messages` does both
+for messages whose fields declare their bounds.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from palaestra_protocol.masking import masked
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # of one response; enough for all fields at maximum length, with the longest escapes
+MOST_BYTES = 2**19  # size of one response; all fields fit at maximum length, with the longest escapes
 MOST_COUNT = 2**53  # every JSON reader keeps integers up to this one exactly
 MOST_NAME = 255
 MOST_TEXT = 500
@@ -48,7 +49,7 @@ def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
     try:
         return cast("object", json.loads(data))
     except (ValueError, RecursionError) as error:
-        raise ProtocolError(f"body: is no JSON ({type(error).__name__})") from error
+        raise ProtocolError(f"body: is not JSON ({type(error).__name__})") from error
 
 
 def clipped(text: str, most: int = MOST_TEXT) -> str:
@@ -85,14 +86,14 @@ class Fields:
     def __init__(self, content: object, path: str = "") -> None:
         self._path = path
         if not isinstance(content, dict):
-            raise ProtocolError(f"{path or 'body'}: {_kind(content)} is no object")
+            raise ProtocolError(f"{path or 'body'}: {_kind(content)} is not an object")
         self._content = cast("dict[str, object]", content)
 
     def only(self, *names: str) -> None:
         """Raise ProtocolError for any field that is not among `names`."""
         for name in self._content:
             if name not in names:
-                raise self._error(clipped(name, MOST_NAME), "is not a field of this request")
+                raise self.error(clipped(name, MOST_NAME), "is not a field of this request")
 
     def has(self, name: str) -> bool:
         """Return whether the field is present and not null."""
@@ -113,44 +114,44 @@ class Fields:
             return choices(value)
         except ValueError:
             allowed = ", ".join(choices)
-            raise self._error(name, f"{value[:40]!r} is not one of {allowed}") from None
+            raise self.error(name, f"{value[:40]!r} is not one of {allowed}") from None
 
     def whole(self, name: str, least: int = 0, most: int = MOST_COUNT) -> int:
         """Return an integer from `least` to `most`."""
         value = self._value(name)
         if not isinstance(value, int) or isinstance(value, bool):
-            raise self._error(name, f"{_kind(value)} is no integer")
+            raise self.error(name, f"{_kind(value)} is not an integer")
         if not least <= value <= most:
-            raise self._error(name, f"is not within {least} to {most}")
+            raise self.error(name, f"is not within {least} to {most}")
         return value
 
     def number(self, name: str, least: float = -math.inf, most: float = math.inf) -> float:
         """Return a finite number from `least` to `most`."""
         value = self._value(name)
         if not isinstance(value, int | float) or isinstance(value, bool):
-            raise self._error(name, f"{_kind(value)} is no number")
+            raise self.error(name, f"{_kind(value)} is not a number")
         try:
             number = float(value)
         except OverflowError:
-            raise self._error(name, "is not finite") from None
+            raise self.error(name, "is not finite") from None
         if not math.isfinite(number):
-            raise self._error(name, "is not finite")
+            raise self.error(name, "is not finite")
         if not least <= number <= most:
-            raise self._error(name, f"is not within {least:g} to {most:g}")
+            raise self.error(name, f"is not within {least:g} to {most:g}")
         return number
 
     def flag(self, name: str) -> bool:
         """Return true or false."""
         value = self._value(name)
         if not isinstance(value, bool):
-            raise self._error(name, f"{_kind(value)} is not true or false")
+            raise self.error(name, f"{_kind(value)} is not true or false")
         return value
 
     def time(self, name: str) -> str:
         """Return a time in RFC 3339."""
         text = self.text(name, MOST_NAME)
         if not _RFC3339.fullmatch(text) or not _exists(text):
-            raise self._error(name, "is no time such as 2025-01-31T12:00:00Z")
+            raise self.error(name, "is not a time such as 2025-01-31T12:00:00Z")
         return text
 
     def part(self, name: str, read: Callable[[object, str], T]) -> T:
@@ -161,28 +162,29 @@ class Fields:
         """Return the results of `read` for a list of at most `most` entries."""
         value = self._value(name)
         if not isinstance(value, list):
-            raise self._error(name, f"{_kind(value)} is no list")
+            raise self.error(name, f"{_kind(value)} is not a list")
         items = cast("list[object]", value)
         if len(items) > most:
-            raise self._error(name, f"has {len(items)} entries, more than {most}")
+            raise self.error(name, f"has {len(items)} entries, more than {most}")
         return tuple(read(item, f"{self._at(name)}[{place}]") for place, item in enumerate(items))
 
     def _value(self, name: str) -> object:
         if name not in self._content:
-            raise self._error(name, "is missing")
+            raise self.error(name, "is missing")
         return self._content[name]
 
     def _at(self, name: str) -> str:
         return f"{self._path}.{name}" if self._path else name
 
-    def _error(self, name: str, fact: str) -> ProtocolError:
+    def error(self, name: str, fact: str) -> ProtocolError:
+        """Return an error that names a field and what is wrong with it."""
         return ProtocolError(f"{self._at(name)}: {fact}")
 
 
 def _text(value: object, path: str, most: int, least: int = 0) -> str:
     """Return the `value` at `path` if it is text of `least` to `most` characters."""
     if not isinstance(value, str):
-        raise ProtocolError(f"{path}: {_kind(value)} is no text")
+        raise ProtocolError(f"{path}: {_kind(value)} is not text")
     if not least <= len(value) <= most:
         raise ProtocolError(f"{path}: has {len(value)} characters, not {least} to {most}")
     if any("\ud800" <= character <= "\udfff" for character in value):

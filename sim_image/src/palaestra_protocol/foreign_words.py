@@ -55,7 +55,7 @@ ELSEWHERE: Mapping[str, str] = MappingProxyType(
         "verbose": "the log of a run has every figure; leave it out",
     }
 )
-# Those of them that only a file of RL-Baselines3-Zoo has.
+# The words of this table that only a file of RL-Baselines3-Zoo has.
 OF_ZOO = frozenset(
     {
         "callback", "env_kwargs", "env_wrapper", "frame_stack", "monitor_kwargs", "n_envs", "n_timesteps",

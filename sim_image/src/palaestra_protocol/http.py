@@ -48,7 +48,7 @@ class Address(NamedTuple):
                 return cls(bare, int(port))
         except ValueError:
             pass
-        raise ValueError(f"{text!r} is no address such as 127.0.0.1:7100")
+        raise ValueError(f"{text!r} is not an address such as 127.0.0.1:7100")
 
     def __str__(self) -> str:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
@@ -64,7 +64,7 @@ class Response:
 
 
 Route = Callable[[bytes], Response]  # takes the body of a request
-Routes = Mapping[tuple[str, str], Route]  # by method, GET or POST, and path
+Routes = Mapping[tuple[str, str], Route]  # keys: the method, GET or POST, and the path
 
 
 def json_response(status: HTTPStatus, content: Mapping[str, Any]) -> Response:
@@ -93,7 +93,7 @@ class Server(TcpServer):
         address: where to listen. `0.0.0.0` and `::` both mean every address of the machine, IPv6 and IPv4,
             because the addresses of a pod are those of its cluster.
         routes: its paths.
-        name: of the program, for the header `Server` and the thread.
+        name: the name of the program, for the header `Server` and the thread.
         deadline_s: for reading a request, and again for writing the response.
 
     Raises:

@@ -139,4 +139,4 @@ class Tally:
             yield "_sum", {}, self.total
 
 
-Values = Mapping[tuple[str, ...], float | Tally]  # by the values of the labels, in their order
+Values = Mapping[tuple[str, ...], float | Tally]  # keys: the values of the labels, in their order

@@ -16,7 +16,7 @@ def whole(least: int = 0, most: int | None = None) -> Callable[[str], int]:
         try:
             number = int(text)
         except ValueError:
-            raise ArgumentTypeError(f"{text!r} is no whole number") from None
+            raise ArgumentTypeError(f"{text!r} is not a whole number") from None
         if number < least or (most is not None and number > most):
             wanted = f"{least} or more" if most is None else f"{least} to {most}"
             raise ArgumentTypeError(f"{number} is refused; give {wanted}")
@@ -45,7 +45,7 @@ def _finite(text: str) -> float:
     try:
         number = float(text)
     except ValueError:
-        raise ArgumentTypeError(f"{text!r} is no number") from None
+        raise ArgumentTypeError(f"{text!r} is not a number") from None
     if not math.isfinite(number):
         raise ArgumentTypeError(f"{text} is refused; give a finite number")
     return number

@@ -15,7 +15,9 @@ import sys
 from _frozen_importlib import BuiltinImporter, FrozenImporter, ModuleSpec
 from _frozen_importlib_external import PathFinder
 
-_WITH_CODE_OF_USERS = ("palaestra-train", "palaestra-eval", "palaestra-export")
+_WITH_CODE_OF_USERS = (
+    *("palaestra-train", "palaestra-eval", "palaestra-export", "palaestra-compare", "palaestra-try"),
+)
 _WRONG_INPUT = 2
 _OURS = ("palaestra", "palaestra-sim", "palaestra-trainer")
 # Modules that no metadata names: ours in a checkout, the distribution's, and webots_ros, which we generate.

@@ -25,7 +25,7 @@ class TcpServer(socketserver.ThreadingTCPServer):
         address: host and port on which it listens; port 0 stands for any free port.
         handler: serves one connection.
         name: for its thread and its log.
-        slots: of its connections.
+        slots: the slots of its connections.
 
     Raises:
         OSError: the address is in use, or does not belong to this machine.

@@ -33,8 +33,8 @@ class WorldError(SimError, ValueError):
 
     Attributes:
         world: the name of the file in messages.
-        line: of the place, counted from 1.
-        column: of the place, in characters, counted from 1.
+        line: the line of the place, counted from 1.
+        column: the column of the place, in characters, counted from 1.
         fact: the mistake at this place.
         remedy: the text to write instead.
     """

@@ -16,15 +16,16 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from palaestra_protocol.control import LEFT_OUT_FILE
+from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim import faults
 from palaestra_sim.errors import SimError, StandInError, WorldError, WorldRefusedError
-from palaestra_sim.ros import Loop, MasterUnreachable, RosNode
+from palaestra_sim.ros import LocalSocket, Loop, MasterUnreachable, RosNode
 from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.ros_controller.left_out import write_left_out
 from palaestra_sim.ros_controller.options import FrontOptions
 from palaestra_sim.ros_controller.simulator import Load, RunningSimulator
+from palaestra_sim.ros_controller.viewing import answers
 from palaestra_sim.scene.loader import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
@@ -44,7 +45,8 @@ _NO_MASTER = 1
 
 _EPILOG = """\
 Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. If
-PALAESTRA_SIMULATOR_LEFT_OUT is set, as by a sidecar, writes the nodes that it leaves out into that file.
+PALAESTRA_SIMULATOR_LEFT_OUT is set, as by a sidecar, writes the nodes that it leaves out into that file. If
+PALAESTRA_SIMULATOR_VIEW is set, describes its world on this Unix socket, at the request of a viewer.
 
 faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/reference/faults.md has them.
 PALAESTRA_STUB_FAULTS holds faults with spaces between, PALAESTRA_STUB_FAULT_SEED the value of --fault-seed,
@@ -60,7 +62,7 @@ class Program:
     """One simulator.
 
     Attributes:
-        name: of the program.
+        name: the name of the program.
         description: for its help.
         physics: returns the physics of a world that is about to be read.
         mjcf: returns the simulation of an MJCF world. Its files are in the given folder or, with None, in the
@@ -156,7 +158,10 @@ class _Process:
             self._start()
         else:
             self._start_as_ordered(self._course)
+        viewing = self._viewing()
         self._loop.run()
+        if viewing is not None:
+            viewing.close()
         self._simulator.close()
         self._loop.close()
         return self._exit_code
@@ -180,15 +185,27 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
-        self._report_left_out()  # first, because a sidecar reads the file when the simulator is ready
+        # Before the rest, because a sidecar reads the file when the simulator is ready.
+        self._report_left_out()
         self._simulator.start()
         silent = silent_devices(self._simulator.simulation.robots)
         if silent:
-            log.warning("devices without readings, whose enable answers failure: %s", silent)
+            log.warning("devices without readings, whose enable returns failure: %s", silent)
         for difference in differences(self._simulator.simulation):
             log.warning("differs from Webots: %s", difference)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
         self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+    def _viewing(self) -> LocalSocket | None:
+        """Return the socket for viewers; None if nobody wants one, or it cannot be made."""
+        path = os.environ.get(VIEW_SOCKET)
+        if path is None:
+            return None
+        try:
+            return LocalSocket(self._loop, Path(path), answers(self._simulator))
+        except OSError as error:
+            log.warning("%s: no viewer can connect (%s)", path, error.strerror)
+            return None
 
     def _report_left_out(self) -> None:
         left_out = self._simulator.simulation.left_out
@@ -197,10 +214,10 @@ class _Process:
         if left_out and (file := os.environ.get(LEFT_OUT_FILE)):
             write_left_out(left_out, Path(file))
 
-    def _start_as_ordered(self, course: faults.FaultState) -> None:
+    def _start_as_ordered(self, fault_state: faults.FaultState) -> None:
         """Start with the faults of a fault state: late, or not at all."""
         log.info("faults: %s", self._ordered)
-        refused, delay_s = course.start()
+        refused, delay_s = fault_state.start()
         if refused is None:
             self._loop.later(delay_s, self._start)
         else:
@@ -222,7 +239,7 @@ class _Process:
 
     def _lose(self, name: str, reason: str) -> None:
         """End one controller whose node was shut down; the simulation continues without it."""
-        log.warning("the node %s was shut down (%s); its robot has no controller any more", name, reason)
+        log.warning("the node %s was shut down (%s); its robot no longer has a controller", name, reason)
         controller = self._simulator.controllers.pop(name, None)
         if controller is not None:
             controller.close()

@@ -14,7 +14,7 @@ from palaestra_sim.errors import SimError
 
 Fields = Mapping[str, Any]
 Handler = Callable[[Any], Any]
-Row = tuple[str, str, Handler]  # of a table of services: last part of the path, type without package, handler
+Row = tuple[str, str, Handler]  # a row of the services: last part of the path, type without package, handler
 
 
 class UnsimulatedError(SimError, NotImplementedError):
@@ -57,7 +57,7 @@ class NodeInterface(Protocol):
     """A ROS node; paths are relative to its name.
 
     Attributes:
-        name: of the node.
+        name: the name of the node.
         blocked: returns whether requests have to wait; called before each request.
         current_call: identifies the request in progress, for `answer`.
     """

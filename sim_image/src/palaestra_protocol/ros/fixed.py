@@ -54,7 +54,7 @@ class Record:
     """A message of fixed size, or some consecutive fields of a message.
 
     Attributes:
-        names: of the fields.
+        names: the names of the fields.
         parts: one for each field; None if the field is one number.
         placed: the parts, each with the index of its first number among all.
         empties: the value of each field if it is absent.

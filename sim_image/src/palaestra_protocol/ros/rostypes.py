@@ -37,7 +37,7 @@ class ServiceType(NamedTuple):
     Attributes:
         name: `package/name`.
         md5: that of Webots R2023b.
-        request: of a call.
+        request: the request of a call.
         response: to a call.
         later_md5: that of Webots R2025a, whose clients send the same bytes; equal to `md5` if nothing was
             renamed.
@@ -113,7 +113,7 @@ def reading_field(name: str, field: str) -> tuple[struct.Struct, int] | None:
     size.
 
     Args:
-        name: of the message type.
+        name: the name of the message type.
         field: its name; "" is the last field.
 
     Raises:

@@ -36,7 +36,7 @@ class MessageField:
     """One field of a message.
 
     Attributes:
-        type: of the field, or of one element: built in, or `package/Name`.
+        type: the type of the field, or of one element: built in, or `package/Name`.
         array: empty, `[]` for any number of elements, or the number, as in `[9]`.
         name: as in the text, even if Python reserves it.
     """

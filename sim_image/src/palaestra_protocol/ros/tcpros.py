@@ -65,7 +65,7 @@ class FrameReader:
         """
         begins_here = not self._buffer and len(data) >= LENGTH.size
         if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= MAX_FRAME_BYTES:
-            return (data[LENGTH.size :],)  # one whole frame, as nearly always
+            return (data[LENGTH.size :],)  # nearly always, exactly one whole frame has arrived
         self._buffer += data
         return self._cut()
 

@@ -28,7 +28,7 @@ from palaestra_protocol.ros.fixed import (
 from palaestra_protocol.ros.syntax import NUMBERS, Message, MessageField
 from palaestra_protocol.ros.tcpros import LENGTH
 
-Piece = bytes | memoryview  # of a message that is being written
+Piece = bytes | memoryview  # a part of a message that is being written
 _LENGTH_SIZE = LENGTH.size
 _length_at = LENGTH.unpack_from
 

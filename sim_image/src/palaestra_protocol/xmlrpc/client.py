@@ -18,10 +18,10 @@ def call(uri: str, deadline_s: float, method: str, *parameters: Any) -> Any:
     """Return the value of a call.
 
     Args:
-        uri: of the server, e.g. http://localhost:11311/
+        uri: the URI of the server, e.g. http://localhost:11311/
         deadline_s: for the whole call, from the connection to the last byte of the response.
         method: its name.
-        parameters: of the method.
+        parameters: the parameters of the method.
 
     Raises:
         OSError: the server cannot be reached; TimeoutError: the deadline passed.

@@ -10,7 +10,7 @@ import xmlrpc.client
 from typing import Any
 from xml.parsers import expat
 
-MOST_DEPTH = 64  # of arrays and structs inside each other; a tree of ROS parameters has few levels
+MOST_DEPTH = 64  # levels of arrays and structs; a tree of ROS parameters has few
 FAULT = 1  # the code of every fault; ROS's clients read only the text
 _NESTING = frozenset({"array", "struct"})
 
@@ -94,7 +94,9 @@ def _read(data: bytes) -> xmlrpc.client.Unmarshaller:
         parser.Parse(data, True)
     except UnreadableDocument:
         raise
-    except Exception as error:  # of many types: ExpatError, ValueError, IndexError, binascii.Error, ...
+    except (
+        Exception
+    ) as error:  # the parser raises many types: ExpatError, ValueError, IndexError, binascii.Error, ...
         raise UnreadableDocument(f"XML-RPC: {error!r}") from error
     return reader
 

@@ -28,7 +28,7 @@ from palaestra_protocol.xmlrpc.documents import (
 
 MOST_REQUEST_BYTES = 8 << 20  # a robot's description is a parameter of up to a few MB
 MOST_CONNECTIONS = 256  # each has a thread; a simulator keeps one connection for each robot
-REQUEST_S = 10.0  # from the first byte of a request to its last, and again for the response
+REQUEST_S = 10.0  # limit from the first byte of a request to its last, and again for the response
 IDLE_S = 60.0  # between two requests
 _MULTICALL = "system.multicall"
 
@@ -98,7 +98,8 @@ class RpcServer(TcpServer):
             return encode_response(value)
         except xmlrpc.client.Fault as fault:
             return encode_fault(fault.faultString)
-        except (UnreadableDocument, TypeError, OverflowError) as error:  # the latter of a value
+        # TypeError and OverflowError: XML-RPC cannot express the value.
+        except (UnreadableDocument, TypeError, OverflowError) as error:
             return encode_fault(str(error))
 
     def _called(self, name: str, parameters: tuple[Any, ...]) -> Any:
@@ -107,7 +108,7 @@ class RpcServer(TcpServer):
             raise xmlrpc.client.Fault(FAULT, f"{name} is not a method of this server")
         try:
             return method(parameters)
-        except Exception as error:  # of any type: the caller must get a response, and others continue
+        except Exception as error:  # whatever fails, the caller must get a response, and others continue
             raise xmlrpc.client.Fault(FAULT, f"{name}: {error!r}") from error
 
     def _several(self, parameters: tuple[Any, ...]) -> list[Any]:

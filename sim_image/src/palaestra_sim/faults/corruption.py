@@ -40,7 +40,7 @@ def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value:
     codec = message_type(type_name).codec
     try:
         fields = codec.decode(payload)._asdict()
-    except ValueError:  # another damage may have cut it short
+    except ValueError:  # an earlier corruption may have cut the message short
         return payload
     found = fields[field]
     if isinstance(found, bytes):
@@ -72,7 +72,7 @@ def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> b
         if not isinstance(damage, WrongValue):
             payload = payload[: len(payload) // 2]
             continue
-        with suppress(ValueError):  # another damage may have cut it short
+        with suppress(ValueError):  # an earlier corruption may have cut the message short
             payload = response.encode(_with_floats(response.decode(payload), damage.value)._asdict())
     return succeeded + frame(payload)
 

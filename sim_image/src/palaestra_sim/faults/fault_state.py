@@ -78,8 +78,8 @@ class FaultState:
     def request(self, robot: str, path: str) -> Ruling:
         """Return the ruling on a request to `path`, below the robot's name."""
         delay_s, effects = 0.0, []
-        number, happening = self._count(robot, path)
-        for fault in happening:
+        number, faults = self._count(robot, path)
+        for fault in faults:
             if fault.service:
                 self._lasting.add(fault)
             elif isinstance(fault, Slow):
@@ -115,10 +115,10 @@ class FaultState:
             return 0, ()
         self._counts[event] += 1
         number = self._counts[event]
-        happening = self._schedule.at(event, number)
+        faults = self._schedule.at(event, number)
         if event is FaultEvent.STEP:
-            self._messages = tuple(it for it in happening if it.topic)
-        return number, happening
+            self._messages = tuple(it for it in faults if it.topic)
+        return number, faults
 
     def _with_service_faults(self, path: str, delay_s: float, effects: tuple[InjectedFault, ...]) -> Ruling:
         lost, damages = False, []

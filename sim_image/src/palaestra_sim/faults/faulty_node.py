@@ -130,7 +130,7 @@ class _Answers:
 
     Attributes:
         link: the connection itself.
-        damages: of the next response.
+        damages: the damages of the next response.
     """
 
     def __init__(self, link: Connection, response: Codec | None) -> None:

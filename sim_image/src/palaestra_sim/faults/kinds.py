@@ -36,7 +36,7 @@ class Trigger:
         event: the kind of events.
         at: the number of the only event; None if another attribute decides.
         every: the fault occurs at each multiple of this.
-        probability: of the fault at each event.
+        probability: the probability of the fault at each event.
     """
 
     event: FaultEvent

@@ -23,7 +23,7 @@ class Ordered:
 
     Attributes:
         faults: in the order in which they were written, options before those of the environment.
-        seed: of all random draws.
+        seed: the seed of all random draws.
         life: the number of this start of the simulator, from 1.
         counted: whether a sidecar or a person counts the lives; otherwise `life` is random.
     """
@@ -73,11 +73,11 @@ def _check(faults: tuple[InjectedFault, ...], *, counted: bool) -> None:
     texts = [fault.text for fault in faults]
     for fault in faults:
         if texts.count(fault.text) > 1:
-            raise FaultError(f"fault {fault.text}: is there twice; leave one")
+            raise FaultError(f"fault {fault.text}: is given twice; remove one")
         trigger = fault.trigger
         if not counted and trigger.event is FaultEvent.START and (trigger.at or trigger.every > 1):
             raise FaultError(
-                f"fault {fault.text}: nobody counts the starts here;"
+                f"fault {fault.text}: the number of this start is unknown;"
                 " give --fault-life N, or start the stub through its sidecar"
             )
 
@@ -88,6 +88,6 @@ def _whole(least: int, *given: tuple[str, str | None]) -> int | None:
         if text is None:
             continue
         if not (text.isascii() and text.isdigit() and int(text) >= least):
-            raise FaultError(f"{where}: {text!r} is no whole number from {least} on; give one")
+            raise FaultError(f"{where}: {text!r} is not a whole number of at least {least}; give one")
         return int(text)
     return None

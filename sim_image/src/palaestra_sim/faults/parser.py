@@ -19,7 +19,7 @@ from palaestra_sim.faults.kinds import FaultEvent, InjectedFault, Trigger
 
 _MOST_MS: Final = 3_600_000.0
 _MOST_MIB: Final = 1_048_576.0
-_FLOAT32: Final = struct.Struct("<f")  # the narrowest field that may receive a value
+_FLOAT32: Final = struct.Struct("<f")  # the field with the smallest range that may receive the value
 _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV")
 
 
@@ -151,7 +151,7 @@ class _Reader:
         self._where = where
         name, _, rest = text.partition(":")
         if name not in KINDS:
-            raise self._error(f"there is no fault {name!r}", f"use one of {', '.join(KINDS)}")
+            raise self._error(f"{name!r} is not a fault", f"use one of {', '.join(KINDS)}")
         self._kind = KINDS[name]
         self._given = self._pairs(rest) if rest else {}
         self._events = _CALLS if {"service"} <= self._given.keys() & self._kind.keys else self._kind.events
@@ -166,7 +166,7 @@ class _Reader:
                 raise self._error(f"{key} is not known here", f"use {self._keys()}")
             fields[known.field] = self._read(key, known.read, text)
         if self._kind.needs and not set(self._kind.needs) & given.keys():
-            raise self._error("it does not say how long", f"add {self._kind.needs[0]}=100")
+            raise self._error("it has no duration", f"add {self._kind.needs[0]}=100")
         if {"service", "topic"} <= given.keys():
             raise self._error("it names a service and a topic", "write two faults")
         if "service" not in given:
@@ -180,7 +180,7 @@ class _Reader:
             if not equals:
                 raise self._error(f"{part!r} has no =", "write KEY=VALUE, with commas between")
             if key in pairs:
-                raise self._error(f"{key} is there twice", "leave one")
+                raise self._error(f"{key} is given twice", "remove one")
             pairs[key] = value
         return pairs
 
@@ -188,12 +188,12 @@ class _Reader:
         """Remove the keys of the trigger from `given`, and return the trigger."""
         said = [it for it in ("every", "probability", *FaultEvent) if it in given]
         if len(said) > 1:
-            raise self._error(f"{said[0]} and {said[1]} say two different times", "leave one")
+            raise self._error(f"{said[0]} and {said[1]} set two different times", "remove one")
         event = self._events[0]
         if "on" in given:
             event = self._event(given.pop("on"))
             if set(said) & set(FaultEvent):
-                raise self._error(f"on and {said[0]} both say what is counted", "leave on out")
+                raise self._error(f"on and {said[0]} both set what is counted", "remove on")
         if not said:
             return Trigger(event=event)
         key, text = said[0], given.pop(said[0])

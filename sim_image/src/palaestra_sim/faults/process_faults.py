@@ -73,7 +73,7 @@ class ProcessFaults:
         resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
         if fault.signal is not signal.SIGKILL:
             signal.signal(fault.signal, signal.SIG_DFL)
-        signal.raise_signal(fault.signal)  # to this thread, so that it sends no further response
+        signal.raise_signal(fault.signal)  # this thread gets the signal, so it sends no further response
         return False
 
     def _exit(self, fault: Exit) -> bool:

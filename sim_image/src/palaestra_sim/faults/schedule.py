@@ -25,7 +25,7 @@ class Life:
     Attributes:
         seed: chosen by a person.
         simulator: its name, which distinguishes it from others with that seed.
-        number: of the life, counted from 1 by the program that starts the simulator.
+        number: the number of the life, counted from 1 by the program that starts the simulator.
     """
 
     seed: int = 0

@@ -6,19 +6,21 @@ import argparse
 import sys
 import sysconfig
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 from palaestra_sim.errors import SimError
-from palaestra_sim.message_package.package_writer import make_importable, write
 
 _WRONG = 2
+_GENERATORS = {"genmsg", "genpy"}  # modules of ROS, in a package of the distribution
 
 _EPILOG = """\
 Writes FOLDER/webots_ros. ROS's tools find it if FOLDER is on ROS_PACKAGE_PATH; they find /usr/share without
 that. An installed webots_ros is used instead if it is importable, or earlier on ROS_PACKAGE_PATH.
 
-exit codes: 0; 2 the folder cannot be written, or has a webots_ros that Palaestra did not write
+exit codes: 0; 2 genpy is not installed, the folder cannot be written, or it has a webots_ros that Palaestra
+did not write
 """
 
 
@@ -26,9 +28,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Write the package; return the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        package = write(options.folder)
+        writer = import_module("palaestra_sim.message_package.package_writer")
+        package = writer.write(options.folder)
         if options.importable:
-            make_importable(package, Path(sysconfig.get_path("purelib")))
+            writer.make_importable(package, Path(sysconfig.get_path("purelib")))
+    except ModuleNotFoundError as error:
+        if error.name not in _GENERATORS:
+            raise
+        remedy = "install python3-genpy, and use the Python of the distribution"
+        sys.stderr.write(f"palaestra-webots-ros: {error.name} of ROS is not installed; {remedy}\n")
     except SimError as error:
         sys.stderr.write(f"palaestra-webots-ros: {error}\n")
     except OSError as error:

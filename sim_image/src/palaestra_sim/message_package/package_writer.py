@@ -8,6 +8,7 @@ from pathlib import Path
 
 from palaestra_sim.errors import ForeignPackageError
 from palaestra_sim.message_package.files import MANIFEST, NAME, package_files
+from palaestra_sim.whole_file import write_whole
 
 
 def write(folder: Path) -> Path:
@@ -38,9 +39,7 @@ def make_importable(package: Path, packages_of_python: Path) -> None:
     A package webots_ros that is installed there is imported instead.
     """
     lines = packages_of_python / f"{NAME}.pth"
-    part = lines.with_suffix(".part")
-    part.write_text(f"{package.resolve() / 'src'}\n")
-    part.replace(lines)
+    write_whole(lines, f"{package.resolve() / 'src'}\n".encode())
 
 
 def _check_ours(target: Path) -> None:

@@ -1,6 +1,6 @@
 """MuJoCo as the physics of a scene: masses, forces, contacts, and dynamic solids that move when pushed.
 
-- `cli`: `palaestra-mujoco`
+- `entry`: the start of `palaestra-mujoco`, which refuses a system other than Linux; `cli`: the program
 - `physics`: the bodies and obstacles of a world
 - `model`: builds MuJoCo's model from robots and shapes
 - `geoms`: builds parts of a model from shapes, and sets which of them may touch

@@ -16,7 +16,7 @@ from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.mobile_base import ACCELERATIONS
 from palaestra_sim.scene.shapes import Shape
 
-X, Y, HEADING = 0, 1, 2  # of the three joints
+X, Y, HEADING = 0, 1, 2  # indices of the three joints
 _REST: Final = (0.0, 0.0, 0.0)
 
 
@@ -27,7 +27,7 @@ class MujocoBody:
         build: its parts.
         base: its wheels.
         poses: the pose of each shape of its outline, in its own frame.
-        radius_m: of the circle around its outline.
+        radius_m: the radius of the circle around its outline.
         x, y, heading_rad, c, s, velocity, touched: see `Body`.
     """
 

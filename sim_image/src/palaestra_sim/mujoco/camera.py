@@ -45,7 +45,8 @@ class MujocoCamera:
         numbers = self._pictures.segments(self._place, self._lens)
         owners = [owner(thing.node) for thing in self._pictures.things]
         known = list(dict.fromkeys(it for it in owners if it is not None))
-        # From the number of a visible shape to that of its owner; the last entry is for pixels without one.
+        # The table maps the number of a visible shape to the number of its owner; its last entry is for
+        # pixels without a shape.
         table = np.array([*(-1 if it is None else known.index(it) for it in owners), -1])
         of_owner = table[numbers]
         return {known[at]: _corners(of_owner == at) for at in np.unique(of_owner).tolist() if at >= 0}

@@ -16,7 +16,7 @@ class FreeBody:
 
     Attributes:
         place: its frame in the scene.
-        number: of its body in the model.
+        number: the number of its body in the model.
     """
 
     def __init__(self, place: DynamicFrame, model: Any, data: Any, number: int) -> None:
@@ -27,10 +27,10 @@ class FreeBody:
         self._where = data.qpos[at : at + _PLACE]
         self._speed = data.qvel[speed : speed + _SPEED]
 
-    def begin(self, course: BodyState, changed: dict[DynamicFrame, None]) -> None:
+    def begin(self, state: BodyState, changed: dict[DynamicFrame, None]) -> None:
         """Start from a state; a client's change to the frame adds the frame to `changed`."""
-        self._write(course.pose)
-        self._move(course)
+        self._write(state.pose)
+        self._move(state)
         self.place.put = False
         self.place.changed = changed
         if self.place.speed is not None:
@@ -57,6 +57,6 @@ class FreeBody:
         x, y, z, w = to_quaternion(pose.rotation)
         self._where[:] = (*pose.position, w, x, y, z)
 
-    def _move(self, course: BodyState) -> None:
+    def _move(self, state: BodyState) -> None:
         """Write the velocities of a state; its angular velocity is in world axes."""
-        self._speed[:] = (*course.velocity, *course.pose.inverse.turned(course.turning))
+        self._speed[:] = (*state.velocity, *state.pose.inverse.turned(state.turning))

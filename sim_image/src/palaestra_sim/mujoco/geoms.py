@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from palaestra_sim.mujoco.body import MujocoBody
 
 SEEN: Final = 0  # the group of geoms that rays and contacts meet
-UNSEEN: Final = 1  # the group of a robot's own links during its rays
+UNSEEN: Final = 1  # while a robot's sensors cast rays, the group of its own links
 ROBOTS: Final = 1 << 0  # all robots touch each other
 LOOSE: Final = 1 << 1  # dynamic solids touch each other and robots
 STANDING: Final = 1 << 2  # robots' links and dynamic solids touch obstacles and floors
 _FIRST_ROBOT: Final = 3
 _BITS: Final = 32
 _LEAST_M3: Final = 1e-9
-_LEAST_M: Final = 1e-6  # of the straight part of a capsule
+_LEAST_M: Final = 1e-6  # minimum length of the straight part of a capsule
 FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
 
 _GEOMS: Final = {

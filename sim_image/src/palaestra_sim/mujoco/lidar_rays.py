@@ -17,8 +17,8 @@ from palaestra_sim.scene.sensor_rays import Beam
 
 _GROUPS: Final = np.array([int(group == 0) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
 
-_PAST_M: Final = 1e-6  # behind a triangle
-_MOST_TRIANGLES: Final = 100  # that one ray passes from behind
+_PAST_M: Final = 1e-6  # how far behind a triangle the next ray begins
+_MOST_TRIANGLES: Final = 100  # number of triangles that one ray passes from behind
 
 
 class LidarBeams:
@@ -59,8 +59,10 @@ class LidarBeams:
         if self._own[0] is not visible:
             carrier = self._figure.place
             places = [thing.place for thing in visible.things]
-            own = [at for at, place in enumerate(places) if place is not None and carrier in place.chain()]
-            self._own = (visible, np.array(own, dtype=int))
+            carried = [
+                at for at, place in enumerate(places) if place is not None and carrier in place.chain()
+            ]
+            self._own = (visible, np.array(carried, dtype=int))
         return self._own[1]
 
 

@@ -19,7 +19,8 @@ from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.links import Link, frames_between, link_around
 from palaestra_sim.scene.motors import Motor
 
-_STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # of friction: with the default, a held weight creeps
+# With the defaults, a held weight creeps, and a strong motor drives a joint a centimeter beyond its stop.
+_STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 _TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)
 
 
@@ -113,6 +114,7 @@ def _add_joint(ground: Ground, added: Added) -> None:
         damping=[joint.rubbing.damping, 0.0, 0.0],
         stiffness=[joint.rubbing.spring, 0.0, 0.0],
         solimp_friction=_STIFF,
+        solimp_limit=_STIFF,
         frictionloss=joint.rubbing.friction if joint.motor is None else 0.0,
     )
     if joint.motor is not None:

@@ -40,8 +40,8 @@ from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.physics_settings import PhysicsSettings, material_of
 from palaestra_sim.scene.shapes import Shape
 
-MASS_KG: Final = 23.0  # of a robot without Physics: that of a Robotino 3 with its batteries
-STANDING_KG: Final = 1e5  # of a robot without a drive, so that it stands like a wall
+MASS_KG: Final = 23.0  # mass of a robot without Physics; a Robotino 3 has it with its batteries
+STANDING_KG: Final = 1e5  # mass of a robot without a drive, so that it stands like a wall
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
 
@@ -166,7 +166,8 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
     A body that touches a movable obstacle never sleeps in MuJoCo. So if there are bodies that can sleep,
     obstacles are fixed, except those that have `moved`.
     """
-    courses = [thing.place.course for thing in contents.loose]  # from the previous model, if there was one
+    # The values of the previous model, if there was one.
+    states = [thing.place.course for thing in contents.loose]
     spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
     stands, fixed = _add_obstacles(spec, contents, moved, marks)
     robots = {figure: _add_robot(spec, figure, body, at, marks) for at, (figure, body) in enumerate(moving)}
@@ -196,8 +197,8 @@ def build(contents: Contents, surroundings: PhysicsSettings, moved: frozenset[Fr
         },
     )
     _begin(built)
-    for thing, course in zip(built.loose.values(), courses, strict=True):
-        thing.begin(course, built.changed)
+    for thing, state in zip(built.loose.values(), states, strict=True):
+        thing.begin(state, built.changed)
     built.take()
     built.settle()
     return built

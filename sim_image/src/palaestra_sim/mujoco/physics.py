@@ -31,7 +31,7 @@ from palaestra_sim.scene.sensor_rays import Beam
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.visuals import View
 
-LONGEST_STEP_S: Final = 0.004  # of MuJoCo: with a longer step, contacts are soft
+LONGEST_STEP_S: Final = 0.004  # MuJoCo's step; with a longer one, contacts are soft
 
 
 class MujocoPhysics:
@@ -76,7 +76,7 @@ class MujocoPhysics:
             self._floors = floors
             self._stale = True
         heights = [figure.place.height_m for figure, _ in contents.moving]
-        if heights != self._heights:  # at which they move, and which decide what they touch
+        if heights != self._heights:  # the height at which a robot moves decides what it touches
             self._heights = heights
             self._stale = True
         if contents == self._contents:

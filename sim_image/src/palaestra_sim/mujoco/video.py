@@ -24,7 +24,7 @@ from palaestra_sim.ros_interfaces import UnsimulatedError
 from palaestra_sim.scene.movies import Movie
 
 _CODEC: Final = "libx264"
-_WORST, _STEPS = 51, 41  # of the constant rate factor: quality 0 has 51, quality 100 has 10
+_WORST, _STEPS = 51, 41  # constant rate factor: 51 for quality 0, 10 for quality 100
 _PUBLIC: Final = 0o644
 _UNFINISHED: Final = ".unfinished"
 
@@ -49,7 +49,8 @@ class MujocoVideo:
         self._stream.pix_fmt = "yuv420p"
         rate = _WORST - _STEPS * movie.quality // 100
         self._stream.options = {"crf": str(rate), "preset": "veryfast"}
-        self._stream.thread_count = 1  # the simulator's own: several simulators share the processor
+        # Only the simulator's own thread, because several simulators share the processor.
+        self._stream.thread_count = 1
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame."""

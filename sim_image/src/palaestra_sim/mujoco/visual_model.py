@@ -25,9 +25,9 @@ _QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks
 _AMBIENT: Final = 0.45
 _FROM_CAMERA: Final = 0.25
 _FROM_ABOVE: Final = 0.30
-SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, in axes where z points up
-SKY: Final = 1  # the group of its geom, which is the last one of the model
-PASSED: Final = 2  # the group of geoms through which a lidar's beams pass, during its rays
+SUN: Final = (-0.3, 0.4, -0.866)  # the direction of the sun's light: a unit vector, in axes where z points up
+SKY: Final = 1  # the group of the sky's geom, which is the last geom of the model
+PASSED: Final = 2  # while a lidar measures, the group of the geoms through which its beams pass
 
 
 @dataclass(slots=True, eq=False)
@@ -36,10 +36,10 @@ class VisualModel:
 
     Attributes:
         things: by the number of their geom; the last geom is the sky.
-        positions, rotations: of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
+        positions, rotations: the poses of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
         planes: the numbers of those that are Planes.
         sun: the direction of its light.
-        scene, option, camera: of MuJoCo's visualizer.
+        scene, option, camera: the objects of MuJoCo's visualizer.
     """
 
     things: tuple[Drawn, ...]

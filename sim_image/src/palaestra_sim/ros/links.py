@@ -14,10 +14,11 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# Long enough for roscpp and rospy to close first. A client that reads until the end of stream waits for it.
+# The node closes a connection after this time, so that roscpp and rospy can close first. A client that
+# reads until the end of the stream waits for that.
 LINGER_S = 1.0
 
-# For a client that stops reading in the middle of a long response.
+# The node drops a client that stops reading in the middle of a long response after this time.
 SEND_S = 60.0
 
 

@@ -20,7 +20,7 @@ class PublishedTopic:
     """A published topic and the connections of its subscribers.
 
     Attributes:
-        links: of the connected subscribers.
+        links: the links of the connected subscribers.
         publishers: number of publishers that share the topic.
         reading: the field of the value; "" for the last one.
     """

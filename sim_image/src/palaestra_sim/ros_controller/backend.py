@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from palaestra_protocol.scene import SceneState, VisibleScene
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
@@ -45,6 +46,18 @@ class MotionBackend(Protocol):
         ...
 
 
+class AppearanceInterface(Protocol):
+    """What a viewer sees of a world; nothing is computed before a request."""
+
+    def scene(self, world: str) -> VisibleScene:
+        """Return the looks of the world now; `world` is its name."""
+        ...
+
+    def state(self, time_ms: int) -> SceneState:
+        """Return the poses of what moves, and the positions of joints."""
+        ...
+
+
 class Backend(Protocol):
     """One loaded world. A reload makes another Backend.
 
@@ -61,6 +74,11 @@ class Backend(Protocol):
     time_ms: int
     mode: Mode
     quit_status: int | None
+
+    @property
+    def appearance(self) -> AppearanceInterface:
+        """What a viewer sees of it."""
+        ...
 
     @property
     def motion(self) -> MotionBackend:

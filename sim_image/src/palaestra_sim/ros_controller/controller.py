@@ -16,6 +16,7 @@ response, but its messages are lost. Without it, the messages of the previous st
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -49,6 +50,7 @@ from palaestra_sim.scene.stepping import Stepping
 
 _MODEL_NAME = "/model_name"
 _CLOCK = "/clock"
+_CAMERA = "Camera"
 
 
 class RosController:
@@ -133,6 +135,17 @@ class RosController:
         if self._arguments.auto_publish:
             self._enable_all()
         self._serve(services.device_list())
+
+    def pictures(self) -> Iterator[tuple[str, tuple[int, int], bytes | memoryview]]:
+        """Yield name, width and height, and the newest picture of each camera that has sent one.
+
+        A pixel has four bytes: blue, green, red, alpha.
+        """
+        for name, (kind, _) in self.robot.parts.devices.rows.items():
+            if kind.node == _CAMERA:
+                image = self._outlets[name].feeds[0]
+                if image.newest is not None:
+                    yield name, (image.constants["width"], image.constants["height"]), image.newest
 
     def close(self) -> None:
         """Remove the robot from the steps, and its services and topics from ROS."""

@@ -14,7 +14,7 @@ from palaestra_sim.ros_controller.backend import Backend
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.tree.fields import NodeField
 
-_FIRST_ADDRESS: Final = 0x5580_0000_0000  # where Linux places the heap of a position-independent program
+_FIRST_ADDRESS: Final = 0x5580_0000_0000  # Linux places the heap of a position-independent program there
 _LOAD_SPACING: Final = 0x0001_0000_0000
 _SPACING: Final = 0x90
 
@@ -27,7 +27,7 @@ class Handles:
     """The handles of one load of a world.
 
     Args:
-        simulation: of that world.
+        simulation: the simulation of that world.
         load: number of earlier loads, so that handles of different loads differ.
     """
 

@@ -16,7 +16,7 @@ from palaestra_sim.scene.devices.device_type import DeviceTopic, Enable, whole_s
 from palaestra_sim.scene.robot import Robot
 
 _MOST_KEYS: Final = 7  # Webots reports at most this many keys at once
-_AXES: Final = 6  # of the joystick that our services connect: a gamepad with two sticks and two triggers
+_AXES: Final = 6  # our services connect a gamepad with two sticks and two triggers
 _POVS: Final = 1
 _BYTE: Final = (-128, 127)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.whole_file import write_whole
 
-_MOST_PLACES: Final = 8  # in one line
+_MOST_PLACES: Final = 8  # a line names at most so many places
 
 
 def write_left_out(left_out: Iterable[WorldError], file: Path) -> None:
@@ -18,12 +18,7 @@ def write_left_out(left_out: Iterable[WorldError], file: Path) -> None:
     Raises:
         OSError: it cannot be written; no partial file is left.
     """
-    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        unfinished.write_text("".join(f"{line}\n" for line in left_out_lines(left_out)), "utf-8")
-        unfinished.replace(file)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    write_whole(file, "".join(f"{line}\n" for line in left_out_lines(left_out)).encode())
 
 
 def left_out_lines(left_out: Iterable[WorldError]) -> Iterator[str]:

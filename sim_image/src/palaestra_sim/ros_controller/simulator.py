@@ -39,7 +39,7 @@ class RunningSimulator:
         clock: returns seconds of real time, from any origin.
 
     Attributes:
-        simulation: of the world that is loaded now.
+        simulation: the simulation of the world that is loaded now.
         controllers: by ROS name, of the robots whose controller is "ros".
         quit_status: the exit status from `simulation_quit`; None before.
 

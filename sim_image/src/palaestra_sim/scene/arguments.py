@@ -38,10 +38,10 @@ def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     if not names and not reading.leave_out.names:
         reading.refuse(node, "controllerArgs without --name=", "generate the world")
     if "--synchronize" not in texts and not reading.leave_out.names:
-        fact = f"controllerArgs without --synchronize: {reading.simulator} steps only when it is asked to"
+        fact = f"controllerArgs without --synchronize: {reading.simulator} steps only on request"
         reading.refuse(node, fact, "add it")
     for text in texts:
         if text in _REFUSED:
-            reading.lacks(node, f"{reading.simulator} knows no {text}")
+            reading.lacks(node, f"{reading.simulator} does not know {text}")
     name = names[-1] if names else ""
     return ControllerArguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

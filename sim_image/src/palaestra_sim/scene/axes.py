@@ -25,7 +25,7 @@ def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
     system = node.text("coordinateSystem") or ("NUE" if of_old_axes(node) else "ENU")
     if system not in _SYSTEMS:
         known = ", ".join(_SYSTEMS)
-        reading.refuse(node, f'coordinateSystem "{system}" is none of {known}', "write one of them")
+        reading.refuse(node, f'coordinateSystem "{system}" is not one of {known}', "write one of them")
         return None
     reading.system = system
     return YUp() if system.index("U") == 1 else None

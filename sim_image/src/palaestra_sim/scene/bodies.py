@@ -36,7 +36,7 @@ class Body(Protocol):
 
     Attributes:
         base: its wheels.
-        x, y: of its origin in the world, in meters, in the axes of the ground.
+        x, y: the position of its origin in the world, in meters, in the axes of the ground.
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.

@@ -11,8 +11,8 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 # Left, top, right and bottom in pixels from the top left; right and bottom are exclusive.
 Corners = tuple[int, int, int, int]
 
-MOST_PIXELS: Final = 4096  # in a row or column
-_WIDEST_RAD: Final = 3.1  # of a flat image
+MOST_PIXELS: Final = 4096  # limit for a row and for a column
+_WIDEST_RAD: Final = 3.1  # widest field of view of a flat image
 
 
 @dataclass(slots=True, kw_only=True)

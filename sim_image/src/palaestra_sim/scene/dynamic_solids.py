@@ -110,7 +110,7 @@ class DynamicSolid:
         node: its Solid.
         place: its frame.
         shapes: the shapes with which it and the Solids inside it collide.
-        densities: of the shapes, in kg/m3.
+        densities: the densities of the shapes, in kg/m3.
     """
 
     node: SceneNode

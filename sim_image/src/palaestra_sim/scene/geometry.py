@@ -6,6 +6,7 @@ Rotations are 3 x 3 matrices as nine floats, row after row. The planar motion of
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 Vector = tuple[float, float, float]
@@ -106,6 +107,11 @@ def from_axis_angle(rotation: AxisAngle) -> Matrix:
         t * y * z + s * x,
         t * z * z + c,
     )
+
+
+def triple(numbers: Sequence[float]) -> Vector:
+    """Return the first three numbers."""
+    return numbers[0], numbers[1], numbers[2]
 
 
 def minus(a: Vector, b: Vector) -> Vector:

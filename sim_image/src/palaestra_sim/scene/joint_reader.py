@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import triple
 from palaestra_sim.scene.joints import Joint, JointFrame, Rubbing, unit
 from palaestra_sim.scene.links import Link, link_around
 from palaestra_sim.scene.mass import read_matter
@@ -24,13 +24,13 @@ def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint |
     slides = node.type_name == "SliderJoint"
     parameters = parameters_of(node)
     along = reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0))
-    axis = unit(_triple(along))
+    axis = unit(triple(along))
     if axis is None:
         reading.refuse(parameters, "a joint with an axis of length 0", "write its direction")
         return None
     joint = Joint(
         axis=axis,
-        anchor=_triple(reading.vector(parameters, "anchor", (0.0, 0.0, 0.0))),
+        anchor=triple(reading.vector(parameters, "anchor", (0.0, 0.0, 0.0))),
         slides=slides,
         start=reading.number(parameters, "position", 0.0),
     )
@@ -69,7 +69,3 @@ def fill_door(reading: NodeReader, link: Link, inner: Sequence[Link], shapes: Se
         for node in nodes
         if (place := node.place) is not None and link_around(place, links) is link
     )
-
-
-def _triple(numbers: tuple[float, ...]) -> Vector:
-    return numbers[0], numbers[1], numbers[2]

@@ -44,8 +44,8 @@ class Joint:
         motor: the motor that moves it; None if it stays where it is set, unless a physics moves it.
         stops: the positions that it never passes; equal ones mean no stops.
         rubbing: its resistance to motion.
-        position: of a joint without a motor, in rad or m.
-        speed: of a joint without a motor, in rad/s or m/s.
+        position: the position of a joint without a motor, in rad or m.
+        speed: the speed of a joint without a motor, in rad/s or m/s.
         brake: the damping by the brake of a joint without a motor, in N m s/rad.
     """
 

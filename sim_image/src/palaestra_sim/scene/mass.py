@@ -12,13 +12,17 @@ from typing import Final
 
 from palaestra_sim.scene import meshes
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.geometry import Vector, triple
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 
 DENSITY: Final = 1000.0  # kg/m3, the default of Physics.density
-_FILLED: Final = {"box": 1.0, "cylinder": math.pi / 4.0, "ball": math.pi / 6.0}  # of the box around it
+_FILLED: Final = {
+    "box": 1.0,
+    "cylinder": math.pi / 4.0,
+    "ball": math.pi / 6.0,
+}  # share of the box around the shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,7 +56,7 @@ def read_matter(
             density = reading.number(physics, "density", DENSITY)
             mass_kg = max(density, 0.0) * sum(map(volume_m3, shapes))
         if physics.numbers("centerOfMass"):
-            center = _triple(reading.vector(physics, "centerOfMass", (0.0, 0.0, 0.0)))
+            center = triple(reading.vector(physics, "centerOfMass", (0.0, 0.0, 0.0)))
         if physics.numbers("inertiaMatrix"):
             inertia = reading.vector(physics, "inertiaMatrix", (0.0,) * 6)
     return MassProperties(place=place, shapes=tuple(shapes), mass_kg=mass_kg, center=center, inertia=inertia)
@@ -66,7 +70,3 @@ def volume_m3(shape: Shape) -> float:
     if shape.kind == "capsule":
         return math.pi / 4.0 * x * x * (z - x / 3.0)
     return x * y * z * _FILLED[shape.kind]
-
-
-def _triple(numbers: tuple[float, ...]) -> Vector:
-    return numbers[0], numbers[1], numbers[2]

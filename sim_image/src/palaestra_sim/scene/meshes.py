@@ -11,16 +11,16 @@ from typing import Final, NamedTuple
 from palaestra_sim.scene.geometry import Vector, cross, dot, minus
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-_SIDES: Final = 20  # of a cone
-_CORNERS: Final = 3  # of a triangle
+_SIDES: Final = 20  # a cone is drawn with so many sides
+_CORNERS: Final = 3  # a triangle has three
 _FEW: Final = 4  # a face with at most so many corners is treated as convex; most have three or four
 _LARGEST_M: Final = 1e5
 _PARALLEL: Final = 1e-12
-_THIN_M: Final = 1e-4  # a mesh that is thinner is flat
+_THIN_M: Final = 1e-4  # a mesh that is thinner than this counts as flat
 _SHEET_M: Final = 1e-3
 
-_FEW_TRIANGLES: Final = 8  # that are tried one by one
-_SLACK_M: Final = 1e-9  # of a ray along the side of a box
+_FEW_TRIANGLES: Final = 8  # up to this number, a ray tries all triangles
+_SLACK_M: Final = 1e-9  # tolerance for a ray along the side of a box
 
 Triangle = tuple[int, int, int]
 Corners = tuple[Vector, Vector, Vector]
@@ -49,7 +49,7 @@ class _Part(NamedTuple):
     Attributes:
         low, high: the corners of the box around them.
         inner: their halves, if there are many.
-        corners: of each triangle, if there are few.
+        corners: the corners of each triangle, if there are few.
     """
 
     low: Vector

@@ -17,6 +17,7 @@ from operator import sub
 from typing import Final
 
 from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.steering import SteeredDrive
 from palaestra_sim.scene.wheel_kinematics import Drive
 
 ACCELERATIONS: Final = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2
@@ -37,7 +38,7 @@ class MobileBase:
 
     __slots__ = ("_kinematic", "_step_s", "_wheels", "drive", "omega", "vx", "vy")
 
-    def __init__(self, wheels: Sequence[Motor] = (), drive: Drive | None = None) -> None:
+    def __init__(self, wheels: Sequence[Motor] = (), drive: Drive | SteeredDrive | None = None) -> None:
         if drive is not None and len(wheels) != len(drive.to_speeds):
             raise ValueError(f"{len(wheels)} motors do not fit a drive of {len(drive.to_speeds)} wheels")
         self.drive = drive
@@ -80,7 +81,7 @@ class MobileBase:
             wheel.angle_rad += wheel.speed_rad_s * step_s
         return bool(self.vx or self.vy or self.omega)
 
-    def _approach(self, step_s: float, law: Drive) -> None:
+    def _approach(self, step_s: float, law: Drive | SteeredDrive) -> None:
         """Change the speeds of the wheels toward those that their motors demand."""
         wheels = self._wheels
         speeds = [wheel.speed_rad_s for wheel in wheels]
@@ -97,3 +98,20 @@ class MobileBase:
             wheel.changed = not wheel.steady
         self.vx, self.vy, self.omega = law.twist(demands)
         self._step_s = step_s
+
+
+class SteeredBase(MobileBase):
+    """The wheels of a robot of which some are steered; their angles change the drive."""
+
+    __slots__ = ("_steered",)
+
+    def __init__(self, wheels: Sequence[Motor], drive: SteeredDrive) -> None:
+        super().__init__(wheels, drive)
+        self._steered = drive
+
+    def turn(self, step_s: float) -> bool:
+        """Turn the wheels for one basic step; return whether they move the robot."""
+        if self._steered.changed():
+            for wheel in self._wheels:
+                wheel.changed = True
+        return super().turn(step_s)

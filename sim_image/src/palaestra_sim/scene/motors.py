@@ -48,14 +48,14 @@ class Motor:
     The names are those of a rotational motor; the angles of a linear one are lengths in meters.
 
     Attributes:
-        speed_rad_s: of the shaft.
-        angle_rad: of the shaft, since the start or the last reset.
+        speed_rad_s: the speed of the shaft.
+        angle_rad: the angle of the shaft, since the start or the last reset.
         asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
         gains: P, I and D of its controller.
         kinematic: whether its joint has no physics. Then the available torque limits its acceleration, as in
             Webots, and it keeps the commanded velocity up to its target.
         changed: whether a command came since the physics last read it; the physics clears it.
-        damping: of the joint, in N m s/rad, set by its brake; 0 without a brake.
+        damping: the damping of the joint, in N m s/rad, set by its brake; 0 without a brake.
         forceful: whether the physics moves it by forces.
         effort_nm: the torque that a client set instead of a position; None if there is no such command.
         feedback_nm: the torque that it applied in the last basic step.
@@ -128,7 +128,7 @@ class Motor:
     def halt(self) -> None:
         """Stop the shaft; the motor starts from rest."""
         self.speed_rad_s = 0.0
-        self._rate = 0.0  # of a kinematic motor: its current velocity
+        self._rate = 0.0  # current velocity of a kinematic motor
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:

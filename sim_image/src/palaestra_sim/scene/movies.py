@@ -27,7 +27,7 @@ class Movie:
     """A movie that a client requests.
 
     Attributes:
-        path: of its file, absolute or relative to the working directory of the simulator.
+        path: the path of its file, absolute or relative to the working directory of the simulator.
         size: width and height in pixels.
         quality: from 1 to 100.
         acceleration: simulated seconds per second of the movie.
@@ -67,7 +67,7 @@ class Movies:
     Args:
         view: returns a camera of that size at the current Viewpoint; None if the simulator does not render.
         film: returns a writer for a movie; None if the simulator does not render.
-        basic_step_ms: of the simulation.
+        basic_step_ms: the basic step of the simulation.
 
     Attributes:
         failed: whether the last movie failed.
@@ -102,13 +102,13 @@ class Movies:
         if self._film is not None:
             raise UnsimulatedError("a movie is being recorded; stop it first")
         self.failed = True
-        eye = self._view(movie.size)
-        if eye is None:
+        camera = self._view(movie.size)
+        if camera is None:
             return False
         _require_possible(movie)
         self._every_ms = frame_step_ms(movie.acceleration, self._basic_step_ms)
         frames_s = Fraction(1000 * movie.acceleration, self._every_ms)
-        eye.open()
+        camera.open()
         self._size = movie.size
         try:
             self._film = self._new_film(replace(movie, frames_s=frames_s))
@@ -126,9 +126,9 @@ class Movies:
         self._elapsed_ms += self._basic_step_ms
         if self._elapsed_ms % self._every_ms:
             return
-        eye = self._view(self._size)  # again for each frame, because a client may have moved the Viewpoint
-        if eye is not None:
-            pixels = eye.colors()
+        camera = self._view(self._size)  # again for each frame, because a client may have moved the Viewpoint
+        if camera is not None:
+            pixels = camera.colors()
             self._try(lambda: film.add(pixels))
 
     def stop(self) -> None:

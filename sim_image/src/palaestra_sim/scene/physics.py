@@ -51,7 +51,7 @@ class Abilities:
     """The contents of a world that a physics simulates; other contents are refused when the world is read.
 
     Attributes:
-        name: of the simulator, in messages.
+        name: the name of the simulator, in messages.
         loose: whether Solids with physics move when they are pushed.
         leaning: whether shapes may have any rotation.
         forces: whether forces have an effect.

@@ -12,8 +12,8 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
 DEFAULT: Final = "default"  # the material of a Solid that does not name one
-_COULOMB: Final = 1.0  # of two materials without ContactProperties
-_ENDLESS: Final = 100.0  # for -1, which is infinite in Webots
+_COULOMB: Final = 1.0  # friction of two materials without ContactProperties
+_ENDLESS: Final = 100.0  # replaces -1, which stands for infinite friction in Webots
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class PhysicsSettings:
         gravity_m_s2: downward.
         frictions: the coefficients of pairs of materials, for those that have ContactProperties.
         floor: the material of the floors.
-        floors: of the world; without any, the world has one at height 0.
+        floors: the floors of the world; without any, the world has one at height 0.
     """
 
     gravity_m_s2: float = 9.81

@@ -25,10 +25,10 @@ def save(
     """Write an image to a PNG or JPEG file; return whether it could be written.
 
     Args:
-        path: of the file.
+        path: the path of the file.
         size: width and height.
         pixels: blue, green, red and alpha of each, row by row from the top left.
-        quality: of a JPEG file, from 1 to 100.
+        quality: the quality of a JPEG file, from 1 to 100.
         alpha: whether a PNG file stores it.
 
     Raises:

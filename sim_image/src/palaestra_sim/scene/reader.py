@@ -48,7 +48,7 @@ DRAWN_ONLY: Final = frozenset(
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 _ONE_AXIS: Final = frozenset(("HingeJoint", "SliderJoint"))
-_LEAST_M3: Final = 1e-9  # of shapes with a mass
+_LEAST_M3: Final = 1e-9  # minimum volume of a shape with a mass
 _JOINTS: Final = _ONE_AXIS | frozenset(("BallJoint", "Hinge2Joint"))
 
 
@@ -136,7 +136,7 @@ def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -
 def _read_world_info(reading: NodeReader, node: SceneNode, scene: SceneContents) -> None:
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
-        fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
+        fact = f"basicTimeStep {step_ms:g} is not a whole number of milliseconds"
         reading.refuse(node, fact, "write a whole number, because the controller counts whole milliseconds")
     scene.basic_step_ms = int(step_ms)
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
@@ -266,7 +266,7 @@ def _read_solid(reading: NodeReader, node: SceneNode, place: Frame, scene: Scene
         fact = f"a {node.type_name} with physics moves when it is pushed, which {name} does not simulate"
         reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
     if node.type_name == "Track" and node.nodes("device"):
-        fact = f"a Track with devices moves what stands on it, which {name} does not simulate"
+        fact = f"a Track with devices moves the objects on it, which {name} does not simulate"
         reading.lacks(node, fact)
     shapes = list(bounding_shapes(reading, node, place))
     if node.nodes("physics"):

@@ -22,7 +22,7 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motion import Motion, Trail, motion_of
 from palaestra_sim.scene.motors import Motor
-from palaestra_sim.scene.nodes.scene_node import FieldContent
+from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.scene.physics import Cast, Physics
 from palaestra_sim.scene.robot_reader import RobotParts
 from palaestra_sim.scene.sensor_rays import Beam
@@ -41,6 +41,7 @@ class Robot:
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
         body: None if nothing moves it and nothing can collide with it.
+        time_s: the time of the world since its start or its last reset.
         powered: whether its motors turn; without energy they do not.
         links: the parts that forces move on its joints.
         battery: its battery; its value is -1 if the robot has no battery.
@@ -56,6 +57,7 @@ class Robot:
         self.place: Frame = parts.place
         self.body: Body | None = parts.body
         self.battery = Battery(parts.node)
+        self.time_s = 0.0
         self.powered = True
         self._has_battery = self.battery.value >= 0.0
         self.seed = random_seed
@@ -99,6 +101,10 @@ class Robot:
         """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
         return VisualRays(self._view, self.place, beams, textures=True).cast
 
+    def lights(self) -> Sequence[SceneNode]:
+        """Return the lights of the world now; see `Carrier`."""
+        return self._view.lights()
+
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
         """Return a camera at a frame; None if this simulator does not render; see `Carrier`."""
         return self._physics.eye(place, lens)
@@ -120,6 +126,7 @@ class Robot:
 
     def begin(self, step_s: float) -> None:
         """Begin a basic step; if the battery is empty, stand still."""
+        self.time_s += step_s
         if self._has_battery:
             self.powered = not self._exhausted(step_s)
             if not self.powered:
@@ -141,6 +148,7 @@ class Robot:
     def reset(self) -> None:
         """Return to the start in the world file: pose, rest, motors, battery, noise; customData is kept."""
         self.battery.reset()
+        self.time_s = 0.0
         self.powered = True
         self.place.return_to_start()
         for motor in self.motors.values():

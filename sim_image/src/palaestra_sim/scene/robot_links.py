@@ -14,12 +14,13 @@ from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.joints import JointFrame
 from palaestra_sim.scene.links import Link, link_around
 from palaestra_sim.scene.mass import MassProperties, read_matter
+from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheels import Driven
 
-_CLEARANCE_M: Final = 0.01  # an end that is nearer to the floor rolls on it
+_CLEARANCE_M: Final = 0.01  # the end of a joint that is nearer to the floor rolls on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,12 +31,14 @@ class Parts:
         nodes: each node with its frame, outer ones first.
         shapes: all shapes that may touch something.
         wheels: the wheels that drive the robot.
+        steering: the motors that steer its wheels.
         measured: parts whose force on the robot is measured, still without shapes and masses.
     """
 
     nodes: Sequence[tuple[SceneNode, Frame]]
     shapes: Sequence[Shape]
     wheels: Sequence[Driven]
+    steering: Sequence[Motor]
     measured: Sequence[Link]
 
     @property
@@ -86,7 +89,7 @@ def _matter_on(
 def _moves(end: JointFrame, parts: Parts) -> bool:
     """Return whether forces move the end of a joint."""
     motors = [place.joint.motor for place in end.chain() if isinstance(place, JointFrame)]
-    rolling = {found.motor for found in parts.wheels}
+    rolling = {found.motor for found in parts.wheels} | set(parts.steering)
     if any(motor in rolling for motor in motors if motor is not None):
         return False
     if not any(end in place.chain() for _, place in parts.heavy):

@@ -27,10 +27,10 @@ from palaestra_sim.scene.geometry import (
     turned,
 )
 from palaestra_sim.scene.joint_reader import parameters_of, read_joint
-from palaestra_sim.scene.joints import Joint, JointFrame, unit
+from palaestra_sim.scene.joints import Joint, JointFrame
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.mass import MassProperties
-from palaestra_sim.scene.mobile_base import MobileBase
+from palaestra_sim.scene.mobile_base import MobileBase, SteeredBase
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
@@ -38,23 +38,15 @@ from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.robot_frame import RobotFrame, TurnedFrame
 from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.steering import SteeredDrive, Tire, find_steered_drive
 from palaestra_sim.scene.validation import NodeReader
-from palaestra_sim.scene.wheel_kinematics import find_drive
-from palaestra_sim.scene.wheels import Driven, wheels_among
+from palaestra_sim.scene.wheel_kinematics import Drive, find_drive
+from palaestra_sim.scene.wheel_reader import read_rolling
+from palaestra_sim.scene.wheels import Driven, Rolling, tires_among, wheels_among
 
+_LIGHTS: Final = ("DirectionalLight", "PointLight", "SpotLight")
 # A SolidReference closes a loop of joints; the solid is read at its own place.
-_INERT: Final = frozenset(
-    (
-        "Shape",
-        "CadShape",
-        "DirectionalLight",
-        "PointLight",
-        "SpotLight",
-        "Slot",
-        "SolidReference",
-        "TrackWheel",
-    )
-)
+_INERT: Final = frozenset(("Shape", "CadShape", *_LIGHTS, "Slot", "SolidReference", "TrackWheel"))
 _MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
 _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
 _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid", "Track"}
@@ -104,11 +96,13 @@ class _RobotReader:
         # The robot's pose does not affect its parts, so they are read in its own frame, with z up.
         self._y_points_up = self._has_y_up()
         self._frame = Frame(None, (0.0, 0.0, 0.0), to_axis_angle(Y_UP if self._y_points_up else IDENTITY))
-        self._outline: list[Shape] = []  # of parts that are fixed to the robot
-        self._on_joints: list[Shape] = []  # of parts that turn in place: wheels, casters
-        self._carried: list[Shape] = []  # of parts that motors move, in a physics with forces
+        self._outline: list[Shape] = []  # shapes of parts that are fixed to the robot
+        self._on_joints: list[Shape] = []  # shapes of parts that turn in place: wheels, casters
+        self._carried: list[Shape] = []  # shapes of parts that motors move, in a physics with forces
         self._measured: list[Link] = []
         self._driven: list[Driven] = []
+        self._idle: list[Rolling] = []  # wheels without motors
+        self._steering: list[Motor] = []  # they steer wheels
         self._parts: list[tuple[SceneNode, Frame]] = []
 
     def read(self) -> RobotParts:
@@ -118,8 +112,7 @@ class _RobotReader:
             self._lacks(node, "a robot with a scale")
         self._outline += bounding_shapes(reading, node, self._frame)
         self._read_children(node, self._frame)
-        wheels = wheels_among(self._driven)
-        drive = find_drive([found.wheel() for found in wheels])
+        wheels, drive = self._find_drive()
         if node.nodes("physics"):
             for found in wheels:  # the robot with its wheels is one body, so they count as having physics
                 found.motor.kinematic = False
@@ -133,7 +126,10 @@ class _RobotReader:
         heights = self._heights(wheels)
         body = None
         if moves:
-            base = MobileBase([it.motor for it in wheels], drive)
+            motors = [it.motor for it in wheels]
+            base = MobileBase(motors, drive)
+            if isinstance(drive, SteeredDrive):
+                base = SteeredBase(motors, drive)
             body = self._physics.body(
                 Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
             )
@@ -151,6 +147,19 @@ class _RobotReader:
             links=links,
         )
 
+    def _find_drive(self) -> tuple[list[Driven], Drive | SteeredDrive | None]:
+        """Return the wheels whose motors move the robot, and their drive."""
+        tires = tires_among(self._driven, self._idle)
+        found = [Tire(wheel=it.wheel(), driven=isinstance(it, Driven), steer=it.steer) for it in tires]
+        steered = find_steered_drive(found)
+        if steered is not None:
+            turning = [it for it in tires if it.steer is not None]
+            self._on_joints += [it.shape for it in turning]
+            self._steering += [it.steer.motor for it in turning if it.steer is not None]
+            return [it for it in tires if isinstance(it, Driven)], steered
+        wheels = wheels_among([it for it in self._driven if it.steer is None])
+        return wheels, find_drive([it.wheel() for it in wheels])
+
     @property
     def _forces(self) -> bool:
         return self._physics.abilities.joints
@@ -160,6 +169,7 @@ class _RobotReader:
             nodes=[(self._node, self._frame), *self._parts],
             shapes=(*shapes, *self._carried),
             wheels=wheels,
+            steering=self._steering,
             measured=self._measured,
         )
 
@@ -289,41 +299,14 @@ class _RobotReader:
         inner = JointFrame(place, reading.translation(end), reading.rotation(end), joint)
         if end.type_name == "Solid":
             shapes = list(bounding_shapes(reading, end, inner))
-            found = self._as_driven(joint, place, shapes, end)
-            if found is not None:
+            found = read_rolling(reading, joint, place, shapes, end)
+            if isinstance(found, Driven):
                 self._driven.append(found)
-            if found is not None or joint.motor is None:
+            elif found is not None:
+                self._idle.append(found)
+            if joint.motor is None or (found is not None and found.steer is None):
                 self._on_joints += shapes
         self._read_frame(end, inner)
-
-    def _as_driven(
-        self, joint: Joint, place: Frame, shapes: Sequence[Shape], end: SceneNode
-    ) -> Driven | None:
-        round_ones = [shape for shape in shapes if shape.kind not in {"box", "mesh"}]
-        if joint.motor is None or joint.slides or not round_ones or _moves(place):
-            return None
-        frame = place.world_pose
-        return Driven(
-            motor=joint.motor,
-            axle=turn(frame.rotation, joint.axis),
-            anchor=frame.carry(joint.anchor),
-            shape=max(round_ones, key=lambda shape: shape.size[0]),
-            roller=self._lowest_roller(end, JointFrame(place, *_where(self._reading, end), joint)),
-        )
-
-    def _lowest_roller(self, wheel: SceneNode, place: Frame) -> Vector | None:
-        """Return the axis of the wheel's roller that touches the floor; None if the wheel has no rollers."""
-        lowest: tuple[float, Vector] | None = None
-        for node in wheel.nodes():
-            parameters = next(iter(node.nodes("jointParameters")), None)
-            if node.type_name != "HingeJoint" or parameters is None or node.nodes("device"):
-                continue
-            axis = unit(_triple(self._reading.vector(parameters, "axis", (1.0, 0.0, 0.0))))
-            anchor = _triple(self._reading.vector(parameters, "anchor", (0.0, 0.0, 0.0)))
-            height = place.world_pose.carry(anchor)[2]
-            if axis is not None and (lowest is None or height < lowest[0]):
-                lowest = height, turn(place.world_pose.rotation, axis)
-        return None if lowest is None else lowest[1]
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
         """Read a joint without motors, such as a caster, as fixed, with all parts on it."""
@@ -399,7 +382,3 @@ def _end_has_physics(joint: SceneNode) -> bool:
 
 def _where(reading: NodeReader, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:
     return reading.translation(node), reading.rotation(node)
-
-
-def _triple(numbers: tuple[float, ...]) -> Vector:
-    return numbers[0], numbers[1], numbers[2]

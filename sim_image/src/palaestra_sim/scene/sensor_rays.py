@@ -11,7 +11,7 @@ from palaestra_sim.scene.geometry import Pose, Vector, turn
 Ray = tuple[float, float, float, float]
 
 _LEVEL: Final = 1e-3  # a smaller slope counts as level
-_STEEPEST: Final = 1e-6  # of a vertical ray: its distance along the floor for each meter
+_STEEPEST: Final = 1e-6  # a vertical ray moves less than this along the floor for each meter
 
 
 class Beam(NamedTuple):
@@ -19,7 +19,7 @@ class Beam(NamedTuple):
 
     Attributes:
         ray: in the robot's frame, seen from above.
-        height_m: of its origin, in the robot's frame.
+        height_m: the height of its origin, in the robot's frame.
         slope: the height that it gains for each meter along the floor.
         reach_m: the distance beyond which the sensor's value is constant.
     """
@@ -45,7 +45,8 @@ def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
     """Return the beam that starts at the origin of a frame, in a direction of this frame."""
     dx, dy, dz = turn(pose.rotation, direction)
     along = math.hypot(dx, dy)
-    if along < _STEEPEST:  # any direction will do; one from rounding errors would not have length 1
+    # Any direction is right; a direction made of rounding errors would not have length 1.
+    if along < _STEEPEST:
         dx, dy, along = _STEEPEST, 0.0, _STEEPEST
     slope = dz / along
     ray = pose.position[0], pose.position[1], dx / along, dy / along

@@ -16,9 +16,9 @@ from palaestra_sim.scene.validation import NodeReader
 
 _ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
-_ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
-_LEAST_M: Final = 1e-3  # of a side of the box around points
-_ACROSS: Final = 1e-3  # of a unit vector: level, to within a milliradian
+_ALONG: Final = 1.0 - 0.5e-6  # z of a unit vector that is vertical to within a milliradian
+_LEAST_M: Final = 1e-3  # minimum side of the box around points
+_ACROSS: Final = 1e-3  # z of a unit vector that is level to within a milliradian
 
 Kind = Literal["box", "cylinder", "ball", "capsule", "mesh"]
 
@@ -120,7 +120,7 @@ def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -
         case "Group" | "Pose" | "Transform":
             pose, scale = reading.pose(node), reading.scale(node)
             if min(scale) <= 0.0 or not (grown.even or pose.rotation == IDENTITY):
-                reading.lacks(node, f"a {node.type_name} with a scale that distorts what is in it")
+                reading.lacks(node, f"a {node.type_name} with a scale that distorts the shapes in it")
                 return
             for inner in node.nodes():
                 yield from _shapes(reading, inner, place, grown.inside(pose, scale))
@@ -129,7 +129,7 @@ def _shapes(reading: NodeReader, node: SceneNode, place: Frame, grown: _Grown) -
             local = standing(node, grown.frame)
             normal = place.ground_pose.after(local).rotation[8]
             if abs(normal) < _FLAT:
-                reading.lacks(node, "a Plane that is no floor and no ceiling")
+                reading.lacks(node, "a Plane that is neither a floor nor a ceiling")
             elif normal > 0.0 and not any(around.type_name == "Robot" for around in node.ancestors()):
                 reading.floors.append((place, local))
         case "IndexedFaceSet":

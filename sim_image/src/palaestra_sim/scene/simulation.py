@@ -7,8 +7,7 @@
     simulation.step(192)
     robot.sensors["ir1"].value
 
-The same world, commands and seed give the same values, bit for bit. Time advances only by steps; no clock is
-read.
+The same world, commands and seed give the same values, bit for bit. Only steps advance the time.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ import math
 from collections.abc import Callable
 
 from palaestra_sim.errors import SimError, WorldError
+from palaestra_sim.scene.appearance import Appearance
 from palaestra_sim.scene.devices.connector import Connector
 from palaestra_sim.scene.devices.radar import Radar
 from palaestra_sim.scene.frames import Frame
@@ -52,14 +52,16 @@ class Simulation:
         time_ms: simulated time; a reset sets it to 0.
         mode: for the program that paces the steps; `step` itself works in all three.
         quit_status: the exit status that `quit` requested; None before.
-        motion: of robots and dynamic solids, for a supervisor.
+        motion: the motion of robots and dynamic solids, for a supervisor.
         movies: recordings of the Viewpoint's view.
+        appearance: what a viewer sees.
     """
 
     def __init__(self, tree: SceneTree, scene: SceneContents, mode: Mode) -> None:
         self.tree = tree
         self.scene = scene
         self._view = View(tree.root)
+        self.appearance = Appearance(self._view, lambda: self.robots)
         self.movies = Movies(
             lambda size: view(tree.root, scene.physics, size), scene.physics.film, scene.basic_step_ms
         )
@@ -71,13 +73,12 @@ class Simulation:
         self.mode = mode
         self.quit_status: int | None = None
         self._pending: list[Callable[[], None]] = []
-        self._reset_asked = False
+        self._reset_asked = self._solids_moved = False
         self._added: list[SceneNode] = []
         self.motion = NodeMotion(scene, self.robot_of)
         self._states = States(tree.nodes.values())
         self._assemble()
         self._step_s = scene.basic_step_ms / 1000.0
-        self._solids_moved = False
         scene.physics.begin(scene.surroundings)
         self._arrange()
 
@@ -107,9 +108,9 @@ class Simulation:
         Args:
             world: the parsed world.
             physics: moves its robots.
-            name: of its file, in errors.
+            name: the name of its file, in errors.
             mode: the mode at the start.
-            descriptions: of the types that are not base types.
+            descriptions: the descriptions of the types that are not base types.
             leave_out: the nodes that may be left out, if they cannot be simulated.
 
         Raises:
@@ -160,8 +161,8 @@ class Simulation:
         count, rest = divmod(duration_ms, self.scene.basic_step_ms)
         if rest or count < 1:
             raise ValueError(
-                f"step: {duration_ms} ms is no multiple of the basic step;"
-                f" use one of {self.scene.basic_step_ms} ms"
+                f"step: {duration_ms} ms is not a positive multiple of the basic step;"
+                f" use a multiple of {self.scene.basic_step_ms} ms"
             )
         for _ in range(count):
             self._basic_step()
@@ -231,12 +232,9 @@ class Simulation:
         added = self.tree.grow(text, field.node)
         try:
             require_room(field.node, field.name, added)
-            read = field.name == "children"  # other fields hold visible nodes
-            fresh = (
-                read_added(self.tree, added, self.scene)
-                if read
-                else SceneContents(physics=self.scene.physics)
-            )
+            fresh = SceneContents(physics=self.scene.physics)  # stays empty for fields other than children
+            if field.name == "children":
+                fresh = read_added(self.tree, added, self.scene)
         except SimError:
             self.tree.forget(added)
             raise

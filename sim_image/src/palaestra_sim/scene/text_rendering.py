@@ -22,8 +22,8 @@ def letters(text: str, corner: Point, font: Font, size: tuple[int, int]) -> Iter
     Args:
         text: one line or more.
         corner: the upper left corner of the first letter.
-        font: of all letters.
-        size: of the image; pixels outside it are not yielded.
+        font: the font of all letters.
+        size: the size of the image; pixels outside it are not yielded.
 
     Raises:
         UnsimulatedError: Pillow is missing.

@@ -20,9 +20,10 @@ from palaestra_sim.world.source import Source
 
 ReadFile = Callable[[Source, str], bytes]
 Coordinates = tuple[float, float]
-# A function of a point, whose box has the corners -1 and 1, to its place in a texture.
+# A function that maps a point of a shape to its place in a texture; the box around the shape has the
+# corners -1 and 1.
 Mapped = Callable[[Vector], Coordinates]
-_END: Final = 1.0 - 1e-7  # of half the height of a cylinder: beyond, a point is on an end
+_END: Final = 1.0 - 1e-7  # share of half a cylinder's height; a point beyond it is on an end
 _UP: Final = 2  # the axis
 _PIXEL: Final = 4  # blue, green, red, alpha
 _RED: Final = 2
@@ -54,7 +55,7 @@ class Paint:
     """What a textured shape looks like to infra-red light.
 
     Attributes:
-        red: of its base color, 0 to 1, as far as it is opaque.
+        red: the red of its base color, 0 to 1, as far as it is opaque.
         roughness: without `rough`.
         image, rough, hollow: its color, its roughness, and its occlusion.
         mapped: from a point to a place in its textures.
@@ -111,7 +112,7 @@ class Textures:
         if mapped is None or image is None:
             return None
         transform = _transform(next(iter(look.nodes("textureTransform")), None))
-        red = 1.0  # of an Appearance, whose texture replaces the color
+        red = 1.0  # the texture of an Appearance replaces the color
         if look.type_name == "PBRAppearance":
             red = min(1.0, max(0.0, (look.numbers("baseColor") or (1.0,))[0]))
         return Paint(

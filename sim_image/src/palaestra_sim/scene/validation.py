@@ -29,7 +29,7 @@ class LeaveOut:
     """The nodes that the user leaves out, if they cannot be simulated.
 
     Attributes:
-        types: of the nodes, as written in the world.
+        types: the types of the nodes, as written in the world.
         everything: whether nodes of any type are left out.
         names: whether a robot may lack --name and --synchronize, which a sidecar adds.
     """
@@ -153,7 +153,7 @@ class NodeReader:
             return x
         inside = any(child.type_name not in _DRAWN for child in node.nodes())
         if inside or node.nodes("boundingObject"):
-            self.lacks(node, f"a {node.type_name} with a scale that distorts what is in it")
+            self.lacks(node, f"a {node.type_name} with a scale that distorts the shapes in it")
         return 1.0
 
     def pose(self, node: SceneNode) -> Pose:

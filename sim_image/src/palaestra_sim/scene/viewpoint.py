@@ -21,15 +21,15 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
     Raises:
         UnsimulatedError: the name is not that of a PNG or JPEG file, or this machine cannot render.
     """
-    eye = view(root, physics, SIZE)
-    return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)
+    camera = view(root, physics, SIZE)
+    return camera is not None and picture_files.save(path, SIZE, camera.colors(), quality=quality)
 
 
 def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInterface | None:
     """Return a camera at the current Viewpoint; None if the simulator does not render."""
     reading = NodeReader()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
-    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # of the longer side, as in Webots
+    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # angle of the longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))

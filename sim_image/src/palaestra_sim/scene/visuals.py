@@ -8,12 +8,13 @@ angles.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from palaestra_sim.scene.frames import Frame
-from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle
+from palaestra_sim.scene.geometry import Pose, Vector, from_axis_angle, triple
+from palaestra_sim.scene.lights import lights_in
 from palaestra_sim.scene.meshes import Mesh, cone, elevation_grid, face_set
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import standing
@@ -24,11 +25,11 @@ Color = tuple[float, float, float, float]  # red, green, blue, alpha, from 0 to 
 
 _WHITE: Final = (1.0, 1.0, 1.0)
 _STAND_IN: Final = (0.72, 0.70, 0.66)
-_FLOOR: Final = (0.45, 0.46, 0.47)  # of a stand-in's floor; its walls have another color
-_PATTERN: Final = (0.7, 0.7, 0.7)  # for textures and appearance PROTOs, which are not read
+_FLOOR: Final = (0.45, 0.46, 0.47)  # color of a stand-in's floor; its walls have another color
+_PATTERN: Final = (0.7, 0.7, 0.7)  # color that replaces textures and appearance PROTOs, which are not read
 _MATERIAL: Final = (0.8, 0.8, 0.8)  # Source: Material.diffuseColor of Webots
 _NIGHT: Final = (0.0, 0.0, 0.0)  # Source: Background.skyColor of Webots
-_DAY: Final = (0.62, 0.76, 0.92)  # of a textured sky
+_DAY: Final = (0.62, 0.76, 0.92)  # color that replaces a textured sky
 _SHEET_M: Final = 0.002  # a plane is a box of this height; its upper side is the plane
 _LARGEST_M: Final = 1e5
 _PLACING: Final = frozenset(("translation", "rotation"))
@@ -54,7 +55,7 @@ _LOOKS: Final = frozenset(
         "TextureTransform",
     )
 )
-# What has the size of a floor's texture, by the PROTO.
+# The field that holds the size of a floor's texture, by the name of the PROTO.
 _TILES: Final = {"Floor": "tileSize", "RectangleArena": "floorTileSize"}
 _TILE_M: Final = (0.5, 0.5)  # Source: Floor.proto of Webots
 _HOLDING: Final = ("children", "endPoint")
@@ -67,12 +68,12 @@ class Drawn:
     Attributes:
         kind: "ball" is an ellipsoid if its sizes differ.
         size: x, y, z in meters; for round shapes 2 r, 2 r, height. A mesh is scaled by it.
-        color: of the whole shape.
+        color: the color of the whole shape.
         local: its pose in the frame `place`, in meters of the world.
         place: the frame that carries it; None for the world.
         node: the Shape, or the stand-in.
         mesh: for the kind "mesh".
-        roughness: of a PBRAppearance, 0 to 1.
+        roughness: the roughness of a PBRAppearance, 0 to 1.
         geometry: the type of its geometry, such as "Plane".
         look: its appearance; None if it has none, or if the place of its texture is not known.
         textured: whether its appearance has a texture.
@@ -102,7 +103,7 @@ class View:
     """The visible part of a world, with counts of its changes.
 
     Attributes:
-        root: of the world.
+        root: the root of the world.
         textures: the images of its textures.
         changes: how often something has come, gone, or got another look.
         moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
@@ -113,6 +114,8 @@ class View:
         self.textures = Textures()
         self.changes = 0
         self.moves = 0
+        # The number of changes when the lights were collected.
+        self._lights: tuple[int, tuple[SceneNode, ...]] = (-1, ())
 
     def written(self, node: SceneNode, field: str) -> None:
         """Count the write of a field, if its effect is visible."""
@@ -125,6 +128,12 @@ class View:
         """Return the current visible shapes."""
         return tuple(drawn(self.root))
 
+    def lights(self) -> tuple[SceneNode, ...]:
+        """Return the current lights."""
+        if self._lights[0] != self.changes:
+            self._lights = (self.changes, tuple(lights_in(self.root)))
+        return self._lights[1]
+
     def unread_textures(self) -> int:
         """Return the number of shapes with a texture that infra-red sensors do not see."""
         paint = self.textures.paint
@@ -135,7 +144,7 @@ class View:
         """Return the color of the background, red, green and blue from 0 to 1."""
         for node in self.root.nodes():
             if node.type_name == "Background":
-                return _triple(_mixed(node, "skyColor", _NIGHT))
+                return triple(_mixed(node, "skyColor", _NIGHT))
             if "TexturedBackground" in {node.type_name, node.proto_name}:
                 return _DAY
         return _NIGHT
@@ -162,7 +171,7 @@ class _Frame(NamedTuple):
             x, y, z = scale if len(set(scale)) > 1 else (1.0, 1.0, 1.0)
             return _Frame(place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
         turned = _numbers(node, "rotation", (0.0, 0.0, 1.0, 0.0))
-        pose = self.at(_triple(_numbers(node, "translation", (0.0, 0.0, 0.0))))
+        pose = self.at(triple(_numbers(node, "translation", (0.0, 0.0, 0.0))))
         x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
         rotation = from_axis_angle((turned[0], turned[1], turned[2], turned[3]))
         return _Frame(self.place, pose.after(Pose(rotation=rotation)), (x, y, z))
@@ -267,7 +276,7 @@ def _solid(node: SceneNode, pose: Pose) -> _Solid | None:
     diameter = 2.0 * _number(node, "radius", 1.0)
     match node.type_name:
         case "Box":
-            return _Solid("box", _triple(_numbers(node, "size", (0.1, 0.1, 0.1))), pose)
+            return _Solid("box", triple(_numbers(node, "size", (0.1, 0.1, 0.1))), pose)
         case "Sphere":
             return _Solid("ball", (diameter, diameter, diameter), pose)
         case "Cylinder":
@@ -336,7 +345,3 @@ def _numbers(node: SceneNode, field: str, default: tuple[float, ...]) -> tuple[f
 
 def _number(node: SceneNode, field: str, default: float) -> float:
     return _numbers(node, field, (default,))[0]
-
-
-def _triple(numbers: Sequence[float]) -> Vector:
-    return numbers[0], numbers[1], numbers[2]

@@ -30,9 +30,9 @@ Rows = tuple[Twist, Twist, Twist]
 _PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
 _LEAST_GAIN: Final = 0.05  # minimum speed along the grip, as a fraction of the wheel's rim speed
 _LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for three ideal equations, 0 for dependent ones
-_LEAST_ARM_M: Final = 1e-3  # minimum of the longest arm; shorter arms do not turn a robot
+_LEAST_ARM_M: Final = 1e-3  # if the longest arm is shorter than this, the wheels do not turn the robot
 _THREE: Final = 3
-_ROUNDED: Final = 1e-3  # in m and in rad: maximum error by which a file may round a ring of wheels
+_ROUNDED: Final = 1e-3  # tolerance in m and in rad, because files round the positions of wheels
 _K: Final = math.sqrt(0.75)
 _COSINES: Final = (1.0, -0.5, -0.5)
 _SINES: Final = (0.0, _K, -_K)
@@ -44,7 +44,7 @@ class Wheel:
     """A driven wheel on the floor, in the robot's frame.
 
     Attributes:
-        x_m, y_m: of its hub.
+        x_m, y_m: the position of its hub.
         axle: the axis about which a positive speed turns the wheel.
         radius_m: from the hub to the floor.
         roller: the axis of the roller that touches the floor; None for a plain tire.
@@ -90,7 +90,7 @@ class Drive:
 
     def twist(self, speeds: Sequence[float]) -> Twist:
         """Return vx, vy in m/s and omega in rad/s of the robot's origin, from speeds in rad/s."""
-        if len(speeds) == _THREE:  # the loop below takes twice as long
+        if len(speeds) == _THREE:  # faster: the loop below takes twice as long
             (x0, y0, t0), (x1, y1, t1), (x2, y2, t2) = self.to_twist
             s0, s1, s2 = speeds
             return x0 * s0 + x1 * s1 + x2 * s2, y0 * s0 + y1 * s1 + y2 * s2, t0 * s0 + t1 * s1 + t2 * s2
@@ -128,7 +128,7 @@ class Ring(Drive):
         return x * self.c - y * self.s, x * self.s + y * self.c, omega
 
 
-STANDING: Final = Drive((), ())  # of a robot without wheels
+STANDING: Final = Drive((), ())  # the drive of a robot without wheels
 
 
 def _ring(wheels: Sequence[Wheel]) -> Ring | None:

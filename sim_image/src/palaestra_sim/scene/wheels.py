@@ -9,34 +9,36 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.steering import Steer
 from palaestra_sim.scene.wheel_kinematics import Wheel
 
-_LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
-_OFF_CENTER: Final = 0.2  # of a wheel's radius: tolerance from center to axle, and from rim to floor
+_LEVEL: Final = 1e-3  # sine of the largest angle between the floor and an axle that counts as level
+_OFF_CENTER: Final = 0.2  # tolerance from center to axle and from rim to floor, in wheel radii
 
 
 @dataclass(slots=True, kw_only=True)
-class Driven:
-    """A hinge or a track with a motor, which may be a wheel, in the robot's frame.
+class Rolling:
+    """A hinge or a track, which may be a wheel, in the robot's frame.
 
     Attributes:
         anchor: a point on the axle; of a track, its origin.
         shape: the round end; of a track, the lowest of its shapes.
         roller: the axis of the roller that touches the floor; None for a plain tire or a belt.
         belt: whether it is a track.
+        steer: steers it; None on a fixed axle.
     """
 
-    motor: Motor
     axle: Vector
     anchor: Vector
     shape: Shape
     roller: Vector | None = None
     belt: bool = False
+    steer: Steer | None = None
 
     @property
     def bottom(self) -> float:
@@ -54,10 +56,10 @@ class Driven:
         low, high = self.shape.heights()
         return (high - low) / 2.0 if self.belt else self.shape.size[0] / 2.0
 
-    def may_drive(self) -> bool:
-        """Return whether it turns without stops about a level axle through its center."""
-        stops = self.motor.spec.stops
-        fits = abs(self.axle[2]) < _LEVEL and self.radius > 0.0 and stops[0] == stops[1]
+    @property
+    def turns_level(self) -> bool:
+        """Whether it turns about a level axle through its center."""
+        fits = abs(self.axle[2]) < _LEVEL and self.radius > 0.0
         return fits and (self.belt or self._turns_about_its_center())
 
     def wheel(self) -> Wheel:
@@ -79,11 +81,36 @@ class Driven:
         return math.sqrt(max(0.0, square)) <= _OFF_CENTER * self.radius
 
 
+@dataclass(slots=True, kw_only=True)
+class Driven(Rolling):
+    """A hinge or a track with a motor."""
+
+    motor: Motor
+
+    def may_drive(self) -> bool:
+        """Return whether it turns without stops about a level axle through its center."""
+        stops = self.motor.spec.stops
+        return stops[0] == stops[1] and self.turns_level
+
+
+_Wheel = TypeVar("_Wheel", bound=Rolling)
+
+
 def wheels_among(driven: Sequence[Driven]) -> list[Driven]:
     """Return the parts that drive: they may drive, and they reach down to the floor."""
-    possible = [found for found in driven if found.may_drive()]
-    floor = min((found.bottom for found in possible), default=0.0)
-    return [found for found in possible if found.bottom <= floor + _OFF_CENTER * found.radius]
+    return _lowest([found for found in driven if found.may_drive()])
+
+
+def tires_among(driven: Sequence[Driven], idle: Sequence[Rolling]) -> list[Rolling]:
+    """Return the plain wheels on the floor, also those without a motor."""
+    possible = [*(found for found in driven if found.may_drive()), *(it for it in idle if it.turns_level)]
+    return [found for found in _lowest(possible) if found.roller is None and not found.belt]
+
+
+def _lowest(wheels: Sequence[_Wheel]) -> list[_Wheel]:
+    """Return the wheels that reach down to the floor."""
+    floor = min((found.bottom for found in wheels), default=0.0)
+    return [found for found in wheels if found.bottom <= floor + _OFF_CENTER * found.radius]
 
 
 def _level(vector: Vector) -> tuple[float, float]:

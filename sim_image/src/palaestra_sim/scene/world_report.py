@@ -15,11 +15,13 @@ from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.robot_reader import RobotParts
+from palaestra_sim.scene.steering import SteeredDrive
 from palaestra_sim.scene.tree.field_types import without_effect
 from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.world.mjcf import is_mjcf
 
 _ROLLS_AND_TURNS: Final = 2
-_MOST_NAMES: Final = 8  # of devices in one line
+_MOST_NAMES: Final = 8  # names of devices in one line
 _OF_BODIES: Final = frozenset(("Accelerometer", "Gyro"))
 
 
@@ -64,7 +66,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
         yield f"a world of {release}: its nodes are turned to the axes of today, as by Webots"
     silent = silent_devices(simulation.robots)
     if silent:
-        yield f"devices without readings, whose enable answers failure: {silent}"
+        yield f"devices without readings, whose enable returns failure: {silent}"
     for difference in differences(simulation):
         yield f"differs from Webots: {difference}"
     if error := refusal(simulation.tree.ignored):
@@ -116,7 +118,7 @@ def differences(simulation: Described) -> Iterator[str]:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
         yield f"{lidars} Lidar: rays pass the robot itself"
-    yield from _without_physics(robots)
+    yield from _without_physics(it for it in robots if not _of_a_model(it.node))
     if meshes:
         yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"
     rays = (
@@ -128,6 +130,11 @@ def differences(simulation: Described) -> Iterator[str]:
     sloped = any(not beam.level for beam in rays)
     if sloped and not any(node.type_name == "Plane" for node in outlines):
         yield "no Plane as boundingObject: rays meet a floor at height 0"
+
+
+def _of_a_model(node: SceneNode) -> bool:
+    """Return whether a node is of a model of MuJoCo, in which each body has a mass."""
+    return node.origin is not None and is_mjcf(node.origin.source.data)
 
 
 def _without_physics(robots: Iterable[RobotParts]) -> Iterator[str]:
@@ -180,6 +187,8 @@ def _of_robot(robot: Robot) -> Iterator[str]:
         yield "no wheels"
     else:
         kind = "differential" if drive.freedoms == _ROLLS_AND_TURNS else "omnidirectional"
+        if isinstance(drive, SteeredDrive):
+            kind = "steered"
         yield f"{kind} drive on {len(drive.to_speeds)} wheels"
     devices = Counter(kind.node for kind, _ in robot.parts.devices.rows.values())
     if devices:

@@ -14,6 +14,7 @@ It may have a second simulator as a standby. The two share the process and its p
 - `signals`: the thread that only waits for signals
 - `output`: the simulator's output, forwarded line by line
 - `left_out`: the simulator's report on the nodes that it leaves out of its world
+- `viewing`: what the simulator shows to viewers, read at most 30 times a second
 - `server`: the routes of the two ports: control, and health with metrics and state
 - `metric_definitions`: every metric by name, as data
 - `metrics`: the content of /metrics

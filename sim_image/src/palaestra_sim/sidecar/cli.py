@@ -13,14 +13,15 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from palaestra_protocol.control import LEFT_OUT_FILE, SidecarState, SimulatorState
+from palaestra_protocol.control import LEFT_OUT_FILE, VIEW_SOCKET, SidecarState, SimulatorState
 from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, project, signals, world_files
-from palaestra_sim.sidecar.drivers import Driver, Launch, command
+from palaestra_sim.sidecar.drivers import SHOWN, Driver, Launch, command
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
 from palaestra_sim.sidecar.server import bound, control_routes, health_routes
 from palaestra_sim.sidecar.simulator import SupervisedSimulator
+from palaestra_sim.sidecar.viewing import Viewing
 from palaestra_sim.world import RunIdentity
 
 log = logging.getLogger(__name__)
@@ -36,11 +37,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def work_folder(given: argparse.Namespace) -> Iterator[None]:
-    """Set `given.work` to a temporary folder for the block, if --suffix needs a folder and --work names none.
+    """Set `given.work` to a temporary folder for the block, if a folder is needed and --work names none.
 
-    The sidecar owns the folder: its parent may be killed, but the sidecar then still shuts down in order.
+    --suffix needs it for the world, and viewers for a socket. The sidecar owns the folder: its parent may be
+    killed, but the sidecar then still shuts down in order.
     """
-    if not given.suffix or given.job is not None or given.work is not None:
+    needed = given.suffix or Driver(given.driver) in SHOWN
+    if not needed or given.job is not None or given.work is not None:
         yield
         return
     with tempfile.TemporaryDirectory(prefix="palaestra-world-") as folder:
@@ -113,11 +116,14 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     launch = Launch(world=world, root=root, options=given.option, program=given.program)
     left_out = _left_out(given, world)
     own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})
+    view = _view_socket(given, driver, world)
+    own |= {VIEW_SOCKET: str(view)} if view else {}
     started = command(driver, launch, os.environ | own)
     return SupervisedSimulator(
         replace(started, mark=f"{slot}: ") if given.standby else started,
         SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots),
         left_out,
+        Viewing.without(_nothing_to_see(driver)) if view is None else Viewing(view),
     )
 
 
@@ -163,6 +169,19 @@ def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
     if given.work is None or world == Path(given.world).absolute():
         return None
     return Path(given.work).absolute() / f"{world.stem}.left-out"
+
+
+def _view_socket(given: argparse.Namespace, driver: Driver, world: Path) -> Path | None:
+    """Return the socket on which the simulator describes its world; None if it does not, or has no folder."""
+    if given.work is None or driver not in SHOWN:
+        return None
+    return Path(given.work).absolute() / f"{world.stem}.view"
+
+
+def _nothing_to_see(driver: Driver) -> str:
+    if driver in SHOWN:
+        return "this sidecar has no folder for the socket of viewers; give it --work"
+    return f"driver {driver} does not describe its world to viewers; use driver {' or '.join(SHOWN)}"
 
 
 def _missing_controllers(given: argparse.Namespace) -> str | None:

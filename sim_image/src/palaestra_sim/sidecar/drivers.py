@@ -11,7 +11,7 @@ from pathlib import Path
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.process import CommandLine
 
-WORLD = "{world}"  # in a command: the path of the world
+WORLD = "{world}"  # a command has it in place of the path of the world
 _NOT_ROOT = "palaestra"
 _MESA_THREADS = "LP_NUM_THREADS"
 
@@ -27,6 +27,9 @@ class Driver(StrEnum):
     MUJOCO = "mujoco"
     WEBOTS = "webots"
     COMMAND = "command"
+
+
+SHOWN = (Driver.STUB, Driver.MUJOCO)  # these describe their world to viewers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,8 +100,8 @@ def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
 
 def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
     """Return the full path of a program: on the PATH, or in the folder of the running Python."""
-    beside = os.fspath(Path(sys.executable).parent)
-    for path in (environment.get("PATH", os.defpath), beside):
+    python_folder = os.fspath(Path(sys.executable).parent)
+    for path in (environment.get("PATH", os.defpath), python_folder):
         if (found := shutil.which(program, path=path)) is not None:
             return str(Path(found).absolute())
     raise SidecarError(f"--driver {driver}: program {program} not found; install it, or set PATH")

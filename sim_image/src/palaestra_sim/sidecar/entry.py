@@ -7,11 +7,13 @@ ended during the imports of the sidecar, the pod would stay for its whole grace 
 import sys
 from importlib import import_module
 
+from palaestra_protocol.linux import require_linux
 from palaestra_sim.sidecar.blocked_signals import hold_back
 
 
 def main() -> int:
     """Run the sidecar until SIGTERM or SIGINT; return its exit code."""
+    require_linux("palaestra-sidecar")
     hold_back()
     code: int = import_module("palaestra_sim.sidecar.cli").main()
     return code

@@ -19,7 +19,7 @@ palaestra_protocol.control. The simulator inherits the environment: ROS_MASTER_U
 reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work;
         for Webots as a project there, with links to the controllers, PROTOs and so on around the world
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
-serves  control: /start /ready /stop /state; health: /healthz /state /metrics
+serves  control: /start /ready /stop /state; health: /healthz /state /metrics; both: /scene /watch /camera
 
 With --standby there is a second simulator, slot b, with its own world, ROS names and process
 (GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
@@ -107,4 +107,5 @@ def _address(text: str) -> Address:
     try:
         return Address.parse(text)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error  # argparse drops other messages
+        # argparse drops the messages of other exceptions.
+        raise argparse.ArgumentTypeError(str(error)) from error

@@ -15,9 +15,11 @@ from pathlib import Path
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.world import own_controllers, placed
 
-# Source: Webots' guide, "The Standard File Hierarchy of a Project". One of them makes a folder a project.
+# Source: Webots' guide, "The Standard File Hierarchy of a Project". A folder that has one of these is a
+# project.
 FOLDERS = ("controllers", "libraries", "plugins", "protos")
-# Source: Filesystem Hierarchy Standard 3.0, with /proc and /sys. A world in /worlds does not need these.
+# The folders of the system, and /proc and /sys. A world in /worlds does not need them. Source: Filesystem
+# Hierarchy Standard 3.0
 _OF_THE_SYSTEM = frozenset(
     {
         *("bin", "boot", "dev", "etc", "lib", "lib32", "lib64", "libx32", "lost+found"),
@@ -87,7 +89,7 @@ def missing_controllers(world: Path, source: bytes, environment: Mapping[str, st
     more = len(missing) - _MOST_NAMED
     named = ", ".join(missing[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
     return (
-        f"--world: {world}: is in no Webots project, so Webots starts <generic> for controllers that it "
+        f"--world: {world}: is not in a Webots project, so Webots starts <generic> for controllers that it "
         f"lacks: {named}; put the project into spec.simulators[].image and name its world in "
         "spec.simulators[].world.file"
     )

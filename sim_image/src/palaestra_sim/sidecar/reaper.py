@@ -32,7 +32,7 @@ KILL = b"K"
 
 _PR_SET_CHILD_SUBREAPER = 36  # Source: linux/prctl.h
 _GIVE_UP_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
-_NOT_RUN = 127  # as in a shell
+_NOT_RUN = 127  # the exit code of a shell that finds no program
 _PARENT = 1  # index among the fields after the name in /proc/PID/stat: state, parent, ...
 
 

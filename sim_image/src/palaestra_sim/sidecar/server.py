@@ -1,10 +1,12 @@
 """The routes of a sidecar's two ports; `simulator` decides what a request does.
 
 Control is for the trainer of the same pod and has no authentication, so it listens on loopback only.
-Health is for all clients that can reach the pod, so none of its requests changes anything.
+Health is for all clients that can reach the pod, so none of its requests changes anything. Both have the
+routes of a viewer (`viewing`).
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from http import HTTPStatus
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
@@ -23,6 +25,7 @@ from palaestra_protocol.http import (
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import LifecycleEvent
 from palaestra_sim.sidecar.simulator import CommandResult, NoAnswer, SupervisedSimulator
+from palaestra_sim.sidecar.viewing import NothingToSee, SimulatorSilent
 
 _ABOVE = ("", STANDBY)  # path prefixes of the first simulator and of its standby
 
@@ -55,7 +58,7 @@ def control_routes(simulators: Sequence[SupervisedSimulator]) -> Routes:
             ("POST", f"{above}/ready"): _plain(simulator, LifecycleEvent.READY),
             ("POST", f"{above}/stop"): _stop(simulator),
         }
-    return routes
+    return routes | _view_routes(simulators)
 
 
 def health_routes(simulators: Sequence[SupervisedSimulator], registry: CollectorRegistry) -> Routes:
@@ -64,12 +67,35 @@ def health_routes(simulators: Sequence[SupervisedSimulator], registry: Collector
         ("GET", f"{above}/state"): _state(simulator)
         for above, simulator in zip(_ABOVE, simulators, strict=False)
     }
-    return states | {
-        ("GET", "/healthz"): lambda _: probe_response(),
-        ("GET", "/metrics"): lambda _: Response(
-            status=HTTPStatus.OK, body=generate_latest(registry), content_type=CONTENT_TYPE_LATEST
-        ),
-    }
+    return (
+        states
+        | _view_routes(simulators)
+        | {
+            ("GET", "/healthz"): lambda _: probe_response(),
+            ("GET", "/metrics"): lambda _: Response(
+                status=HTTPStatus.OK, body=generate_latest(registry), content_type=CONTENT_TYPE_LATEST
+            ),
+        }
+    )
+
+
+def _view_routes(simulators: Sequence[SupervisedSimulator]) -> dict[tuple[str, str], Route]:
+    routes: dict[tuple[str, str], Route] = {}
+    for above, simulator in zip(_ABOVE, simulators, strict=False):
+        routes[("GET", f"{above}/scene")] = partial(_viewed, simulator.viewing.scene)
+        routes[("GET", f"{above}/watch")] = partial(_viewed, simulator.viewing.state)
+        routes[("GET", f"{above}/camera")] = partial(_viewed, simulator.viewing.camera)
+    return routes
+
+
+def _viewed(read: Callable[[], bytes], _: bytes) -> Response:
+    """Return what the simulator shows, or a sentence about the reason that it shows nothing."""
+    try:
+        return Response(status=HTTPStatus.OK, body=read(), content_type="application/json")
+    except NothingToSee as error:
+        return error_response(HTTPStatus.NOT_FOUND, str(error))
+    except SimulatorSilent as error:
+        return error_response(HTTPStatus.SERVICE_UNAVAILABLE, str(error))
 
 
 def _state(simulator: SupervisedSimulator) -> Route:

@@ -17,8 +17,9 @@ from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.left_out import read_left_out
 from palaestra_sim.sidecar.lifecycle import Action, LifecycleEvent
 from palaestra_sim.sidecar.process import CommandLine, Ended, SimulatorProcess, Started, Usage
+from palaestra_sim.sidecar.viewing import Viewing
 
-SHUTDOWN_GRACE_S = 1.0  # from SIGTERM to SIGKILL; the whole shutdown has 2 s
+SHUTDOWN_GRACE_S = 1.0  # time from SIGTERM to SIGKILL; the whole shutdown has 2 s
 _ANSWER_S = 5.0
 
 FAULT_KINDS = ("code", "signal", "unknown")
@@ -52,12 +53,14 @@ class SupervisedSimulator:
     Attributes:
         state: the current state; may be read from any thread.
         faults: number of faults by kind; may be read from any thread.
+        viewing: reads what the simulator shows to viewers; may be used from any thread.
 
     Args:
         command: starts the simulator.
         state: the state before the first start.
         left_out: the file in which the simulator reports the nodes that it leaves out; None without such a
             file.
+        viewing: see Attributes; None if it shows nothing.
         clock: returns seconds, from any origin.
     """
 
@@ -66,10 +69,12 @@ class SupervisedSimulator:
         command: CommandLine,
         state: SimulatorState,
         left_out: Path | None = None,
+        viewing: Viewing | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.state = state
         self.faults: Mapping[str, int] = dict.fromkeys(FAULT_KINDS, 0)
+        self.viewing = viewing or Viewing.without("this simulator was started without a socket for viewers")
         self._command = command
         self._left_out = left_out
         self._clock = clock
@@ -214,7 +219,7 @@ class SupervisedSimulator:
 
 def _described(ended: Ended) -> tuple[str, str]:
     """Return the kind of an unexpected end, and a sentence about it."""
-    said = f"; it said last: {ended.last_line}" if ended.last_line else ""
+    said = f"; its last line: {ended.last_line}" if ended.last_line else ""
     if ended.code is not None:
         return "code", f"the simulator ended with code {ended.code}{said}"
     if ended.signal is not None:

@@ -4,7 +4,6 @@ Only the sidecar writes ROS names into a world. It gets a source world, from the
 ConfigMap.
 """
 
-import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import RootError, SidecarError, WorldError
 from palaestra_sim.sidecar import project
+from palaestra_sim.whole_file import write_whole
 from palaestra_sim.world import MJCF, RunIdentity, builtin_path, generate, placed, rename, robots, suffix
 from palaestra_sim.world import root_of as root_around
 from palaestra_sim.world.bounded_read import read_bounded
@@ -116,9 +116,11 @@ def _written(
         if as_project or linked:
             around = root_of(world, root)
             path = project.lay_out(source, work / _PROJECT, around, linked=linked) / path.name
-        return _write_whole(path, generated)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, generated)
     except OSError as error:
-        raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
+        raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with free space") from error
+    return path
 
 
 def file_name(identity: RunIdentity, ending: str = ".wbt") -> str:
@@ -143,15 +145,3 @@ def described(source: bytes, name: str) -> tuple[RobotName, ...]:
         for robot in robots(source, name)
         if robot.ros_name
     )
-
-
-def _write_whole(path: Path, content: bytes) -> Path:
-    """Write a file atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
-    return path

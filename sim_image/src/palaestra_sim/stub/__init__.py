@@ -1,6 +1,6 @@
 """The stub simulator: a physics without masses and forces; it is small, fast, and exact within these limits.
 
-- `cli`: `palaestra-stub`
+- `entry`: the start of `palaestra-stub`, which refuses a system other than Linux; `cli`: the program
 - `physics`: the robots and obstacles of a world
 - `body`, `contacts`: motion, and what a robot runs into
 - `rays`, `others`: how far the beams of sensors travel, and robots as they meet them

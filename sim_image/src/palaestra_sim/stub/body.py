@@ -18,7 +18,7 @@ from palaestra_sim.stub.outline import RoundPart
 
 _PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
 _RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, up to rounding
-_STRIDE: Final = 0.3  # of the smallest radius: maximum motion between two checks for contacts
+_STRIDE: Final = 0.3  # maximum motion between two checks for contacts, in smallest radii
 
 
 class StubBody(Disc):
@@ -70,7 +70,8 @@ class StubBody(Disc):
         self.heights = heights
         self._parts = tuple(outline)
         self._stride_m = _STRIDE * min((radius for _, _, radius in outline), default=0.0)
-        # Distance of the farthest axis; a turn does not move a cylinder whose axis is in the middle.
+        # The distance of the farthest axis from the middle; a turn does not move a cylinder whose axis is
+        # in the middle.
         self._arm_m = max((math.hypot(x, y) for x, y, _ in outline), default=0.0)
         self._solids = Neighborhood((), 0.0)
         self._others: tuple[StubBody, ...] = ()

@@ -291,7 +291,7 @@ class Neighborhood:
 
     def near(self, x: float, y: float) -> tuple[FlatObstacle, ...]:
         """Return at least all obstacles that are within reach of x, y, in their order."""
-        column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift keeps usual floors positive
+        column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift makes the numbers of usual floors positive
         row = int(y * 8.0 + 4096.0)
         key = column * 65536 + row
         found = self._squares.get(key)

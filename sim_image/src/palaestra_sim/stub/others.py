@@ -12,14 +12,14 @@ from palaestra_sim.scene.hits import first_hit
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
 
-_ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical
+_ALONG: Final = 1.0 - 0.5e-6  # z of a unit vector that is vertical
 
 
 class OtherRobot:
     """A robot with a body.
 
     Args:
-        body: of the robot.
+        body: the body of the robot.
         place: its frame, of which the height counts.
         parts: the shapes of its outline, each with the frame of the robot in that of the shape.
     """

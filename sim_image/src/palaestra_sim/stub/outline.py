@@ -20,7 +20,7 @@ from palaestra_sim.stub.obstacles import Block, Disc, Hull
 
 _Z: Final = 2
 _ALONG_Z: Final = frozenset(("cylinder", "capsule"))
-_MOST_DISCS: Final = 16  # of one box; a bar more than eight times as long as wide has gaps between them
+_MOST_DISCS: Final = 16  # most discs of one box; in a bar over eight times as long as wide they have gaps
 
 
 class RoundPart(NamedTuple):
@@ -42,7 +42,7 @@ def discs_of_box(
     if width_m > length_m:
         return discs_of_box(x_m, y_m, heading_rad + math.pi / 2.0, width_m, length_m)
     radius_m = width_m / 2.0
-    row_m = length_m - width_m  # from the first center to the last
+    row_m = length_m - width_m  # distance from the first center to the last
     gaps = _MOST_DISCS - 1
     if row_m < gaps * radius_m:
         gaps = math.ceil(row_m / radius_m)

@@ -28,7 +28,7 @@ from palaestra_sim.stub.others import OtherRobot
 from palaestra_sim.stub.outline import covering, obstacle, prismatic
 from palaestra_sim.stub.rays import Fan, Met, Rounded, SlopedBeams, Upright
 
-_Tall = tuple[Shape, tuple[float, float]]  # with its lower and its upper end
+_Tall = tuple[Shape, tuple[float, float]]  # a shape with its lower and its upper end
 
 
 class _Level(NamedTuple):
@@ -88,7 +88,7 @@ class StubPhysics:
         doors: Sequence[Link] = (),
     ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose, doors  # the world checks refuse both, see `abilities`
+        del loose, doors  # the world checks refuse worlds with either, see `abilities`
         self._solids = tuple(solids)
         self._tall = [(shape, shape.heights()) for shape in solids]
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]

@@ -15,7 +15,7 @@ from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
 _UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
-_LONGEST_GAP = 200  # bytes; a longer gap is not repeated between new strings
+_LONGEST_GAP = 200  # bytes; a longer gap between two strings is not copied between new strings
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 

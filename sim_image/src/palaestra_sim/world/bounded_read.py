@@ -19,7 +19,7 @@ def read_bounded(path: Path) -> bytes:
         OSError: it cannot be read, is not a regular file, or is too large.
     """
     if not stat.S_ISREG(path.stat().st_mode):  # opening a pipe blocks until a process writes to it
-        raise OSError(errno.EINVAL, "is no regular file", str(path))
+        raise OSError(errno.EINVAL, "is not a regular file", str(path))
     with path.open("rb") as file:
         found = file.read(MOST_BYTES + 1)
     if len(found) > MOST_BYTES:

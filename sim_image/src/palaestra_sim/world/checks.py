@@ -106,8 +106,10 @@ def relative_address(candidate: Candidate) -> Iterator[WorldError]:
     """An address is relative, but the world is not in a file, so it has no folder."""
     for token in _addresses(candidate.world):
         if not _ABSOLUTE.match(unquoted(token)):
-            fact = f"{token.text.decode()} is relative to the file of the world, and this one has none"
-            remedy = "begin it with webots:// or https://, or give the world as a file"
+            fact = (
+                f"{token.text.decode()} is relative to the file of the world, and this world is not in a file"
+            )
+            remedy = "begin the address with webots:// or https://, or give the world as a file"
             yield candidate.source.error(token.start, fact, remedy)
 
 

@@ -57,7 +57,7 @@ def parse_formula(written: object) -> Expression:
     if isinstance(written, int | float) and not isinstance(written, bool):
         return Expression(str(written), float(written))
     if not isinstance(written, str):
-        fact = f"{written!r} is no length"
+        fact = f"{written!r} is not a length"
         raise ValueError(f"{fact}; write a number, the name of a field, or a formula")  # noqa: TRY004 - of a file
     if len(written) > MAX_LENGTH:
         raise ValueError(f"a formula has more than {MAX_LENGTH} characters; shorten it")
@@ -86,7 +86,7 @@ class _Reader:
             match = _TOKEN.match(text, at)
             if match is None:
                 raise ValueError(
-                    f"{text[at:].strip()!r} in {self._text!r} is no part of a formula; {_REMEDY}"
+                    f"{text[at:].strip()!r} in {self._text!r} is not part of a formula; {_REMEDY}"
                 )
             tokens.append(match.group().strip())
             at = match.end()
@@ -139,7 +139,7 @@ class _Reader:
         return token
 
     def _error(self) -> ValueError:
-        return ValueError(f"{self._text!r} is no formula; {_REMEDY}")
+        return ValueError(f"{self._text!r} is not a formula; {_REMEDY}")
 
 
 _REMEDY = "write numbers and fields with + - * / ( ), such as size.x / 2"

@@ -139,8 +139,8 @@ class _Search:
     def _add(self, namer: _Namer, place: int, address: str, path: Path | None, type_name: str) -> None:
         """Add the PROTO of a file, unless it was already read."""
         if path is None:
-            fact = f'"{address}" is relative to the file of the world, and this one has none'
-            remedy = "begin it with webots:// or https://, or give the world as a file"
+            fact = f'"{address}" is relative to the file of the world, and this world is not in a file'
+            remedy = "begin the address with webots:// or https://, or give the world as a file"
             raise namer.source.error(place, fact, remedy)
         for problem in _endless(namer, type_name):
             raise namer.source.error(place, *problem)
@@ -188,9 +188,9 @@ def _endless(namer: _Namer, type_name: str) -> Iterator[tuple[str, str]]:
     """Yield the fact and the remedy if the chain of files has a cycle or is too long."""
     above = [file.type_name for file in (*namer.above, namer)]
     if type_name in above:
-        fact = f"{namer.type_name} and {type_name} are made of each other"
+        fact = f"{namer.type_name} and {type_name} contain each other"
         if namer.type_name == type_name:
-            fact = f"{type_name} is made of itself"
+            fact = f"{type_name} contains itself"
         yield fact, f"remove {type_name} from {namer.type_name}"
     if len(above) > MAX_FILES_DEEP:
         fact = f"PROTO files name each other more than {MAX_FILES_DEEP} deep"

@@ -37,7 +37,7 @@ class ShapePart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
-    """A shape by formulas.
+    """A shape whose lengths are formulas.
 
     The lengths of box, cylinder, sphere and plane are those of a ShapePart. A ring has (inner radius,
     thickness, height), a wall (thickness, height). A wall follows the points of the field `path`, and returns

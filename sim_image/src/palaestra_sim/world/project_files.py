@@ -1,7 +1,8 @@
 """The files that the nodes of a world name, such as the images of textures, inside the project of the world.
 
-The sidecar puts a generated world into a folder of links to what is beside the source world; such a link is
-followed to the source project. No other link leads out of the project, which is never the whole file system.
+The sidecar puts a generated world into a folder of links to the files next to the source world; such a link
+is followed to the source project. No other link leads out of the project, which is never the whole file
+system.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ class ProjectFiles:
     """The files of one world.
 
     Args:
-        world_path: of the world.
+        world_path: the path of the world.
         source: its bytes.
     """
 
@@ -33,10 +34,11 @@ class ProjectFiles:
         """Return the bytes of the file at an address that a world or a PROTO file names.
 
         Raises:
-            OSError: the file cannot be read, is no regular file, is too large, or is outside of the project.
+            OSError: the file cannot be read, is not a regular file, is too large, or is outside of
+                the project.
         """
         if not is_relative(address) or "\0" in address:
-            raise OSError(errno.EINVAL, "is no path from the folder of the world", address)
+            raise OSError(errno.EINVAL, "is not a path from the folder of the world", address)
         namer_path = Path(namer.name) if namer.kind == "PROTO" else self._world
         return read_bounded(self._inside(Path(posixpath.normpath(namer_path.parent / address))))
 

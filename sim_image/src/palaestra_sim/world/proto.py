@@ -201,7 +201,7 @@ class _ProtoReader(Reader):
         first = self._peek()
         default = self._value(name, 1)
         if not _fits(type_name, default):
-            fact = f"the default of {name} is no {type_name}"
+            fact = f"the default of {name} is not of type {type_name}"
             raise self._error(first, fact, f"write {_example(type_name)}")
         return default
 

@@ -54,9 +54,7 @@ class Reader:
         self._next = next(self._coming)
         self._taken_up_to = 0  # the byte after the last token taken
         self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
-        self._last_counts = (
-            False  # whether a field may occur twice; Webots reads both, but a world needs only one
-        )
+        self._last_counts = False  # whether a field may occur twice: then the last value counts
 
     def world(self, header: str) -> World:
         """Read `file := header (["IMPORTABLE"] "EXTERNPROTO" string | node)*`."""
@@ -170,7 +168,7 @@ class Reader:
         if token.kind != "word" or token.text in _RESERVED or not _NAME.fullmatch(token.text):
             fact = f"{shown(token)} where {role} should be"
             raise self._error(token, fact, "remove it or add what is missing before it")
-        return intern(token.text.decode())  # a world repeats a few names
+        return intern(token.text.decode())  # saves memory: a world repeats a few names
 
     def _peek(self) -> Token:
         return self._next

@@ -93,7 +93,7 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
     try:
         tables = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise StandInError(f"{name}: this is no TOML: {error}; correct it there") from None
+        raise StandInError(f"{name}: this is not TOML: {error}; correct it there") from None
     found: dict[str, StandIn] = {}
     for kind in _LISTS:
         for type_name in _listed(tables.pop(kind, []), f"{name}: {kind}"):
@@ -102,7 +102,7 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
         if type_name in found:
             raise StandInError(f"{name}: {type_name}: it is also in a list; keep one of the two")
         if not isinstance(table, dict):
-            raise StandInError(f"{name}: {type_name}: this is no table; write [{type_name}] and its shape")
+            raise StandInError(f"{name}: {type_name}: this is not a table; write [{type_name}] and its shape")
         found[type_name] = _Entry(f"{name}: {type_name}", type_name, table).stand_in()
     return MappingProxyType(found)
 
@@ -110,7 +110,7 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
 def _listed(names: object, place: str) -> Iterator[str]:
     """Yield the types in one of the lists."""
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise StandInError(f'{place}: this is no list of types; write ["Carpet"], before the first table')
+        raise StandInError(f'{place}: this is not a list of types; write ["Carpet"], before the first table')
     yield from names
 
 
@@ -138,7 +138,7 @@ class _Entry:
     def _declared(self, text: object) -> dict[str, ProtoField]:
         """Return the declared fields, after those that every object has."""
         if not isinstance(text, str):
-            self._refuse("fields", "this is no text", "declare fields as SFVec3f size 1 1 1, one a line")
+            self._refuse("fields", "this is not text", "declare fields as SFVec3f size 1 1 1, one a line")
         try:
             declared = parse_fields(text, self._type)
         except WorldError as error:
@@ -148,7 +148,9 @@ class _Entry:
     def _parts(self, rest: dict[str, Any]) -> tuple[Form, ...]:
         parts = rest.pop("parts")
         if rest or not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
-            self._refuse("parts", "it is no list of tables, or not alone", 'write [ { box = "size" } ]')
+            self._refuse(
+                "parts", "it is not a list of tables, or not the only key", 'write [ { box = "size" } ]'
+            )
         return tuple(self._form(part, f"parts[{number}].") for number, part in enumerate(parts))
 
     def _form(self, table: dict[str, Any], prefix: str) -> Form:
@@ -157,7 +159,7 @@ class _Entry:
         unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
         if unknown:
             self._refuse(
-                prefix + unknown[0], "there is no such key", f"choose of {_words({*LENGTHS, *_OPTIONS})}"
+                prefix + unknown[0], "it is not a key here", f"choose from {_words({*LENGTHS, *_OPTIONS})}"
             )
         if len(shapes) != 1:
             fact = f"it has {len(shapes)} shapes"
@@ -202,7 +204,7 @@ class _Entry:
             written = [f"{written}.{axis}" for axis in axes]
         if not isinstance(written, list) or len(written) != len(axes):
             self._refuse(
-                place, f"it has no {len(axes)} lengths", "write them in a list, or the name of a field"
+                place, f"it does not have {len(axes)} lengths", "write them in a list, or the name of a field"
             )
         return tuple(self._formula(length, place) for length in written)
 
@@ -212,13 +214,15 @@ class _Entry:
         closed = written.get("closed", False) if isinstance(written, dict) else None
         declared = self._fields.get(path)
         if declared is None or declared.type not in ("MFVec2f", "MFVec3f") or not isinstance(closed, bool):
-            fact = "its path is no field with a list of points"
+            fact = "its path is not a field with a list of points"
             self._refuse(place, fact, 'declare MFVec3f path [ … ], and write path = "path"')
         return path, closed
 
     def _on_base(self, origin: object, place: str) -> bool:
         if origin not in ("center", "base"):
-            self._refuse(place, f"{origin!r} is no origin", 'write "center", or "base" for the lower side')
+            self._refuse(
+                place, f"{origin!r} is not an origin", 'write "center", or "base" for the lower side'
+            )
         return origin == "base"
 
     def _optional(self, table: dict[str, Any], key: str, prefix: str) -> Expression | None:
@@ -247,7 +251,9 @@ class _Entry:
         size = _AXES.get(declared.type[2:])
         fits = size is not None and (summed or (declared.type.startswith("S") and _has_axis(size, axis)))
         if not fits:
-            self._refuse(place, f"{used} is no number of {declared.type} {name}", "name one, such as size.x")
+            self._refuse(
+                place, f"{used} is not a number of {declared.type} {name}", "name one, such as size.x"
+            )
 
     def _refuse(self, field: str, fact: str, remedy: str) -> NoReturn:
         raise StandInError(f"{self._place}: {field}: {fact}; {remedy}")

@@ -10,6 +10,7 @@
 - `tree`: bodies, joints and devices as nodes
 - `body_frame`: the frames of bodies
 - `motion`: the motion of bodies
+- `appearance`: what a viewer sees of a model
 - `states`: saved states of bodies
 - `simulation`: the Backend for `ros_controller`
 """

@@ -24,7 +24,7 @@ class MujocoSensor:
     """A sensor of several numbers; `value` holds those of the last sample.
 
     Attributes:
-        type_name: of the sensor in the model, such as framelinvel.
+        type_name: the type of the sensor in the model, such as framelinvel.
         numbers: a view of its value in the model.
     """
 
@@ -44,8 +44,8 @@ class MujocoActuator:
     """An actuator that is not a motor, such as a muscle or an adhesion.
 
     Attributes:
-        controls: of all actuators of the model.
-        number: of this one among them.
+        controls: the controls of all actuators of the model.
+        number: the number of this one among them.
         low, high: the minimum and the maximum control; infinite if the model has no limits.
     """
 

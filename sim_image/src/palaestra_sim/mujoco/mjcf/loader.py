@@ -50,7 +50,7 @@ def load(
     basic_step_ms = _basic_step_ms(compiled, description)
     body = body_of(compiled)
     if compiled.nu == 0 or body is None:
-        fact = f"the model has no {'body' if body is None else 'actuator'}, so a trainer can move nothing"
+        fact = f"the model has no {'body' if body is None else 'actuator'}, so a trainer cannot move anything"
         raise description.error("", "", fact, "add a body with a joint, and an actuator for it")
     equipment = equip(model, description, leave_out)
     tree = grow(model, description, equipment, body, basic_step_ms)
@@ -83,7 +83,7 @@ def _compiled(world_path: Path) -> Any:
     """
     try:
         return mujoco.MjModel.from_xml_path(str(world_path))
-    except ValueError as error:
+    except (MemoryError, RuntimeError, ValueError) as error:
         text = " ".join(str(error).split())
         line = _LINE.search(text)
         remedy = "correct the model; MuJoCo's XML reference has every element"
@@ -111,7 +111,7 @@ def _basic_step_ms(model: Any, description: Description) -> int:
         fact = f"no short basic step of whole milliseconds fits the timestep of {timestep_s:g} s"
         raise description.error("", "", fact, f"write a timestep of {shorter:g} or {longer:g}")
     if not mjcf.fits(step_ms, timestep_s):
-        fact = f"basicTimeStep {step_ms:g} is no multiple of the timestep of {timestep_s:g} s in whole ms"
+        fact = f"basicTimeStep {step_ms:g} is not a multiple of the timestep of {timestep_s:g} s in whole ms"
         remedy = f"write {mjcf.whole_step_ms(timestep_s) or 'another'}"
         raise description.error("custom", "basicTimeStep", fact, remedy)
     return int(step_ms)

@@ -23,11 +23,11 @@ class Model:
     the last step, and changes nothing on which the next step depends.
 
     Args:
-        model: of MuJoCo.
+        model: the model of MuJoCo.
         keyframe: the number of the keyframe at which the world begins; None for the model's own positions.
 
     Attributes:
-        model, data: of MuJoCo.
+        model, data: model and data of MuJoCo.
     """
 
     def __init__(self, model: Any, keyframe: int | None = None) -> None:

@@ -43,7 +43,7 @@ class BodyMotion:
         """
         free = self._model.free_joint_of(self._body(node))
         if free is None:
-            fact = f"the body {node.def_name!r} is on joints or stands, so it takes no velocity"
+            fact = f"the body {node.def_name!r} is on joints or fixed, so its velocity cannot be set"
             raise UnsimulatedError(f"{fact}; command its motors, or give it a <freejoint>")
         pose: Pose = self._model.pose(self._body(node))
         self._model.speeds(free)[:] = (*velocity, *pose.inverse.turned(turning))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -76,12 +77,13 @@ class _Fitter:
         self._known: set[str] = set()
         self._shafts: dict[int, Shaft] = {}
         self._defaults = _actuator_names(model.model)
+        self._sensor_names = _sensor_names(model.model)
         self._found = Equipment()
 
     def fit(self) -> Equipment:
         """Return the devices."""
         model = self._model.model
-        self._model.settle()  # before motors read the lengths of tendons
+        self._model.settle()  # needed before motors read the lengths of tendons
         for index in range(model.nu):
             self._add_actuator(index)
         for index in range(model.nsensor):
@@ -134,10 +136,9 @@ class _Fitter:
         type_name = generic_devices.type_name_of(model, index)
         what, which = int(model.sensor_objtype[index]), int(model.sensor_objid[index])
         given = model.sensor(index).name
-        target = mujoco.mj_id2name(model, what, which) if which >= 0 else None
         folder = "" if in_webots(model, index) else generic_devices.FOLDER
-        default = given or f"{target or index}_{type_name}"
-        name = self._name(_SENSOR, default, f"{given}_{type_name}", folder)
+        other = f"{given}_{type_name}" if given else f"{self._sensor_names[index]}_sensor"
+        name = self._name(_SENSOR, self._sensor_names[index], other, folder)
         if name is None or (folder and self._is_left_out(_SENSOR, given, name, type_name)):
             return
         start = int(model.sensor_adr[index])
@@ -235,9 +236,36 @@ def _actuator_names(model: Any) -> list[str]:
         model.actuator(index).name or ("" if joint is None else model.jnt(joint).name) or f"actuator{index}"
         for index, joint in enumerate(joints)
     ]
-    unclear = [plain.count(name) > 1 and not model.actuator(index).name for index, name in enumerate(plain)]
+    of_plain = Counter(plain)
+    unclear = [of_plain[name] > 1 and not model.actuator(index).name for index, name in enumerate(plain)]
     kinds = [
         f"{name}_{motors.kind_of(model, index)}" if unclear[index] else name
         for index, name in enumerate(plain)
     ]
-    return [f"{name}{index}" if kinds.count(name) > 1 else name for index, name in enumerate(kinds)]
+    return _numbered(kinds)
+
+
+def _sensor_names(model: Any) -> list[str]:
+    """Return the name of each sensor: its own, else that of its object, or its number, with its type.
+
+    If several of one type without names have one object, their names end with their numbers.
+    """
+    given = [model.sensor(index).name for index in range(model.nsensor)]
+    objects = [
+        mujoco.mj_id2name(model, int(model.sensor_objtype[index]), int(model.sensor_objid[index]))
+        if model.sensor_objid[index] >= 0
+        else None
+        for index in range(model.nsensor)
+    ]
+    return _numbered(
+        [
+            name or f"{objects[index] or index}_{generic_devices.type_name_of(model, index)}"
+            for index, name in enumerate(given)
+        ]
+    )
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Return names; those that occur several times end with their places."""
+    counts = Counter(names)
+    return [f"{name}{index}" if counts[name] > 1 else name for index, name in enumerate(names)]

@@ -50,8 +50,8 @@ class ModelSensor:
 
     Attributes:
         model: the whole model.
-        number: of the sensor.
-        name: of the device.
+        number: the number of the sensor.
+        name: the name of the device.
         numbers: a view of its value.
         shaft: the joint that it measures; a new one without devices if it does not measure a joint.
     """
@@ -87,8 +87,8 @@ def camera(parent: Model, number: int, name: str) -> Measured:
         near_m=float(model.vis.map.znear) * extent_m,
         far_m=float(model.vis.map.zfar) * extent_m,
     )
-    eye = ModelCamera(parent, number, lens)
-    device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0, eye=eye)
+    camera = ModelCamera(parent, number, lens)
+    device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0, eye=camera)
     return Measured(kind=_CAMERA, device=device, sample=lambda: None)
 
 
@@ -214,7 +214,7 @@ _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
 _MUJOCO_SENSOR: Final = _own(MUJOCO_SENSOR)
-_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # its camera interface is already set
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # the camera's interface is already set
 _OF_ONE: Final[dict[int, Callable[[ModelSensor], Measured]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,

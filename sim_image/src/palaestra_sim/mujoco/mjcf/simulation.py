@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Final, Never
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.mujoco.mjcf.appearance import ModelAppearance
 from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
 from palaestra_sim.mujoco.mjcf.motion import BodyMotion
 from palaestra_sim.mujoco.mjcf.robot import Equipment
@@ -54,11 +55,12 @@ class MjcfSimulation:
         self.mode = mode
         self.quit_status: int | None = None
         self.forces = False  # masses and frictions are MuJoCo's own
-        self.unread_textures = 0  # of infra-red sensors, which no model has
+        self.unread_textures = 0  # only infra-red sensors read textures, and no model has such sensors
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)
         self.movies = Movies(lambda _size: None, lambda _movie: None, basic_step_ms)
+        self.appearance = ModelAppearance(model, tree.bodies[tree.robot])
         self._model = model
         self._nodes = tree
         self._equipment = equipment
@@ -86,8 +88,8 @@ class MjcfSimulation:
         """
         count, rest = divmod(duration_ms, self.basic_step_ms)
         if rest or count < 1:
-            fact = f"step: {duration_ms} ms is no multiple of the basic step"
-            raise ValueError(f"{fact}; use one of {self.basic_step_ms} ms")
+            fact = f"step: {duration_ms} ms is not a positive multiple of the basic step"
+            raise ValueError(f"{fact}; use a multiple of {self.basic_step_ms} ms")
         for _ in range(count):
             self._basic_step()
 
@@ -214,7 +216,7 @@ class MjcfSimulation:
         self._reset_asked = False
         self.time_ms = 0
         self._model.reset()
-        self._model.settle()  # before motors read the lengths of tendons
+        self._model.settle()  # needed before motors read the lengths of tendons
         for motor in self._equipment.motors:
             motor.reset()
         for actuator in self._equipment.actuators:

@@ -20,7 +20,11 @@ from palaestra_sim.world import Item, Node, Value, World
 from palaestra_sim.world.mjcf import Description
 from palaestra_sim.world.tokens import Tokens
 
-_JOINTS: Final = {1: "BallJoint", 2: "SliderJoint", 3: "HingeJoint"}  # by mjtJoint; a free joint has no node
+_JOINTS: Final = {
+    1: "BallJoint",
+    2: "SliderJoint",
+    3: "HingeJoint",
+}  # keys: mjtJoint; a free joint has no node
 _PARAMETERS: Final = {"HingeJoint": "HingeJointParameters", "SliderJoint": "JointParameters"}
 
 

@@ -36,6 +36,7 @@ class Feed:
         whole: whether the value is a mapping of all fields.
         stamped: whether the messages have a header.
         publishers: by period in ms.
+        newest: the value that was sent last; None before the first one, and after the end.
     """
 
     path: str
@@ -48,6 +49,7 @@ class Feed:
     whole: bool = False
     stamped: bool = True
     publishers: dict[int, PublisherInterface] = field(default_factory=dict)
+    newest: Any = None
 
     def begin(self, node: NodeInterface, period_ms: int) -> None:
         """Start to publish every `period_ms`, in addition to the other periods."""
@@ -62,6 +64,7 @@ class Feed:
         for publisher in self.publishers.values():
             node.withdraw(publisher)
         self.publishers.clear()
+        self.newest = None
 
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, by each publisher that is due.
@@ -75,6 +78,7 @@ class Feed:
             if elapsed_ms % period_ms == 0 and publisher.heard:
                 for value in source.value if self.many else (source.value,):
                     self._send(publisher, value)
+                    self.newest = value
 
     def _send(self, publisher: PublisherInterface, value: Any) -> None:
         if self.whole:
@@ -93,10 +97,10 @@ class Outlet:
     Args:
         node: the node that publishes.
         device_name: as in the world.
-        topics: of the device.
+        topics: the topics of the device.
         accepts: returns whether the device accepts a period.
         enabled: called after a change with the sampling period in ms; 0 means that the device is off.
-        prefix: of `enable` and `get_sampling_period`, below the device.
+        prefix: the prefix of `enable` and `get_sampling_period`, below the device.
 
     Attributes:
         feeds: one for each topic.

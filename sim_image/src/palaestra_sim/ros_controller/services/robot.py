@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import deque
 from collections.abc import Iterator
 from typing import Any, Final
@@ -28,9 +29,13 @@ class RobotServices:
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths relative to the robot."""
-        own = Service("palaestra/window/send_text", "webots_ros/set_string", self._send_as_window)
+        own = (
+            Service("palaestra/window/send_text", "webots_ros/set_string", self._send_as_window),
+            Service("palaestra/scene", "webots_ros/get_string", self._get_scene),
+            Service("palaestra/scene_state", "webots_ros/get_string", self._get_scene_state),
+        )
         rows = (*self._constants(), *self._actions())
-        return (*(Service(f"robot/{name}", f"webots_ros/{type_}", it) for name, type_, it in rows), own)
+        return (*(Service(f"robot/{name}", f"webots_ros/{type_}", it) for name, type_, it in rows), *own)
 
     def _constants(self) -> Iterator[Row]:
         node = self._robot.parts.node
@@ -76,6 +81,14 @@ class RobotServices:
             return {"success": False}
         self._from_window.append(request.value)
         return {"success": True}
+
+    def _get_scene(self, _request: Any) -> Fields:
+        scene = self._simulation.appearance.scene(self._host.world_path.name)
+        return {"value": json.dumps(scene.to_json())}
+
+    def _get_scene_state(self, _request: Any) -> Fields:
+        state = self._simulation.appearance.state(self._simulation.time_ms)
+        return {"value": json.dumps(state.to_json())}
 
     def _get_custom_data(self, _request: Any) -> Fields:
         return {"value": self._robot.custom_data}

@@ -8,7 +8,7 @@ CONTRIBUTING.md has the steps.
 - `device_type`: the definition of a row
 - `distance_sensor`, `touch_sensor`: rows of sensors for obstacles
 - `motors`, `brake`, `position_sensor`: rows of devices on joints
-- `lidar`: the row of a sensor with many rays
+- `lidar`: the row of a sensor with many rays, and `lidar_rays`: their directions
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: rows of sensors for position and motion
 - `altimeter`, `light_sensor`: rows of sensors for height and light
 - `emitter`, `receiver`: rows of radio devices
@@ -20,6 +20,7 @@ CONTRIBUTING.md has the steps.
 - `vacuum_gripper`: the row of a gripper, which never holds an object here
 - `skin`: the row of animated meshes, which are not loaded here
 - `sensor_response`: lookup tables, resolution and axes, which several sensors share
+- `step_timer`: the time between two samples, for what turns or drifts
 - `imu_topic`: the topic of sensors that send a sensor_msgs/Imu
 """
 
@@ -55,8 +56,8 @@ from palaestra_sim.scene.devices.speaker import SPEAKER
 from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR
 from palaestra_sim.scene.devices.vacuum_gripper import VACUUM_GRIPPER
 
-# By the type of the node. Robots sample in this order, so append new rows: a row in between would change the
-# noise of the later sensors.
+# The keys are the types of nodes. Robots sample in this order, so append new rows: a row in between would
+# change the noise of the later sensors.
 DEVICES: Final[Mapping[str, DeviceType[Any]]] = {
     kind.node: kind
     for kind in (

@@ -10,7 +10,7 @@ from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.camera_interface import MOST_PIXELS, Lens
 from palaestra_sim.scene.devices.device_type import DevicePart, DeviceTopic, ValueSource
 
-PIXEL_BYTES: Final = 4  # for a color, and for a distance
+PIXEL_BYTES: Final = 4  # a color and a distance both have this size
 
 
 def read_lens(part: DevicePart, near_m: float, far_m: float) -> Lens:

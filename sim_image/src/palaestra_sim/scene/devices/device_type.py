@@ -43,7 +43,7 @@ class Device(Protocol):
 DeviceT = TypeVar("DeviceT", bound=Device)
 
 
-ROLES: Final = ("motor", "brake", "position_sensor")  # of the devices of a joint
+ROLES: Final = ("motor", "brake", "position_sensor")  # what the devices of a joint can be
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -53,7 +53,7 @@ class Shaft:
     Attributes:
         joint: the joint itself; None for a device that is not on a joint.
         motor: the first motor on it.
-        names: of the first device of each role.
+        names: the names of the first device of each role.
     """
 
     joint: Joint | None = None
@@ -78,9 +78,9 @@ class DevicePart:
     """The node of a device, while its robot is read.
 
     Attributes:
-        reading: of the world.
+        reading: the reading of the world.
         lacks: records that a node of the robot cannot be simulated.
-        node: of the device.
+        node: the node of the device.
         name: as in the world file, else the default of its type.
         place: its frame in the robot's; of a device on a joint, the frame of the joint.
         shaft: the joint to which it belongs.
@@ -151,9 +151,11 @@ class Carrier(Protocol):
 
     Attributes:
         body: None if nothing can collide with the robot.
+        time_s: the time of the world since its start or its last reset.
     """
 
     body: Body | None
+    time_s: float
 
     def gauss(self, mean: float, deviation: float, /) -> float:
         """Return the next number of the robot's own noise."""
@@ -169,6 +171,10 @@ class Carrier(Protocol):
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
         """Return a function for the object that each infra-red beam meets now."""
+        ...
+
+    def lights(self) -> Sequence[SceneNode]:
+        """Return the lights of the world now."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
@@ -203,8 +209,8 @@ class DeviceTopic:
 
     Attributes:
         name: relative to the device's name.
-        type_name: of its messages.
-        source: of the reading; None if it never has one.
+        type_name: the type of its messages.
+        source: the source of the reading; None if it never has one.
         constants: the other fields.
         reading: the field of the value; "" is the last one, which must consist of numbers and is the fastest.
         many: whether `value` is a sequence, with a message for each of its items.
@@ -227,7 +233,7 @@ class Stream:
     """Topics of a device with their own `enable`, in addition to the device's.
 
     Attributes:
-        prefix: of `enable` and `get_sampling_period`, relative to the name of the device.
+        prefix: the prefix of `enable` and `get_sampling_period`, relative to the name of the device.
         topics: the topics that it starts.
         silent: returns whether all periods are refused.
         enabled: called after a change with the sampling period in ms; 0 means off.
@@ -259,9 +265,9 @@ class DeviceType(Generic[DeviceT]):
 
     Attributes:
         node: the type of its node.
-        name: of a device whose node has no name.
-        fields: of the node, in the syntax of `field_types`, without `name` and, if it is a Solid, those of a
-            Solid.
+        name: the name of a device whose node has no name.
+        fields: the fields of the node, in the syntax of `field_types`, without `name` and, if it is a Solid,
+            those of a Solid.
         without_effect: those fields that have an effect in Webots but in no simulator here, separated by
             spaces.
         solid: whether a node that is not on a joint is a Solid.
@@ -318,7 +324,7 @@ class Devices:
     Attributes:
         rows: each with its row of the table.
         nodes: their nodes.
-        shafts: of those on joints.
+        shafts: the shafts of those on joints.
     """
 
     rows: dict[str, tuple[DeviceType[Any], Any]] = field(default_factory=dict)

@@ -18,7 +18,7 @@ from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceT
 from palaestra_sim.scene.image_buffer import BLACK, OPAQUE, Color, ImageBuffer, Point, on_background
 from palaestra_sim.scene.text_rendering import Font, letters
 
-_LARGEST: Final = 4096  # pixels in a row or column; in Webots a display is a texture
+_LARGEST: Final = 4096  # limit for the pixels in a row or column, because a display is a texture in Webots
 # Indices of blue, green, red and alpha in a pixel of each format. Source: webots/display.h
 _FORMATS: Final = {
     3: (2, 1, 0, None),
@@ -76,9 +76,9 @@ class Display:
         if camera is None or self.camera is not None:
             return camera is not None
         if not isinstance(camera, Camera):
-            raise UnsimulatedError(f"{name} is no Camera; attach one")
+            raise UnsimulatedError(f"{name} is not a Camera; attach one")
         if camera.eye is None:
-            raise UnsimulatedError(f"{name} sees nothing here; use driver mujoco or webots")
+            raise UnsimulatedError(f"{name} has no image here; use driver mujoco or webots")
         size = self.picture.width, self.picture.height
         if camera.lens.size != size:
             raise UnsimulatedError(

@@ -27,12 +27,12 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
-_MOST_RAYS: Final = 10_000  # each is cast at every step
+_MOST_RAYS: Final = 10_000  # the limit, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
-_BEAMS_OF_SONAR: Final = 5  # for each ray
+_BEAMS_OF_SONAR: Final = 5  # so many beams for each ray of a sonar
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-_EMPTY: Final = ((0.0, 0.0, 0.0),)  # of one without rows, which measures 0
+_EMPTY: Final = ((0.0, 0.0, 0.0),)  # stands for a table without rows: the sensor measures 0
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
 # aperture.
 _RINGS: Final = (
@@ -75,9 +75,9 @@ class DistanceSensor:
     A sonar has five beams for each ray: the ray itself, and two pairs beside it.
 
     Attributes:
-        rows: of its lookup table, as the world has them.
+        rows: the rows of its lookup table, as the world has them.
         sensitivity: how much the color counts for an infra-red sensor; 0: not at all.
-        resolution: of the value; -1: as fine as can be.
+        resolution: the resolution of the value; -1: as fine as can be.
     """
 
     name: str
@@ -130,8 +130,8 @@ def _beams(pose: Pose, cone: Sequence[Vector], reach_m: float, *, sonar: bool) -
             up = (-across[1] * z, across[0] * z, level) if level else (1.0, 0.0, 0.0)
             for side in (across, up):
                 for sign in (-_BESIDE_M, _BESIDE_M):
-                    beside = pose.carry((side[0] * sign, side[1] * sign, side[2] * sign))
-                    yield beam_along(Pose(beside, pose.rotation), direction, reach_m)
+                    origin = pose.carry((side[0] * sign, side[1] * sign, side[2] * sign))
+                    yield beam_along(Pose(origin, pose.rotation), direction, reach_m)
 
 
 def _cone(count: int, aperture_rad: float) -> list[Vector]:

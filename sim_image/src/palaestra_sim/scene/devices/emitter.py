@@ -21,7 +21,7 @@ class Emitter:
 
     Attributes:
         range_m: the maximum distance of receivers; -1 is without limit.
-        channel: of its packets; -1 means all receivers.
+        channel: the channel of its packets; -1 means all receivers.
         outbox: texts, each with the channel and the range at which it was sent.
     """
 

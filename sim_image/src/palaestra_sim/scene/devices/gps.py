@@ -1,7 +1,8 @@
-"""GPS: its position in meters, and its speed.
+"""GPS: its position in meters or in degrees, and its speed.
 
-Its coordinates are those of the world plus WorldInfo.gpsReference (the system "local"). Latitude and
-longitude (WGS84) are refused. Source: WbGps.cpp of Webots.
+Its coordinates are those of the world plus WorldInfo.gpsReference (the system "local"). In the system
+"WGS84", the reference is latitude and longitude in degrees and altitude in meters, and so is the position;
+noise and resolution are in meters. Source: WbGps.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -14,11 +15,14 @@ from typing import Any, Final
 from palaestra_sim.ros_interfaces import Fields, Row
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
 from palaestra_sim.scene.devices.sensor_response import Gauss, discrete
+from palaestra_sim.scene.devices.step_timer import StepTimer
 from palaestra_sim.scene.frames import Frame
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.utm import UtmZone
 
-_LOCAL: Final = 0  # the value that `get_coordinate_system` returns; WGS84 is 1
+_LOCAL, _WGS84 = 0, 1  # the values that `get_coordinate_system` returns
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
+_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end there
 
 
 @dataclass(slots=True)
@@ -28,13 +32,36 @@ class _Speed:
     value: float | Vector
 
 
+@dataclass(frozen=True, slots=True)
+class _Globe:
+    """A UTM zone, and the axes of the world that point east, north and up."""
+
+    zone: UtmZone
+    axes: tuple[int, int, int]
+
+    def in_meters(self, latitude: float, longitude: float, altitude_m: float) -> Vector:
+        """Return a point in the axes of the world."""
+        east, north, up = self.axes
+        x_y_z = [0.0, 0.0, 0.0]
+        x_y_z[up] = altitude_m
+        x_y_z[east], x_y_z[north] = self.zone.to_grid(latitude, longitude)
+        return x_y_z[0], x_y_z[1], x_y_z[2]
+
+    def in_degrees(self, point: Vector) -> Vector:
+        """Return latitude, longitude and altitude of a point in the axes of the world."""
+        east, north, up = self.axes
+        return *self.zone.to_degrees(point[east], point[north]), point[up]
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class Gps:
-    """A receiver; `value` is x, y, z in meters.
+    """A receiver; `value` is x, y, z in meters, or latitude, longitude and altitude.
 
     Attributes:
-        reference: the offset from the position in the world.
+        reference: the offset from the position in the world, in meters.
+        globe: how meters become degrees; None in the system "local".
         accuracy: standard deviation of the position's noise, in meters.
+        correlation: the share of the noise that is left after a second.
         speed_noise: standard deviation of the speed's noise, as a fraction of the speed.
         speed: in m/s.
         speed_vector: in m/s, in world axes, without noise.
@@ -44,7 +71,9 @@ class Gps:
     model: str
     place: Frame
     reference: Vector
+    globe: _Globe | None = None
     accuracy: float
+    correlation: float = 0.0
     resolution: float
     speed_noise: float
     speed_resolution: float
@@ -54,47 +83,69 @@ class Gps:
 
 
 def _read(part: DevicePart) -> Gps:
-    system = part.world_text("gpsCoordinateSystem", "local")
-    if system == "WGS84":
-        part.lack("a GPS with latitude and longitude (WorldInfo.gpsCoordinateSystem)")
-    x, y, z = part.world_numbers("gpsReference", (0.0, 0.0, 0.0))
-    accuracy = part.number("accuracy", 0.0)
-    if accuracy and part.number("noiseCorrelation", 0.0):
-        part.lack("a GPS whose noise is correlated (noiseCorrelation)")
+    reference, globe = _reference(part)
     return Gps(
         name=part.name,
         model=part.text("model"),
         place=part.place,
-        reference=(x, y, z),
-        accuracy=accuracy,
+        reference=reference,
+        globe=globe,
+        accuracy=part.number("accuracy", 0.0),
+        correlation=part.number("noiseCorrelation", 0.0),
         resolution=part.number("resolution", -1.0),
         speed_noise=part.number("speedNoise", 0.0),
         speed_resolution=part.number("speedResolution", -1.0),
     )
 
 
+def _reference(part: DevicePart) -> tuple[Vector, _Globe | None]:
+    x, y, z = part.world_numbers("gpsReference", (0.0, 0.0, 0.0))
+    if part.world_text("gpsCoordinateSystem", "local") != "WGS84":
+        return (x, y, z), None
+    if not (abs(x) <= _MOST_LATITUDE and abs(y) <= _MOST_LONGITUDE):
+        part.refuse(
+            f"gpsReference {x:g} {y:g}",
+            f"use at most {_MOST_LATITUDE:g} degrees of latitude and {_MOST_LONGITUDE:g} of longitude",
+        )
+        x = y = 0.0
+    globe = _Globe(UtmZone.of(x, y), (part.axis_to("E"), part.axis_to("N"), part.axis_to("U")))
+    return globe.in_meters(x, y, z), globe
+
+
 def _sampler(receivers: Sequence[Gps], robot: Carrier) -> Sample:
-    gauss = robot.gauss
+    samples = [_receiver(gps, robot) for gps in receivers]
 
     def sample() -> None:
-        for gps in receivers:
-            gps.value = _position(gps, gauss)
-            velocity = robot.motion(gps.place).velocity
-            gps.speed_vector.value = velocity
-            gps.speed.value = _measured_speed(gps, math.hypot(*velocity), gauss)
+        for each in samples:
+            each()
 
     return sample
 
 
-def _position(gps: Gps, gauss: Gauss) -> Vector:
-    coordinates = []
-    for exact, reference in zip(gps.place.world_position, gps.reference, strict=True):
-        coordinate = exact + reference
+def _receiver(gps: Gps, robot: Carrier) -> Sample:
+    timer, gauss = StepTimer(robot), robot.gauss
+    noise = [0.0, 0.0, 0.0]  # of each axis, in standard deviations
+
+    def sample() -> None:
+        elapsed_s, reset = timer.elapsed()
+        if reset:
+            noise[:] = 0.0, 0.0, 0.0
         if gps.accuracy:
-            coordinate += gps.accuracy * gauss(0.0, 1.0)
-        coordinates.append(discrete(coordinate, gps.resolution))
-    x, y, z = coordinates
-    return x, y, z
+            kept = gps.correlation**elapsed_s if gps.correlation else 0.0
+            new = math.sqrt(1.0 - kept**2)
+            noise[:] = (kept * it + new * gauss(0.0, 1.0) for it in noise)
+        gps.value = _position(gps, noise)
+        velocity = robot.motion(gps.place).velocity
+        gps.speed_vector.value = velocity
+        gps.speed.value = _measured_speed(gps, math.hypot(*velocity), gauss)
+
+    return sample
+
+
+def _position(gps: Gps, noise: Sequence[float]) -> Vector:
+    places = zip(gps.place.world_position, gps.reference, noise, strict=True)
+    x, y, z = (discrete(exact + at + gps.accuracy * by, gps.resolution) for exact, at, by in places)
+    return (x, y, z) if gps.globe is None else gps.globe.in_degrees((x, y, z))
 
 
 def _measured_speed(gps: Gps, speed: float, gauss: Gauss) -> float:
@@ -103,9 +154,10 @@ def _measured_speed(gps: Gps, speed: float, gauss: Gauss) -> float:
     return discrete(speed, gps.speed_resolution)
 
 
-def _services(_gps: Gps) -> tuple[Row, ...]:
+def _services(gps: Gps) -> tuple[Row, ...]:
+    system = _LOCAL if gps.globe is None else _WGS84
     return (
-        ("get_coordinate_system", "get_int", lambda _: {"value": _LOCAL}),
+        ("get_coordinate_system", "get_int", lambda _: {"value": system}),
         (
             "decimal_degrees_to_degrees_minutes_seconds",
             "gps_decimal_degrees_to_degrees_minutes_seconds",

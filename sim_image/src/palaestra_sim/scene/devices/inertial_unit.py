@@ -27,7 +27,7 @@ class InertialUnit:
 
     Attributes:
         noise: standard deviation of the noise about each axis, as a fraction of pi.
-        resolution: of each number of the quaternion; -1 for exact values.
+        resolution: the resolution of each number of the quaternion; -1 for exact values.
     """
 
     name: str

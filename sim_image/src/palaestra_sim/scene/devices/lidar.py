@@ -3,6 +3,10 @@
 A layer is a row of the image, from the top down; in a row, the rays go from left to right. All rays are cast
 at each step while the lidar is enabled, and none otherwise, because they cost time. The distance of an object
 nearer than `minRange` or beyond `maxRange` is infinite.
+
+A lidar that rotates casts at each step the rays over which its head has turned since the step before. Its
+first ray looks ahead, and the others go to the right, through a full turn. A distance is 0 until the head has
+passed it.
 Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
@@ -17,13 +21,15 @@ from typing import Any, Final
 
 from palaestra_sim.ros_interfaces import Fields, Row, UnsimulatedError
 from palaestra_sim.scene.devices.device_type import Carrier, DevicePart, DeviceTopic, DeviceType, Sample
+from palaestra_sim.scene.devices.lidar_rays import LidarRays
 from palaestra_sim.scene.devices.sensor_response import discrete
+from palaestra_sim.scene.devices.step_timer import StepTimer
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.old_axes import looking
-from palaestra_sim.scene.sensor_rays import Beam, beam_along
 
 _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
+_ROUNDING: Final = 1e-6  # added so that a turn by exactly one ray's share includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
 _FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
 _POINT_FIELDS: Final = [
@@ -46,9 +52,8 @@ class Lidar:
         info: the response of `get_info`.
         frequency: the response of `get_frequency_info`.
         noise: standard deviation as a fraction of the maximum range.
-        resolution: of a distance; -1 for exact values.
-        directions: of the rays of each layer, unit vectors in the frame of the sensor.
-        beams: the rays of each layer, in the frame of the robot.
+        resolution: the resolution of a distance; -1 for exact values.
+        rays: its rays.
         period_ms: its sampling period; 0 while it is not enabled.
         clouded: whether the point cloud is enabled.
         layers: the distances of the last step in meters, by layer.
@@ -61,8 +66,7 @@ class Lidar:
     frequency: dict[str, float]
     noise: float
     resolution: float
-    directions: tuple[tuple[Vector, ...], ...]
-    beams: tuple[tuple[Beam, ...], ...]
+    rays: LidarRays
     period_ms: int = 0
     clouded: bool = False
     layers: list[array[float]] = field(default_factory=list)
@@ -81,7 +85,7 @@ class Lidar:
 
     def points(self, layer: int) -> Iterator[Vector]:
         """Yield the points of a layer in the frame of the sensor; infinite where a ray met nothing."""
-        for distance_m, (x, y, z) in zip(self.layers[layer], self.directions[layer], strict=True):
+        for distance_m, (x, y, z) in zip(self.layers[layer], self.rays.layer(layer), strict=True):
             if math.isinf(distance_m):
                 yield math.inf, math.inf, math.inf
             else:
@@ -120,24 +124,30 @@ class _Cloud:
 
 
 def _read(part: DevicePart) -> Lidar:
-    if part.text("type", "fixed") != "fixed":
-        part.lack("a lidar that rotates")
-    if part.number("tiltAngle", 0.0) != 0.0:
-        part.lack("a lidar with a tiltAngle")
     number = part.number
+    columns = max(1, int(number("horizontalResolution", 512.0)))
+    layers = max(1, int(number("numberOfLayers", 4.0)))
+    if (count := columns * layers) > _MOST_RAYS:
+        part.refuse(f"a lidar with {count} rays", f"use {_MOST_RAYS} at most")
+        columns = layers = 1
     info = {
-        "horizontalResolution": max(1, int(number("horizontalResolution", 512.0))),
-        "numberOfLayers": max(1, int(number("numberOfLayers", 4.0))),
+        "horizontalResolution": columns,
+        "numberOfLayers": layers,
         "fov": number("fieldOfView", 1.5708),
         "verticalFov": number("verticalFieldOfView", 0.2),
         "minRange": number("minRange", 0.01),
         "maxRange": number("maxRange", 1.0),
     }
-    if (rays := info["horizontalResolution"] * info["numberOfLayers"]) > _MOST_RAYS:
-        part.refuse(f"a lidar with {rays} rays", f"use {_MOST_RAYS} at most")
-        info.update(horizontalResolution=1, numberOfLayers=1)
-    directions = tuple(_layers(info))
-    frame = looking(part.node, part.place).world_pose
+    rays = LidarRays(
+        frame=looking(part.node, part.place).world_pose,
+        layers=layers,
+        columns=columns,
+        wide_rad=info["fov"],
+        high_rad=info["verticalFov"],
+        tilt_rad=number("tiltAngle", 0.0),
+        reach_m=info["maxRange"],
+        rotates=part.text("type", "fixed").lower() == "rotating",
+    )
     return Lidar(
         name=part.name,
         model=part.text("model"),
@@ -149,39 +159,66 @@ def _read(part: DevicePart) -> Lidar:
         },
         noise=number("noise", 0.0),
         resolution=number("resolution", -1.0),
-        directions=directions,
-        beams=tuple(
-            tuple(beam_along(frame, direction, info["maxRange"]) for direction in row) for row in directions
-        ),
-        layers=[_blank(len(row)) for row in directions],
+        rays=rays,
+        layers=_unseen(rays),
     )
 
 
-def _blank(columns: int) -> array[float]:
-    return array("f", [math.inf]) * columns
-
-
-def _layers(info: dict[str, Any]) -> Iterator[tuple[Vector, ...]]:
-    """Yield the directions of each layer: spread over the vertical field of view, its ends included."""
-    layers, columns = info["numberOfLayers"], info["horizontalResolution"]
-    for layer in range(layers):
-        up = info["verticalFov"] * (0.5 - layer / (layers - 1)) if layers > 1 else 0.0
-        left = (info["fov"] * (0.5 - (column + 0.5) / columns) for column in range(columns))
-        yield tuple((math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)) for it in left)
+def _unseen(rays: LidarRays) -> list[array[float]]:
+    """Return the distances before the first measurement."""
+    return [array("f", [0.0 if rays.rotates else math.inf]) * rays.columns for _ in range(rays.layers)]
 
 
 def _sampler(lidars: Sequence[Lidar], robot: Carrier) -> Sample:
-    casts = [(lidar, [robot.see(beams) for beams in lidar.beams]) for lidar in lidars]
-    gauss = robot.gauss
+    samples = [_rotating(lidar, robot) if lidar.rays.rotates else _fixed(lidar, robot) for lidar in lidars]
 
     def sample() -> None:
-        for lidar, layers in casts:
-            if lidar.period_ms:
-                for layer, cast in enumerate(layers):
-                    seen = (_seen(lidar, distance_m, gauss) for distance_m in cast())
-                    lidar.layers[layer] = array("f", seen)
+        for each in samples:
+            each()
 
     return sample
+
+
+def _fixed(lidar: Lidar, robot: Carrier) -> Sample:
+    casts: list[Callable[[], Sequence[float]]] = []
+
+    def sample() -> None:
+        if not lidar.period_ms:
+            return
+        if not casts:  # many rays take memory, so only a lidar that is used has them
+            columns = range(lidar.rays.columns)
+            casts.extend(robot.see(lidar.rays.beams(layer, columns)) for layer in range(lidar.rays.layers))
+        for layer, cast in enumerate(casts):
+            lidar.layers[layer] = array("f", (_seen(lidar, distance_m, robot.gauss) for distance_m in cast()))
+
+    return sample
+
+
+def _rotating(lidar: Lidar, robot: Carrier) -> Sample:
+    timer, turns = StepTimer(robot), 0.0
+
+    def sample() -> None:
+        nonlocal turns
+        elapsed_s, reset = timer.elapsed()
+        if reset:
+            turns = 0.0
+            lidar.layers[:] = _unseen(lidar.rays)
+        if lidar.period_ms and elapsed_s:
+            before, turns = turns, turns + elapsed_s * lidar.frequency["frequency"]
+            _sweep(lidar, robot, before, turns)
+
+    return sample
+
+
+def _sweep(lidar: Lidar, robot: Carrier, before: float, turns: float) -> None:
+    """Cast the rays that the head passes on its way from one place to another, in turns."""
+    rays = lidar.rays
+    first, end = (math.floor(it * rays.columns + _ROUNDING) for it in (before, turns))
+    columns = [column % rays.columns for column in range(max(first, end - rays.columns), end)]
+    beams = [beam for layer in range(rays.layers) for beam in rays.beams(layer, columns)]
+    places = ((layer, column) for layer in range(rays.layers) for column in columns)
+    for (layer, column), distance_m in zip(places, robot.see(beams)(), strict=True):
+        lidar.layers[layer][column] = _seen(lidar, distance_m, robot.gauss)
 
 
 def _seen(lidar: Lidar, distance_m: float, gauss: Callable[[float, float], float]) -> float:

@@ -81,8 +81,8 @@ class Radar:
 
     Attributes:
         place: its frame; it looks along x.
-        node: of the device.
-        limits: of its detection.
+        node: the node of the device.
+        limits: the limits of its detection.
         gain_w_m2: the power reflected by 1 m2 at a distance of 1 m.
         occlusion: whether shapes hide targets.
         seen: the targets of the last sample.

@@ -27,7 +27,7 @@ class RangeFinder:
         place: its frame.
         lens: its far end is the maximum range.
         least_m: the minimum range.
-        resolution_m: of a distance; -1 for exact values.
+        resolution_m: the resolution of a distance; -1 for exact values.
         spherical: whether its image would be spherical.
         eye: the camera interface; None if the simulator does not render.
     """

@@ -28,7 +28,7 @@ class Recognition:
     """The Recognition node of a camera.
 
     Attributes:
-        place, lens: of the camera.
+        place, lens: the frame and the lens of the camera.
         reach_m: objects are recognized within this distance.
         most: maximum number of objects, the nearest first; -1 for all.
         segments: whether it has `segmentation`.

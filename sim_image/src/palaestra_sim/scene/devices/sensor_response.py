@@ -47,7 +47,7 @@ class Axes:
     Attributes:
         table: applied to each axis; None leaves the values unchanged.
         on: whether x, y and z are measured; if not, the value is NaN.
-        resolution: of each value; -1 for exact values.
+        resolution: the resolution of each value; -1 for exact values.
     """
 
     table: LookupTable | None

@@ -18,7 +18,7 @@ from palaestra_sim.scene.lookup_table import LookupTable, lookup_table
 from palaestra_sim.scene.old_axes import of_old_axes
 from palaestra_sim.scene.shapes import Shape
 
-_TYPES: Final = ("bumper", "force", "force-3d")  # by the number that `get_type` returns
+_TYPES: Final = ("bumper", "force", "force-3d")  # the index is the number that `get_type` returns
 _BUMPER, _FORCE, _FORCE_3D = range(3)
 _TABLE: Final = ((0.0, 0.0, 0.0), (5000.0, 50000.0, 0.0))  # the default of TouchSensor.lookupTable
 _NOTHING: Final = (0.0, 0.0, 0.0)
@@ -33,7 +33,7 @@ class TouchSensor:
         type: the number of one of `_TYPES`.
         link: the part whose force is measured; None for a bumper.
         table: applied to each force; None for the force itself.
-        resolution: of a force; -1 for exact values.
+        resolution: the resolution of a force; -1 for exact values.
         value: of a bumper, whether it was touched since the sensor was last sampled; of the others the force,
             as one or three numbers.
     """

@@ -36,7 +36,7 @@ class VacuumGripper:
         """
         if on and self.touches:
             raise UnsimulatedError(
-                f"{self.name} has a boundingObject, and holding what touches it is not simulated;"
+                f"{self.name} has a boundingObject, and holding objects that touch it is not simulated;"
                 " use driver webots"
             )
         self.on = on
@@ -45,7 +45,7 @@ class VacuumGripper:
 def _read(part: DevicePart) -> VacuumGripper:
     on, touches = part.node.flag("isOn", False), bool(part.node.nodes("boundingObject"))
     if on and touches:
-        part.lack("a VacuumGripper that holds what touches it")
+        part.lack("a VacuumGripper that holds objects that touch it")
     return VacuumGripper(name=part.name, model=part.text("model"), on=on, touches=touches)
 
 

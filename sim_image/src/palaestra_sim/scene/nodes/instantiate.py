@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.scene.extrusion import faces
 from palaestra_sim.scene.nodes.scene_node import Content, FieldContent, Origin, SceneNode
 from palaestra_sim.scene.nodes.scope import Scope, definitions
 from palaestra_sim.scene.nodes.types import is_base_type
@@ -26,8 +27,9 @@ _SHAPES: Final = {
     "sphere": ("Sphere", ("radius",)),
     "plane": ("Plane", ("size",)),
 }
-MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots need three
-MAX_NODES: Final = 250_000  # a PROTO that contains two of another, and so on, reaches a million in 20 levels
+MAX_DEPTH: Final = 20  # levels of PROTOs inside PROTOs; Webots' own robots need three
+# Limit for nodes: if each PROTO contains two of the next, 20 levels make a million.
+MAX_NODES: Final = 250_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +78,7 @@ class Instantiator:
         return [node for node in grown if node is not None]
 
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
-        if len(self.nodes) > MAX_NODES:  # stop at the first one, because 2 to the 60th may follow
+        if len(self.nodes) > MAX_NODES:  # stop at the first error, because 2 to the 60th may follow
             fact = f"the world has more than {MAX_NODES} nodes"
             raise scope.error(written, fact, "break a circle of PROTOs or of USE, or use fewer")
         try:
@@ -93,6 +95,9 @@ class Instantiator:
                 return self._instance(proto, source, scope, parent)
         node = self._new(source.type_name, Origin(source, scope.source), parent)
         node.def_name = source.def_name or ""
+        if source.type_name == "Extrusion" and source.type_name not in self._descriptions.unusable:
+            self._fill(node, source, scope)
+            return self._extruded(node)
         why = self._descriptions.unusable.get(source.type_name)
         if why is not None:
             node.unusable = f"{source.type_name} is not expanded ({why.world}:{why.line}: {why.fact})"
@@ -138,6 +143,28 @@ class Instantiator:
             node.shipped = builtin_protos().get(proto.name) is proto
             node.def_name = source.def_name or ""
             node.origin = Origin(source, scope.source)
+        return node
+
+    def _extruded(self, node: SceneNode) -> SceneNode:
+        """Make an Extrusion the IndexedFaceSet that it becomes in Webots; a curved one stays as it is."""
+        found = faces(
+            {name: node.numbers(name) or () for name in node.fields},
+            begin_cap=node.flag("beginCap", True),
+            end_cap=node.flag("endCap", True),
+        )
+        if found is None:
+            return node
+        node.type_name = "IndexedFaceSet"
+        node.proto_name = "Extrusion"
+        points = self._new("Coordinate", node.origin, node)
+        flat = [number for point in found.points for number in point]
+        points.fields["point"] = FieldContent(list(flat), bracketed=True)
+        ccw = node.fields.get("ccw")
+        node.fields.clear()
+        node.fields["coord"] = FieldContent([points])
+        node.fields["coordIndex"] = FieldContent([float(it) for it in found.index], bracketed=True)
+        if ccw is not None:
+            node.fields["ccw"] = ccw
         return node
 
     def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:

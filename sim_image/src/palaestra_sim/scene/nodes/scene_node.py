@@ -49,7 +49,7 @@ class SceneNode:
     Attributes:
         number: the response of `get_id`; 0 is the root.
         origin: where it was written; None for the root.
-        type_name: of the node, such as "Solid".
+        type_name: the type of the node, such as "Solid".
         proto_name: the PROTO of which it is an instance; "" if it is not an instance.
         def_name: its DEF name; "" without one.
         parent: None for the root.

@@ -22,8 +22,8 @@ class SceneTree:
 
     Args:
         world: the parsed world.
-        name: of its file, in errors.
-        descriptions: of the types that are not base types.
+        name: the name of its file, in errors.
+        descriptions: the descriptions of the types that are not base types.
 
     Attributes:
         source: the bytes of the world.

@@ -122,7 +122,7 @@ def _reaches_robot(node: SceneNode, field: str) -> bool:
 
 
 def _moves(node: SceneNode, field: str) -> bool:
-    """Return whether a write of a node's pose moves it; rays and outlines of a robot cannot be moved."""
+    """Return whether writing the field moves the node; a robot's part with a device cannot be moved."""
     if field not in _PLACING or node.place is None or not node.place.placeable:
         return False
     if node.type_name == "Robot" or not _on_robot(node):

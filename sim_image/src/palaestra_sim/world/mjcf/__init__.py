@@ -5,6 +5,7 @@ MuJoCo itself is not needed to check or to name such a world. All modules except
 - `elements`: the elements of an XML file with their places
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
+- `part_files`: how often each of those files is part of the model
 - `project`: these files on disk, and the folder that holds them
 - `size_checks`: checks for elements that would need too much memory
 - `checks`: the mistakes that make a world unusable

@@ -34,7 +34,7 @@ Check = Callable[[Description], Iterator[WorldError]]
 def no_actuator(found: Description) -> Iterator[WorldError]:
     """The model has no actuator; an included file may have one, which this check does not see."""
     if not any(it.children for it in found.root.named("actuator")) and not parts(found.root):
-        fact = "the model has no actuator, so a trainer can move nothing"
+        fact = "the model has no actuator, so a trainer cannot move anything"
         yield found.source.error(found.root.start, fact, "add <actuator> with a motor, position or velocity")
 
 
@@ -77,7 +77,7 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
     element = found.numbers.get(BASIC_STEP)
     if not timestep_s > 0.0:
         option = next(found.root.named("option"))
-        yield found.source.error(option.start, "the timestep is no positive number", "write seconds")
+        yield found.source.error(option.start, "the timestep is not a positive number", "write seconds")
     elif step_ms is None or element is None:
         if whole_step_ms(timestep_s) is None:
             fact = f"no short basic step of whole milliseconds fits the timestep of {timestep_s:g} s"
@@ -85,7 +85,7 @@ def unfit_step(found: Description) -> Iterator[WorldError]:
             option = next(found.root.named("option"))
             yield found.source.error(option.start, fact, f"write {shorter:g} or {longer:g}")
     elif not fits(step_ms, timestep_s):
-        fact = f"basicTimeStep {step_ms:g} is no multiple of the timestep of {timestep_s:g} s in whole ms"
+        fact = f"basicTimeStep {step_ms:g} is not a multiple of the timestep of {timestep_s:g} s in whole ms"
         yield found.source.error(element.start, fact, f"write {whole_step_ms(timestep_s) or 'another'}")
 
 
@@ -97,7 +97,7 @@ def unknown_devices(found: Description) -> Iterator[WorldError]:
             kinds = ", ".join(DEVICE_KINDS)
             remedy = f'write "{DEVICE}KIND/NAME" with a KIND of {kinds}, and the new name or "-" as data'
             yield found.source.error(
-                found.texts[DEVICE + key].start, f"{DEVICE + key!r} names no device", remedy
+                found.texts[DEVICE + key].start, f"{DEVICE + key!r} does not name a device", remedy
             )
 
 
@@ -115,7 +115,7 @@ def relative_address(found: Description) -> Iterator[WorldError]:
     """The model names a file, but the world is not in a file, so it has no folder."""
     for element, path in named_files(found.root):
         if is_relative(path):
-            fact = f"{path!r} is relative to the file of the world, and this one has none"
+            fact = f"{path!r} is relative to the file of the world, and this world is not in a file"
             yield found.source.error(element.start, fact, "give the world as a file (world.file)")
 
 

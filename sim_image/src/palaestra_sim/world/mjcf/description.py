@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from palaestra_sim.errors import WorldError
@@ -31,8 +31,8 @@ DEVICE: Final = "device:"
 LEFT_OUT: Final = "-"  # name for a device that the user leaves out
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
-_LONGEST_MS: Final = 100  # of a default basic step; robots are stepped several times as often
-_MOST_STEPS: Final = 10_000  # of MuJoCo in a basic step; more would take seconds
+_LONGEST_MS: Final = 100  # limit for a default basic step; robots step several times as often
+_MOST_STEPS: Final = 10_000  # steps of MuJoCo in a basic step; more would take seconds
 _SHORTEST_PART: Final = 99  # the shortest timestep that a message recommends is 1 / (99 + 1) ms
 _NEAR: Final = 1e-4  # relative tolerance: 0.0041666 s counts as 1/240 s
 _BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
@@ -53,6 +53,8 @@ class Description:
     root: Element
     texts: Mapping[str, Element]
     numbers: Mapping[str, Element]
+    # Where the elements of a section begin, by name; each section is searched once.
+    _places: dict[str, dict[str, int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def robot(self) -> str:
@@ -88,8 +90,11 @@ class Description:
 
     def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
         """Return an error at the element of that name in a section such as "sensor", else at the root."""
-        elements = (it for section_ in self.root.named(section) for it in section_.walk())
-        start = next((it.start for it in elements if name and it.attributes.get("name") == name), 0)
+        if section not in self._places:
+            elements = (it for section_ in self.root.named(section) for it in section_.walk())
+            named = ((it.attributes.get("name", ""), it.start) for it in elements)
+            self._places[section] = dict(reversed(list(named)))
+        start = self._places[section].get(name, 0) if name else 0
         return self.source.error(start or self.root.start, fact, remedy)
 
     def _text(self, name: str) -> str:

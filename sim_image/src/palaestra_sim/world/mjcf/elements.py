@@ -90,7 +90,7 @@ class _Reader:
         try:
             self._parser.Parse(self._source.data, True)
         except expat.ExpatError as error:
-            fact = f"the file is no well-formed XML: {expat.ErrorString(error.code)}"
+            fact = f"the file is not well-formed XML: {expat.ErrorString(error.code)}"
             raise self._source.error(self._parser.ErrorByteIndex, fact, "correct it here") from None
         if self._root is None:
             raise self._source.error(0, "the file has no element", "write a model: <mujoco> ... </mujoco>")
@@ -118,6 +118,6 @@ class _Reader:
 
 def _start_tag(source: Source, element: Element) -> re.Match[bytes]:
     tag = _START_TAG.match(source.data, element.start)
-    if tag is None:  # impossible: the parser has found a start tag here
+    if tag is None:  # cannot occur: the parser has found a start tag here
         raise LookupError(f"no start tag of {element.tag}")
     return tag

@@ -17,14 +17,16 @@ from palaestra_sim.world.bounded_read import read_bounded
 from palaestra_sim.world.mjcf.description import Description
 from palaestra_sim.world.mjcf.elements import Element, read
 from palaestra_sim.world.mjcf.files import absolutes, assets, named_folders, parts
+from palaestra_sim.world.mjcf.part_files import PartFiles
 from palaestra_sim.world.mjcf.size_checks import growing
 from palaestra_sim.world.paths import climb, is_relative
 from palaestra_sim.world.source import Source
 
-_BESIDE: Final = "put it beside the world, or beside this file"
+_NEXT_TO_IT: Final = "put it next to the world, or next to this file"
 _TOGETHER: Final = (
-    "copy it beside the world, or name a folder that holds both (--root, or world.root of a job)"
+    "copy it next to the world, or name a folder that holds both (--root, or world.root of a job)"
 )
+_SMALLER: Final = "attach fewer models"
 
 
 class _Named(NamedTuple):
@@ -56,6 +58,7 @@ class Project:
     def __init__(self, world: Path, description: Description, root: Path | None = None) -> None:
         self.roots: list[Element] = []
         self._folder = world.absolute().parent
+        self._main = world.name
         self._root = root
         self._description = description
         self._named: list[_Named] = []
@@ -73,26 +76,32 @@ class Project:
     def _read(self) -> Iterator[WorldError]:
         """Read all included files; yield their errors."""
         description = self._description
-        waiting = [("", description.source, description.root)]
+        files = PartFiles(self._main, description.root)
+        waiting = [(self._main, description.source, description.root)]
         seen: set[str] = set()
         while waiting:
-            beside, source, root = waiting.pop()
-            self._note_assets(source, root, beside)
+            place, source, root = waiting.pop()
+            folder_of_file = posixpath.dirname(place)
+            self._note_assets(source, root, folder_of_file)
             for element, part in parts(root):
-                found = next(self._there(part, [*self._folders(description.root), beside]), None)
+                found = next(self._there(part, [*self._folders(description.root), folder_of_file]), None)
                 if found is None:
                     fact = f"the file {part!r}, of which the model consists too, is missing"
-                    yield source.error(element.start, fact, _BESIDE)
+                    yield source.error(element.start, fact, _NEXT_TO_IT)
                     continue
                 self._named.append(named := _Named(source, element, found))
+                files.add(place, found)
                 if found not in seen and not self._is_outside(named, self._root):
                     seen.add(found)
                     inner = Source(data=read_bounded(self._folder / found), name=part)
                     elements = read(inner)
                     self.roots.append(elements)
+                    files.read(found, elements)
                     yield from absolutes(inner, elements)
                     yield from growing(inner, elements)
-                    waiting.append((posixpath.dirname(found), inner, elements))
+                    waiting.append((found, inner, elements))
+        if (trouble := files.trouble()) is not None:
+            yield description.source.error(description.root.start, trouble, _SMALLER)
 
     @property
     def levels(self) -> int:
@@ -124,13 +133,13 @@ class Project:
     def _real(self, named: _Named) -> Path:
         return (self._folder / named.path).resolve()
 
-    def _note_assets(self, source: Source, root: Element, beside: str) -> None:
-        """Record the existing meshes, textures and other assets that a file in the folder `beside` names.
+    def _note_assets(self, source: Source, root: Element, folder_of_file: str) -> None:
+        """Record the existing meshes, textures and other assets that a file in that folder names.
 
         The assets of an attached model are next to that model.
         """
         named = [*self._folders(self._description.root), *self._folders(root)[1:]]
-        folders = named + [posixpath.join(beside, folder) for folder in named if beside]
+        folders = named + [posixpath.join(folder_of_file, folder) for folder in named if folder_of_file]
         for element, path in assets(root):
             self._named += (_Named(source, element, found) for found in self._there(path, folders))
 

@@ -20,6 +20,8 @@ _MOST: Final[Mapping[str, int]] = {
     "hfield": 16_000_000,
     "texture": 100_000_000,
     "camera": 1 << 26,
+    "mesh": 40_000,
+    "size": 1_000_000,
 }
 # The attributes whose numbers are multiplied.
 _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
@@ -29,6 +31,8 @@ _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "hfield": ("nrow", "ncol"),
     "texture": ("width", "height"),
     "camera": ("resolution",),
+    "mesh": ("params",),
+    "size": ("nuserdata",),
 }
 _REMEDY: Final = "make it smaller"
 
@@ -51,4 +55,6 @@ def _size(element: Element) -> float:
     """Return the product of an element's size numbers; 1 without such numbers."""
     texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
     numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
+    if element.tag == "mesh":  # a built-in one has up to the square of its resolution as points
+        return max(numbers, default=1.0) ** 2
     return math.prod(numbers)

@@ -1,0 +1,62 @@
+"""The newest picture of a robot's camera, as JSON data for viewers: an API server passes on texts."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+from palaestra_protocol.fields import MOST_NAME, Fields, ProtocolError, clipped
+
+MOST_SIDE: Final = 320  # pixels; a writer leaves out rows and columns of a larger picture
+MOST_PICTURE_BYTES: Final = 2**19
+_COLORS: Final = 3
+_FAST: Final = 1  # zlib's level
+_MOST_TEXT: Final = MOST_PICTURE_BYTES - 2**10  # the longest base64 of a picture
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraPicture:
+    """One picture.
+
+    Attributes:
+        name: of the camera.
+        width: in pixels, at most MOST_SIDE.
+        height: in pixels, at most MOST_SIDE.
+        pixels: red, green and blue of each, one byte each, row by row from the top left.
+    """
+
+    name: str
+    width: int
+    height: int
+    pixels: bytes
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data; the pixels are compressed."""
+        return {
+            "name": clipped(self.name, MOST_NAME),
+            "width": self.width,
+            "height": self.height,
+            "pixels": base64.b64encode(zlib.compress(self.pixels, _FAST)).decode(),
+        }
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return the object that `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        width, height = fields.whole("width", 1, MOST_SIDE), fields.whole("height", 1, MOST_SIDE)
+        size = _COLORS * width * height
+        try:
+            packed = base64.b64decode(fields.text("pixels", _MOST_TEXT), validate=True)
+            pixels = zlib.decompressobj().decompress(packed, size + 1)
+        except (binascii.Error, zlib.error) as error:
+            raise fields.error("pixels", f"is not compressed ({error})") from error
+        if len(pixels) != size:
+            raise ProtocolError(f"{path or 'body'}.pixels: is not {width} by {height} pixels")
+        return cls(name=fields.text("name", MOST_NAME), width=width, height=height, pixels=pixels)

@@ -1,0 +1,54 @@
+"""How often the files of a model are part of it.
+
+MuJoCo attaches a model without end if it attaches itself, and a few files that attach each other twice make
+more bodies than memory holds.
+"""
+
+from __future__ import annotations
+
+from graphlib import CycleError, TopologicalSorter
+from typing import Final
+
+from palaestra_sim.world.mjcf.elements import Element
+
+_MOST: Final = 1_000_000  # elements of a model with all its copies
+
+
+class PartFiles:
+    """The files of a model, and which file names which.
+
+    Args:
+        main: path of the world.
+        root: its elements.
+    """
+
+    def __init__(self, main: str, root: Element) -> None:
+        self._main = main
+        self._sizes: dict[str, int] = {}
+        self._attaches: dict[str, int] = {}
+        self._named_by: dict[str, set[str]] = {main: set()}
+        self.read(main, root)
+
+    def read(self, path: str, root: Element) -> None:
+        """Count the elements of a file."""
+        tags = [element.tag for element in root.walk()]
+        self._sizes[path] = len(tags)
+        self._attaches[path] = max(1, tags.count("attach"))
+
+    def add(self, path: str, part: str) -> None:
+        """Record that a file names another one as a part."""
+        self._named_by.setdefault(part, set()).add(path)
+
+    def trouble(self) -> str | None:
+        """Return why the model would have no end, or too many elements; None if neither."""
+        try:
+            order = list(TopologicalSorter(self._named_by).static_order())
+        except CycleError as error:
+            circle = ", ".join(sorted(set(error.args[1])))
+            return f"the model contains itself: {circle}"
+        copies = {self._main: 1}
+        for path in order:
+            for above in self._named_by.get(path, ()):
+                copies[path] = copies.get(path, 0) + copies.get(above, 0) * self._attaches.get(above, 1)
+        total = sum(copies.get(path, 0) * size for path, size in self._sizes.items())
+        return f"the attached models have {total} elements; {_MOST} are the most" if total > _MOST else None
