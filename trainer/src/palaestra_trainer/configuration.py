@@ -1,10 +1,11 @@
 """The configuration of one replica: reads and checks the whole training.yaml.
 
 The plan writes the file, and the modules of this package read it only through
-this one. A wrong file is refused before anything starts. All its mistakes are
-reported at once, each with field, fact and remedy. The hyperparameters of each
-algorithm are defined in `palaestra_trainer.algorithms`, not here, because
-reading a configuration must not import a learning library.
+this one; reports and experiment trackers show the file as it is. A wrong file
+is refused before anything starts. All its mistakes are reported at once, each
+with field, fact and remedy. The hyperparameters of each algorithm are defined
+in `palaestra_trainer.algorithms`, not here, because reading a configuration
+must not import a learning library.
 
 Unknown fields are logged and ignored. A job may name a `trainer.image` that is
 older than the operator that writes the file, and a newer operator writes a new
@@ -29,6 +30,7 @@ from pydantic_core import ErrorDetails
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory
 
 log = structlog.get_logger(__name__)
 
@@ -280,6 +282,20 @@ def load(path: Path | None = None) -> Configuration:
     except yaml.YAMLError as error:
         raise ConfigurationError(f"{chosen}: is not YAML: {error}") from error
     return parse(content, source=chosen.name)
+
+
+def load_run(folder: Path) -> Configuration:
+    """Return the configuration of the run in `folder`.
+
+    Raises:
+        ConfigurationError: it is not a run directory, or its training.yaml is wrong.
+    """
+    file = RunDirectory(folder).configuration
+    if not file.exists():
+        raise ConfigurationError(
+            f"{folder}: has no training.yaml; give a run directory, such as runs/<job>/<replica>"
+        )
+    return load(file)
 
 
 def parse(content: object, *, source: str = "training.yaml") -> Configuration:

@@ -29,7 +29,8 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-# These libraries call the code of a job's author, or are called by it; their lines do not show the mistake.
+# Lines of these libraries do not show the mistake of a job's author: they only call the author's code, or
+# are called by it.
 _LIBRARIES = {
     "gymnasium",
     "importlib",

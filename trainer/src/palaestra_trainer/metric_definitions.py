@@ -155,7 +155,7 @@ FAULTS = counter(
 )
 RESTARTS = counter(
     "palaestra_simulator_restarts_total",
-    "Restarts by the fault that caused them; recycled: of a healthy simulator, at a recycling limit.",
+    "Restarts by the fault that caused them; recycled: a healthy simulator reached a limit of `recycle`.",
     SIMULATOR,
     CAUSE,
 )

@@ -11,7 +11,7 @@ import errno
 import json
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -46,9 +46,19 @@ class RunDirectory:
         return self.path / "training.yaml"
 
     @property
+    def end(self) -> Path:
+        """The end of the newest attempt, if its trainer could write it."""
+        return self.path / "end.json"
+
+    @property
     def evaluations(self) -> Path:
         """One JSON line per evaluation."""
         return self.path / "evaluations.jsonl"
+
+    @property
+    def faults(self) -> Path:
+        """One JSON line per fault of a simulator, and one when it is up again."""
+        return self.path / "faults.jsonl"
 
     @property
     def hyperparameters(self) -> Path:
@@ -71,6 +81,16 @@ class RunDirectory:
         return self.path / "model.zip"
 
     @property
+    def replays(self) -> Path:
+        """Recorded episodes of the best policy."""
+        return self.path / "replays.json"
+
+    @property
+    def report(self) -> Path:
+        """The report, one HTML file."""
+        return self.path / "report.html"
+
+    @property
     def summary(self) -> Path:
         """The result of the run; the file exists once the run is finished."""
         return self.path / "summary.json"
@@ -85,10 +105,11 @@ class RunDirectory:
         """The id of this run in each experiment tracker that the job uses."""
         return self.path / "trackers.json"
 
-    def begin_attempt(self, pod_uid: str, reason: str) -> int:
-        """Record the start of an attempt; return its number, counted from 1."""
+    def begin_attempt(self, pod_uid: str, reason: str, versions: Mapping[str, str] | None = None) -> int:
+        """Record the start of an attempt, and the versions with which it runs; return its number, from 1."""
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason})
+        with_versions = {} if versions is None else {"versions": dict(versions)}
+        append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason} | with_versions)
         return sum(1 for _ in read_lines(self.attempts))
 
 

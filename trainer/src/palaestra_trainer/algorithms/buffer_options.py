@@ -12,12 +12,12 @@ from typing import Any
 from gymnasium import spaces
 from stable_baselines3.common.buffers import BaseBuffer, ReplayBuffer, RolloutBuffer
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.algorithms import her, own_buffers
 from palaestra_trainer.algorithms.constructor_params import parameters
 from palaestra_trainer.algorithms.hyperparameters import FIELD
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.user_code import imports
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +76,14 @@ def arguments(given: Mapping[str, Any], observation: spaces.Space[Any]) -> dict[
 
 def _mistakes(kind: BufferKind, chosen: Any, options: Any) -> Iterator[str]:
     known: dict[str, object] | None = None
-    if user_imports.names_class(chosen):
+    if imports.names_class(chosen):
         try:
             known = _options(_own(kind, chosen))
         except ConfigurationError as error:
             yield str(error)
     elif chosen not in (None, *kind.by_name):
         named = " or ".join((*kind.by_name, "module:Class"))
-        yield f"{FIELD}.{kind.chooser}: {chosen!r} is no buffer; write {named}, or leave it out"
+        yield f"{FIELD}.{kind.chooser}: {chosen!r} is not a buffer; write {named}, or leave it out"
     if options is None:
         return
     if chosen is None:
@@ -92,7 +92,7 @@ def _mistakes(kind: BufferKind, chosen: Any, options: Any) -> Iterator[str]:
         yield f"{FIELD}.{kind.options}: {options!r} is refused; give a mapping"
     elif known is not None:
         yield from _unknown(f"{FIELD}.{kind.options}", options, known)
-    elif kind is REPLAY and not user_imports.names_class(chosen):
+    elif kind is REPLAY and not imports.names_class(chosen):
         yield from her.mistakes(options, f"{FIELD}.{kind.options}")
 
 
@@ -105,7 +105,7 @@ def _unknown(field: str, options: Mapping[str, Any], known: Mapping[str, object]
 
 def _own(kind: BufferKind, name: str) -> type[BaseBuffer]:
     """Return a subclass of the class that `name` names; it stores or samples only valid rows."""
-    return own_buffers.with_valid_rows(user_imports.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
+    return own_buffers.with_valid_rows(imports.class_named(name, f"{FIELD}.{kind.chooser}", kind.base))
 
 
 def _options(cls: type[BaseBuffer]) -> dict[str, object]:

@@ -18,12 +18,12 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn, optim
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.algorithms.constructor_params import types
 from palaestra_trainer.algorithms.own_schedules import own_schedule
 from palaestra_trainer.algorithms.schedules import schedule_of
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.user_code import imports
 
 FIELD = "algorithm.hyperparameters"
 CLASSES: Mapping[str, Mapping[str, type[Any]]] = {
@@ -55,7 +55,7 @@ def mistakes(
     known = types(cls)
     for name, value in hyperparameters.items():
         annotation = known.get(name, Any)
-        if _takes_schedule(annotation) and user_imports.names_class(value):
+        if _takes_schedule(annotation) and imports.names_class(value):
             yield from _mistakes_of_schedule(f"{FIELD}.{name}", value)
         elif fact := _refused(value, annotation):
             yield f"{FIELD}.{name}: {fact}"
@@ -96,7 +96,7 @@ def _mistakes_of_policy(policy: type[BasePolicy], given: Mapping[str, Any]) -> I
         field = f"{FIELD}.policy_kwargs.{name}"
         if name not in names:
             yield f"{field}: the policy has no such argument; {nearest(name, names)}"
-        elif user_imports.names_class(value):
+        elif imports.names_class(value):
             yield from _mistakes_of_class(field, value)
         elif name in CLASSES:
             if _class(name, value) is None:
@@ -120,7 +120,7 @@ def _has_shared_layers(layers: Any) -> bool:
 def _mistakes_of_class(field: str, name: str) -> Iterator[str]:
     base = BASES.get(field.rpartition(".")[2], object)
     try:
-        user_imports.class_named(name, field, base)
+        imports.class_named(name, field, base)
     except ConfigurationError as error:
         yield str(error)
 
@@ -137,10 +137,8 @@ def _class(argument: str, name: Any) -> type[Any] | None:
 
     The name may have its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
     """
-    if user_imports.names_class(name):
-        return user_imports.class_named(
-            name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object)
-        )
+    if imports.names_class(name):
+        return imports.class_named(name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object))
     by_name = {known.lower(): cls for known, cls in CLASSES.get(argument, {}).items()}
     return by_name.get(_bare(name).lower()) if isinstance(name, str) else None
 
@@ -163,7 +161,7 @@ def _refused(value: Any, annotation: Any) -> str:
 
 
 def _argument(name: str, value: Any, annotation: Any) -> Any:
-    if _takes_schedule(annotation) and user_imports.names_class(value):
+    if _takes_schedule(annotation) and imports.names_class(value):
         return own_schedule(value, f"{FIELD}.{name}")
     return _as_python(value, annotation)
 

@@ -168,7 +168,7 @@ def refuse_other_observations(cls: type[BaseBuffer], observation: spaces.Space[A
     kind = "Replay" if issubclass(cls, ReplayBuffer) else "Rollout"
     base = f"{kind}Buffer" if takes_dict else f"Dict{kind}Buffer"
     raise ConfigurationError(
-        f"{field_of(cls)}: {cls.__name__} takes observations that are {'a' if takes_dict else 'no'} Dict, "
+        f"{field_of(cls)}: {cls.__name__} takes observations that are {'' if takes_dict else 'not '}a Dict, "
         f"unlike the environment's; extend {base} of Stable-Baselines3"
     )
 

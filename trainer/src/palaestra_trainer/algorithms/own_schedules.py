@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.errors import ConfigurationError, fact_of
+from palaestra_trainer.user_code import imports
 
 _TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps
 
@@ -24,7 +24,7 @@ def own_schedule(name: str, field: str) -> Callable[[float], float]:
     Raises:
         ConfigurationError: it cannot be imported, or does not return finite numbers of 0 or more.
     """
-    schedule: Callable[[float], float] = user_imports.object_named(name, f"{field}: {name}")
+    schedule: Callable[[float], float] = imports.object_named(name, f"{field}: {name}")
     for left in _TRIED:
         value = _value(schedule, left, f"{field}: {name}({left})")
         if not (math.isfinite(value) and value >= 0):

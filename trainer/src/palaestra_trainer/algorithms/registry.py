@@ -22,13 +22,13 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from palaestra_protocol.foreign_words import NO_ALGORITHM
-from palaestra_trainer import user_imports
 from palaestra_trainer.algorithms import buffer_options, noise
 from palaestra_trainer.algorithms.constructor_params import parameters
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.valid_rows import with_valid_rows
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.user_code import imports
 
 # A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some, and
 # others are checked elsewhere. Buffers for valid rows cannot support the rest, because they store rows of
@@ -211,8 +211,8 @@ def entry_of(name: str) -> RegisteredAlgorithm:
         return ALGORITHMS[name]
     if why := NO_ALGORITHM.get(_plain_name(name).lower()):
         raise ConfigurationError(f"algorithm.name: {name} cannot be used: {why}")
-    if user_imports.names_class(name):
-        entry = _entry(user_imports.class_named(name, "algorithm.name", BaseAlgorithm))
+    if imports.names_class(name):
+        entry = _entry(imports.class_named(name, "algorithm.name", BaseAlgorithm))
         with_valid_rows(entry.original)  # raises if invalid rows would reach its losses
         return entry
     raise ConfigurationError(

@@ -20,7 +20,8 @@ from palaestra_trainer.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize
 _REWARD_DONE_TIMEOUT = 3 * _FLOAT
-_EPISODE = 2 * np.dtype(np.int64).itemsize  # start and length, with hindsight experience replay
+# Start and length of its episode, with hindsight experience replay.
+_EPISODE = 2 * np.dtype(np.int64).itemsize
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,7 +47,7 @@ BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
                 sb3.PPO,
                 sb3.A2C,
                 sb3.SAC,
-                sb3.TD3,  # DDPG is one
+                sb3.TD3,  # includes DDPG, which is a subclass
                 sb3_contrib.TQC,
                 sb3_contrib.TRPO,
                 sb3_contrib.CrossQ,

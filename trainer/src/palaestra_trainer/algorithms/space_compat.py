@@ -14,10 +14,10 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.algorithms.registry import RegisteredAlgorithm, entry_of
 from palaestra_trainer.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.user_code import imports
 
 KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
 # The convolutions of each network need at least this number of pixels per side.
@@ -58,8 +58,8 @@ def named_policy(algorithm: Algorithm, entry: RegisteredAlgorithm) -> str | type
     known = aliases(entry.original)
     if name is None or name in known:
         return name
-    if user_imports.names_class(name):
-        return user_imports.class_named(name, "algorithm.policy", BasePolicy)
+    if imports.names_class(name):
+        return imports.class_named(name, "algorithm.policy", BasePolicy)
     raise ConfigurationError(
         f"algorithm.policy: {algorithm.name} has no policy {name}; {nearest(name, dict(known))}, "
         "or write module:Class"
@@ -157,7 +157,7 @@ def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
 def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
     images = images_in(seen)
     if algorithm.cnn and (not images or isinstance(seen, spaces.Dict)):
-        what = "is a Dict" if isinstance(seen, spaces.Dict) else "is no image"
+        what = "is a Dict" if isinstance(seen, spaces.Dict) else "is not an image"
         return [f"algorithm.cnn: has no effect, since the environment's observation {what}; remove it"]
     smallest = SMALLEST[algorithm.cnn]
     sides = [image.shape[1:] if is_image_space_channels_first(image) else image.shape[:2] for image in images]

@@ -13,7 +13,9 @@ from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, OF_ZOO
 from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorithm
 from palaestra_trainer.configuration import nearest
 
-_MISSPELLED = 0.85  # gama and num_steps are above it; n_timesteps and n_epochs, compared with n_steps, below
+# The least similarity to a known word. Those of gama and num_steps are greater; those of n_timesteps and
+# n_epochs to n_steps are less.
+_MISSPELLED = 0.85
 # Other libraries use these names for the same value.
 _SAME: Mapping[str, str] = MappingProxyType(
     {
@@ -58,7 +60,7 @@ def mistakes(
 
 def _fact(algorithm: str, known: list[str], of_policy: Container[str], word: str) -> str:
     if word in ELSEWHERE:
-        return f"is no hyperparameter here; {ELSEWHERE[word]}"
+        return f"is not a hyperparameter here; {ELSEWHERE[word]}"
     if word in of_policy:
         return f"is an argument of the policy; write it in policy_kwargs.{word}"
     fact = f"{algorithm} has no such hyperparameter"

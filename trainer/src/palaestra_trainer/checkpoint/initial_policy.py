@@ -26,7 +26,7 @@ log = structlog.get_logger(__name__)
 
 POLICY = "policy.pth"
 _SHOWN = 3  # number of mismatches in a message
-_OVERHEAD_BYTES = 1 << 20  # for names, statistics, and the overhead of PyTorch's format
+_OVERHEAD_BYTES = 1 << 20  # room for names, statistics, and the overhead of PyTorch's format
 
 
 def begin_from(path: Path, model: BaseAlgorithm) -> None:
@@ -66,7 +66,7 @@ def _read(path: Path, device: torch.device, most: int) -> tuple[Any, dict[str, A
         return torch.load(content, map_location=device, weights_only=True), known
     except ConfigurationError:
         raise
-    except pickle.UnpicklingError as error:  # its own text recommends to unpickle, so it is not shown
+    except pickle.UnpicklingError as error:  # PyTorch's message recommends to unpickle, so it is not shown
         raise _refused(
             path, f"{POLICY} holds more than tensors, which is never unpickled; name a model.zip"
         ) from error

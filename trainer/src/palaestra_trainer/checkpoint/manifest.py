@@ -89,7 +89,7 @@ def read(folder: Path) -> SavedCheckpoint:
     damaged = [name for name, digest in manifest.files.items() if not _is(folder / name, digest)]
     for name in damaged:
         if not name.startswith(EXPERIENCE):
-            raise ValueError(f"{name} is not what the manifest says")
+            raise ValueError(f"{name} differs from the manifest")
     return SavedCheckpoint(path=folder, manifest=manifest, lost=frozenset(damaged))
 
 
@@ -138,10 +138,10 @@ def _read_manifest(folder: Path) -> Manifest:
     if whole and number != FORMAT:
         raise ConfigurationError(
             f"{folder}: is of format {number}, of another release than this one, which reads {FORMAT}; "
-            "go on with the release that wrote it, or use another run directory"
+            "continue with the release that wrote it, or use another run directory"
         )
     if not whole:
-        raise ValueError(f"{MANIFEST} is not what its digest says")
+        raise ValueError(f"{MANIFEST} does not match its digest")
     return Manifest(**content)
 
 

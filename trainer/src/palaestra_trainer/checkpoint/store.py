@@ -22,7 +22,8 @@ from palaestra_trainer.run_directory import sync
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
-_NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})  # e.g. of object stores
+# For example file systems of object stores.
+_NO_RENAME = frozenset({errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EXDEV})
 _NUMBER = re.compile(r"[0-9]{1,18}")
 
 
@@ -175,8 +176,8 @@ def _put_in_place(draft: Path) -> Path:
         if error.errno not in _NO_RENAME:
             raise
         raise ConfigurationError(
-            f"{draft.parent}: its file system renames no folders ({error.strerror}), so no checkpoint is "
-            "ever whole there; use another volume, such as one of a block device or NFS"
+            f"{draft.parent}: its file system cannot rename folders ({error.strerror}), so no checkpoint "
+            "would be complete; use another volume, such as one of a block device or NFS"
         ) from error
     sync(draft.parent)
     shutil.rmtree(replaced, ignore_errors=True)

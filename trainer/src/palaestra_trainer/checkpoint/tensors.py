@@ -90,6 +90,6 @@ def _load_normalization(path: Path, model: BaseAlgorithm) -> None:
     with zipfile.ZipFile(path) as archive:
         known = NORMALIZE in archive.namelist()
         if known != (normalizer is not None):
-            raise ValueError(f"algorithm.normalize is {'not ' if known else ''}set, unlike there")
+            raise ValueError(f"algorithm.normalize is {'not ' if known else ''}set, unlike in the checkpoint")
         if normalizer:
             normalizer.learn_from_json(json.loads(archive.read(NORMALIZE)))

@@ -34,7 +34,8 @@ __all__ = [
 ]
 
 # Entry points are text, because they import simulators, and this package must not import those.
-# max_episode_steps is not set: the environments count their steps themselves, as Sparse rewards the last one.
+# max_episode_steps is not set: the environments count their steps themselves, because Sparse rewards the
+# last step.
 gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
 gymnasium.register(

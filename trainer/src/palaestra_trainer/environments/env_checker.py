@@ -31,7 +31,7 @@ from palaestra_trainer.errors import ConfigurationError
 
 RESET = "reset(self, *, seed=None, options=None) that returns (observation, info)"
 STEP = "step(self, action) that returns (observation, reward, terminated, truncated, info)"
-_one_at_a_time = threading.Lock()  # because warnings are caught for the whole process
+_one_at_a_time = threading.Lock()  # a lock, because warnings are caught for the whole process
 
 
 def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
@@ -179,10 +179,10 @@ def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
             check(returned, **arguments)
         except (AssertionError, gymnasium.error.Error) as error:
             return [str(error)]
-    return [_plain(str(warning.message)) for warning in caught]
+    return [plain_warning(str(warning.message)) for warning in caught]
 
 
-def _plain(warning: str) -> str:
+def plain_warning(warning: str) -> str:
     """Return the text of one of gymnasium's warnings without its color and its level."""
     return re.sub(r"^(\x1b\[\d+m)?WARN: |\x1b\[\d+m", "", warning)
 

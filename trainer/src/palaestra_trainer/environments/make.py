@@ -17,14 +17,14 @@ from gymnasium.envs.registration import (
     parse_env_id,
 )
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.environments import wrappers
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
-from palaestra_trainer.kwargs_check import AcceptedArguments
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import require
+from palaestra_trainer.user_code import imports
+from palaestra_trainer.user_code.kwargs import AcceptedArguments
 
 _OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
 
@@ -97,7 +97,7 @@ def _spec(name: str) -> EnvSpec:
     """Return the registration of a name in the syntax of `gymnasium.make`."""
     module, _, registered = name.rpartition(":")
     if module:
-        user_imports.module_named(module, f"environment.id: {name}")
+        imports.module_named(module, f"environment.id: {name}")
     try:
         space, plain, version = parse_env_id(registered)
         return gymnasium.spec(get_env_id(space, plain, version or find_highest_version(space, plain)))
@@ -112,7 +112,7 @@ def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
     """Return the class or function that creates the environment."""
     creator = spec.entry_point
     if isinstance(creator, str):
-        found: Callable[..., Any] = user_imports.object_named(
+        found: Callable[..., Any] = imports.object_named(
             creator, f"environment.id: the entry point {creator} of {name}"
         )
         return found

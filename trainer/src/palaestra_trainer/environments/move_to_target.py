@@ -151,7 +151,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         self._on_close = on_close
         self._situation: StepState | None = None
         self._targets: list[Point] = []
-        self._at = 0  # index of the target to which the robot drives
+        self._at = 0  # index of the current target
         self._steps = 0
 
     @property

@@ -27,7 +27,7 @@ Numbers = NDArray[np.float32]
 Observation = dict[str, Numbers]
 Info = dict[str, Any]
 
-FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # from corner to corner
+FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # the distance from corner to corner
 
 
 class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):

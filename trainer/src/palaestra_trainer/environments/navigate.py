@@ -26,9 +26,9 @@ from palaestra_trainer.robots.capabilities import Localization, Scanner, Steerin
 from palaestra_trainer.robots.geometry import Point, Pose
 
 REACHED_M = 0.15
-BUMPED_M = 0.05  # from the robot's outline; an object that is nearer may be too near for a scanner
+BUMPED_M = 0.05  # distance from the robot's outline; a scanner may not see an object that is nearer
 SECTORS = 24
-SEEN_M = 0.8  # beyond it, a sector counts as empty
+SEEN_M = 0.8  # a sector whose nearest object is beyond this distance counts as empty
 TARGET_M = 2.0  # the unit of the distance to the target
 # Shares of the robot's greatest speeds: forward, counter-clockwise.
 MOVES = ((0.9, 0.0), (0.55, 0.33), (0.55, -0.33), (0.0, 0.55), (0.0, -0.55))

@@ -13,10 +13,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.configuration import Environment
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
-from palaestra_trainer.kwargs_check import AcceptedArguments
+from palaestra_trainer.user_code import imports
+from palaestra_trainer.user_code.kwargs import AcceptedArguments
 
 FIELD = "environment.wrappers"
 _AXES_OF_AN_IMAGE = 3
@@ -28,7 +28,7 @@ def mistakes(wanted: Environment) -> Iterator[str]:
     for index, wrapper in enumerate(wanted.wrappers or ()):
         field = f"{FIELD}[{index}]"
         try:
-            cls = user_imports.class_named(wrapper.name, f"{field}.name", gymnasium.Wrapper)
+            cls = imports.class_named(wrapper.name, f"{field}.name", gymnasium.Wrapper)
         except ConfigurationError as error:
             yield str(error)
         else:
@@ -45,7 +45,7 @@ def wrapped(env: gymnasium.Env[Any, Any], wanted: Environment) -> gymnasium.Env[
     """
     for index, wrapper in enumerate(wanted.wrappers or ()):
         field = f"{FIELD}[{index}]"
-        cls = user_imports.class_named(wrapper.name, f"{field}.name", gymnasium.Wrapper)
+        cls = imports.class_named(wrapper.name, f"{field}.name", gymnasium.Wrapper)
         try:
             env = cls(env, **wrapper.options)
         except TrainerError:

@@ -20,15 +20,16 @@ import structlog
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
-from palaestra_trainer.copies import copied
+from palaestra_protocol.scene import MOST_TERMS, SceneState, TargetMarker
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.reset_options import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
 from palaestra_trainer.infos import HIDDEN, OURS, TRUNCATED, of_environment
-from palaestra_trainer.simulators.interface import Environment, Step
+from palaestra_trainer.simulators.interface import Environment, Located, Step
 from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.user_code.copies import copied
 from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
@@ -79,6 +80,7 @@ class Collector:
         self._news: dict[str, Any] = {}
         self._found_broken: SimulatorFault | None = None
         self._hidden: set[str] = set()
+        self._newest: dict[str, Any] = {}  # info of the last step
 
     @property
     def env(self) -> Environment:
@@ -91,6 +93,24 @@ class Collector:
         if self._actions is None:
             return EpisodeState(self.episode, None)
         return EpisodeState(self.episode - 1, self._actions.taken(), self._began_at)
+
+    @property
+    def moment(self) -> SceneState:
+        """The member's episode, its step, its target and the newest terms of the reward, for a viewer."""
+        terms = self._newest.get("reward_terms")
+        given = list(terms.items())[:MOST_TERMS] if isinstance(terms, dict) else []
+        rewards = {str(name): float(value) for name, value in given if isinstance(value, int | float)}
+        return SceneState(
+            time_s=0.0, target=self._target(), episode=self.episode, step=self._length, rewards=rewards
+        )
+
+    def _target(self) -> TargetMarker | None:
+        """Return the target on the floor; None if the member's task has no target."""
+        member = self.restarter.member
+        sight = member.sight() if isinstance(member, Located) else None
+        if sight is None or sight.target is None:
+            return None
+        return TargetMarker(position=(*sight.target, 0.0))
 
     def next_seed(self) -> int:
         """Return the seed that the next episode will have."""
@@ -195,7 +215,7 @@ class Collector:
             step = self.restarter.step(action)
         except Diverged as error:
             raise Diverged(f"episode {self.episode - 1}, step {self._length + 1}: {error}") from error
-        self._observation = step[0]
+        self._observation, self._newest = step[0], step[4]
         self._return += float(step[1])
         self._length += 1
         if self._actions is not None:

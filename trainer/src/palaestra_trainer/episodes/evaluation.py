@@ -11,8 +11,9 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import wait
+from dataclasses import dataclass, field
+from functools import partial
 from statistics import fmean
 from typing import Any, Protocol
 
@@ -20,11 +21,13 @@ import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
 from palaestra_trainer.algorithms import predict_allowed, takes_masks
+from palaestra_trainer.episodes.film import MOST_FILMS, Film, Filming
 from palaestra_trainer.episodes.reset_options import EVALUATING, reset_options
 from palaestra_trainer.episodes.wilson import wilson
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
+from palaestra_trainer.waiting.at_once import at_once
 from palaestra_trainer.waiting.episode_end import EpisodeEnd
 from palaestra_trainer.waiting.signals import Check, go_on
 
@@ -53,6 +56,7 @@ class Episode:
         length: number of environment steps.
         success: the last step's `info["is_success"]`; None: the environment did not report it.
         outcome: the last step's `info["outcome"]`, a text; None: the environment did not report it.
+        film: a recording of it; None: the robot does not drive on a floor, or too many were recorded.
     """
 
     seed: int
@@ -60,6 +64,7 @@ class Episode:
     length: int
     success: bool | None
     outcome: str | None = None
+    film: Film | None = field(default=None, compare=False, repr=False)
 
     def record(self) -> dict[str, Any]:
         """Return the episode as part of a line of evaluations.jsonl, without unreported values."""
@@ -241,23 +246,7 @@ class _Games:
 
 
 def _play_at_once(games: _Games, restarters: Sequence[Restarter], check: Check) -> None:
-    over = threading.Event()
-
-    def check_all() -> None:
-        if over.is_set():
-            raise CancelledError
-
-    with ThreadPoolExecutor(len(restarters), "evaluate") as pool:
-        playing = [pool.submit(games.play_on, restarter, check_all) for restarter in restarters]
-        try:
-            while playing:
-                done, left = wait(playing, LOOK_EVERY_S, FIRST_EXCEPTION)
-                for future in done:
-                    future.result()
-                playing = list(left)
-                check()
-        finally:
-            over.set()
+    at_once([partial(games.play_on, restarter) for restarter in restarters], check, "evaluate")
 
 
 def _play(
@@ -269,6 +258,8 @@ def _play(
     """
     number, seed = game
     observation, _ = restarter.reset(seed, reset_options(EVALUATING, number), check)
+    filming = Filming(restarter.member if number < MOST_FILMS else None)
+    filming.look()
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
     over, end, masked = False, EpisodeEnd("an evaluation"), takes_masks(policy)
@@ -283,6 +274,7 @@ def _play(
         observation, reward, terminated, truncated, info = restarter.step(np.asarray(action)[()])
         restarter.watcher.stepped(1)
         rewards.append(float(reward))
+        filming.look()
         over = terminated or truncated
     return Episode(
         seed=seed,
@@ -290,4 +282,5 @@ def _play(
         length=len(rewards),
         success=bool(info["is_success"]) if "is_success" in info else None,
         outcome=outcome if isinstance(outcome := info.get("outcome"), str) else None,
+        film=filming.film(),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-EVALUATING = 1.0  # evaluations measure the whole task, at any time
+EVALUATING = 1.0  # an evaluation measures the whole task, whenever it runs
 
 
 def reset_options(training_progress: float, episode: int) -> dict[str, Any]:

@@ -16,6 +16,7 @@ import numpy as np
 COLLECT = "collect"
 EVALUATE = "A"
 CONFIRM = "C"  # `palaestra-eval` uses B by default
+_FRESH = 2**31  # the seeds of a run are all below this number
 
 
 def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> int:
@@ -36,3 +37,12 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
 def episode_seeds(run_seed: int, stream: str, episodes: int, first: int = 0) -> Iterator[int]:
     """Yield the seeds of `episodes` episodes of a stream that simulators share, from number `first` on."""
     return (episode_seed(run_seed, stream, 0, first + episode) for episode in range(episodes))
+
+
+def fresh_seeds(stream: str, episodes: int, first: int = 0) -> Iterator[int]:
+    """Yield the seeds of `episodes` episodes that no run of any job uses, from number `first` on.
+
+    They are in [2**31, 2**32), and those of runs are below, so the policies of two runs are compared on
+    episodes that neither has learned from, nor been chosen by.
+    """
+    return (_FRESH + seed for seed in episode_seeds(0, stream, episodes, first))

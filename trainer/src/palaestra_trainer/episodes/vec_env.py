@@ -18,7 +18,7 @@ import structlog
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer.copies import copied
+from palaestra_protocol.scene import SceneState
 from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
 from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
 from palaestra_trainer.episodes.collector import CollectedRow, Collector
@@ -27,6 +27,7 @@ from palaestra_trainer.errors import fact_of
 from palaestra_trainer.infos import is_valid
 from palaestra_trainer.simulators.interface import Environment
 from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
+from palaestra_trainer.user_code.copies import copied
 from palaestra_trainer.waiting.greenlets import take_turns
 from palaestra_trainer.waiting.signals import Check, go_on
 
@@ -98,6 +99,10 @@ class SimulatorsVecEnv(MembersVecEnv):
     def snapshot(self) -> list[EpisodeState]:
         """Return the position of each member in its episodes; cheap. Later steps do not change the result."""
         return [collector.state for collector in self._collectors]
+
+    def moments(self) -> dict[str, SceneState]:
+        """Return where each member is in its episode, by name; computed by the caller, in any thread."""
+        return {collector.restarter.name: collector.moment for collector in self._collectors}
 
     def resume(self, states: Sequence[EpisodeState], *, masked: bool = False) -> VecEnvObs:
         """Bring all members back to their states, at once; return their observations.

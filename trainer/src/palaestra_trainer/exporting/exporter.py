@@ -38,8 +38,8 @@ class Exported:
     Attributes:
         path: the file.
         observations: number of observations on which the file was compared with the policy.
-        largest_difference: of a number of an action in that comparison; a continuous one as a share of its
-            range.
+        largest_difference: the largest difference of a number of an action in that comparison; a continuous
+            one as a share of its range.
     """
 
     path: Path

@@ -113,6 +113,7 @@ def _docstring(name: str) -> str:
     """Return the docstring of the environment's class; "" if its module cannot be imported here."""
     with suppress(ConfigurationError):
         creator: Any = creator_of(name)
+        creator = getattr(creator, "environment_class", creator)
         if not inspect.isclass(creator):
             with suppress(NameError, TypeError):
                 creator = typing.get_type_hints(creator).get("return", creator)

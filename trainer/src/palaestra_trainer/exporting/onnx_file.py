@@ -21,7 +21,7 @@ from palaestra_trainer.exporting.policy_module import STATE, PolicyModule
 from palaestra_trainer.exporting.sample_observations import drawn, drawn_masks
 from palaestra_trainer.exporting.verify import Arrays, Run
 
-OPSET = 17  # of ONNX 1.12, released in 2022
+OPSET = 17  # the opset of ONNX 1.12, released in 2022
 # PyTorch's exporter does not accept these types; each has a larger type that it accepts.
 _UNTAKEN = {"uint16": "int32", "uint32": "int64", "uint64": "int64"}
 _BATCH = 3  # larger than 1, because the exporter could treat 1 as a constant

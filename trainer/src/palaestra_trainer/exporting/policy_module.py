@@ -125,7 +125,8 @@ class PolicyModule(nn.Module):
         if self.state_shape is None:
             return ()
         hidden, cell = inputs[len(self.spaces) :]
-        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])  # the flags are 0, as zeros begin an episode
+        # The flags are 0, because a state of zeros already begins an episode.
+        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
         """Return a batch of images with channels first; anything else unchanged."""

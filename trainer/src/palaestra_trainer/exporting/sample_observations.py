@@ -64,7 +64,7 @@ def magnitudes(acting: PolicyModule, observations: dict[str, np.ndarray]) -> np.
 
 
 def _images(shape: tuple[int, ...], count: int, seed: int) -> np.ndarray:
-    """Return images of a shape, whose channels are last."""
+    """Return `count` random images, shape (count, rows, columns, channels); `shape` has the last three."""
     rows, columns, channels = shape
     generator = np.random.default_rng(seed)
     areas = generator.uniform(-255.0, 255.0, (count, _AREAS, _AREAS, channels))

@@ -16,7 +16,8 @@ from palaestra_trainer.run.policies import TrainedPolicy
 
 OBSERVATIONS = 1_000
 TOLERANCE = 1e-5  # allowed difference of a continuous action, as a share of its range
-# At least so many actions must be between the bounds, or scores must differ by so many tolerances.
+# A comparison counts only if at least so many actions are between the bounds, or if scores differ by so
+# many tolerances.
 _TELLING = 10
 
 Arrays = tuple[np.ndarray, ...]

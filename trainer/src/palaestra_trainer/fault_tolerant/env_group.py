@@ -121,7 +121,7 @@ class EnvGroup:
 
     def _check(self, restarters: Sequence[Restarter], give_up: float) -> None:
         if time.monotonic() > give_up:
-            fact = f"not mended within {self._deadline_s:g} s; read the simulator's log"
+            fact = f"not restarted within {self._deadline_s:g} s; read the simulator's log"
             raise SimulatorHung(", ".join(restarter.name for restarter in restarters), fact)
 
 

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.seeding import np_random
 
-from palaestra_trainer.copies import copied
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.infos import OURS, of_environment
 from palaestra_trainer.simulators.interface import Environment, Step
 from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.user_code.copies import copied
 
 
 class StepResult(NamedTuple):

@@ -57,7 +57,7 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
         MasterLost: no ROS master responds.
     """
     if number is not None and number < 1:
-        raise ConfigurationError(f"num_envs: {number} is no number of environments; give 1 or more")
+        raise ConfigurationError(f"num_envs: {number} is not a number of environments; give 1 or more")
     configuration = load() if os.environ.get(CONFIG_VARIABLE) else None
     environment = wanted or (configuration.environment if configuration else None)
     if environment is None:
@@ -75,11 +75,10 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
 
 
 def _in_facade(place: NotebookSimulator, environment: Environment) -> EnvGroup:
-    try:
+    with ExitStack() as undo:
+        undo.callback(place.release)
         restarter = Restarter(NotebookMember(place, environment))
-    except BaseException:
-        place.release()
-        raise
+        undo.pop_all()
     # The program may pause the simulator after any step, so `step` must not return during a restart.
     return EnvGroup([restarter], restarter.stop, mend_at_once=True)
 

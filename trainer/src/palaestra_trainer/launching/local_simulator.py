@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
@@ -76,13 +77,11 @@ class ProcessLauncher(Sidecar):
         """
         for number in range(1, _MOST_BESIDE + 1):
             launcher = cls(world, driver, options, suffix="" if number == 1 else f"_{number}")
-            try:
+            with ExitStack() as undo:
+                undo.callback(launcher.close)
                 if launcher.reserve():
+                    undo.pop_all()
                     return launcher
-            except BaseException:
-                launcher.close()
-                raise
-            launcher.close()
         raise ConfigurationError(
             f"{world}: {_MOST_BESIDE} simulators with its ROS names are already running; close unused ones"
         )
@@ -103,5 +102,5 @@ class ProcessLauncher(Sidecar):
 
 def _program(name: str) -> list[str]:
     """Return the program in the folder of this interpreter, else the one that PATH finds."""
-    beside = Path(sys.executable).with_name(name)
-    return [str(beside) if beside.exists() else name]
+    installed = Path(sys.executable).with_name(name)
+    return [str(installed) if installed.exists() else name]

@@ -24,4 +24,4 @@ def ensure_master() -> None:
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start palaestra-ros-master") from None
         os.environ["ROS_MASTER_URI"] = uri
-        os.environ["ROS_HOSTNAME"] = "localhost"
+        os.environ["ROS_HOSTNAME"] = "127.0.0.1"  # a bare chroot cannot resolve localhost

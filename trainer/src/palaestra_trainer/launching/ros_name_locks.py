@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from palaestra_trainer.locks import FileLock, refusal
+from palaestra_trainer.launching.locks import FileLock, refusal
 from palaestra_trainer.ros import Master
 
 TEMPORARY = "TMPDIR"  # the environment variable that names the folder for temporary files

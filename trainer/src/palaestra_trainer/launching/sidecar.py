@@ -69,7 +69,7 @@ class Sidecar:
             except SimulatorDead:
                 if time.monotonic() > give_up:
                     raise
-            time.sleep(_POLL_S)  # the sidecar is still starting, and no call can wait for that
+            time.sleep(_POLL_S)  # the sidecar is still starting; no call can wait for the end of its start
 
     def start(self) -> None:
         """Start the simulator without waiting for it; do nothing if it is already starting."""
@@ -118,14 +118,16 @@ class Sidecar:
             answer = connection.getresponse()
             text = answer.read(_MOST_BYTES)
         except TimeoutError as error:
-            raise SimulatorHung(self._name, "its sidecar does not answer") from error
+            raise SimulatorHung(self._name, "its sidecar does not respond") from error
         except (OSError, http.client.HTTPException) as error:
             raise SimulatorDead(self._name, f"its sidecar is gone ({error})") from error
         finally:
             connection.close()
         if answer.status not in {http.client.OK, _CONFLICT}:
-            raise WrongData(self._name, f"its sidecar answered {self._above}{path} with {answer.status}")
+            raise WrongData(self._name, f"its sidecar responded to {self._above}{path} with {answer.status}")
         try:
             return SimulatorState.from_json(decoded(text))
         except ProtocolError as error:
-            raise WrongData(self._name, f"its sidecar answered {self._above}{path} with {error}") from error
+            raise WrongData(
+                self._name, f"its sidecar responded to {self._above}{path} with {error}"
+            ) from error

@@ -72,7 +72,7 @@ class Scene(ABC):
     def begin(self, seed: int) -> None:
         """Begin an episode: all objects are at their initial positions and at rest.
 
-        All random values until the next `begin` follow from `seed`, in [0, 2**31).
+        All random values until the next `begin` follow from `seed`, in [0, 2**32).
         """
 
     @abstractmethod

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc
 from palaestra_trainer.robots.simulated import SimulatedRobot
+from palaestra_trainer.user_code import imports
 
 SHIPPED: dict[str, str] = {
     "Robotino": "palaestra_trainer.robots.robotino:Robotino",
@@ -21,14 +21,14 @@ def robot_class(name: str) -> type[SimulatedRobot]:
     Raises:
         ConfigurationError: the class does not exist, or is not a complete `SimulatedRobot`.
     """
-    if name not in SHIPPED and not user_imports.names_class(name):
+    if name not in SHIPPED and not imports.names_class(name):
         raise ConfigurationError(
             f"trainer.robot: {name} is not known; {nearest(name, list(SHIPPED))}, "
             "or name a class of your own as module:Class"
         )
-    found = user_imports.object_named(SHIPPED.get(name, name), f"trainer.robot: {name}")
+    found = imports.object_named(SHIPPED.get(name, name), f"trainer.robot: {name}")
     if not (isinstance(found, type) and issubclass(found, SimulatedRobot)):
-        kind = "a RobotAbc that no simulator has" if _is_robot(found) else "not a RobotAbc"
+        kind = "a RobotAbc without a simulator" if _is_robot(found) else "not a RobotAbc"
         raise ConfigurationError(
             f"trainer.robot: {name} is {kind}; derive the class from "
             "palaestra_trainer.robots.simulated.SimulatedRobot or one of its subclasses"

@@ -15,6 +15,7 @@ from palaestra_trainer.robots.base import JointScene, RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import Localization
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
+from palaestra_trainer.robots.sight import Sight
 from palaestra_trainer.webots import (
     FLOOR,
     Actuator,
@@ -26,6 +27,7 @@ from palaestra_trainer.webots import (
 )
 
 PERIOD_MS = 192  # six basic steps of 32 ms
+DOT_M = 0.1  # radius in a recording of a robot whose class has no radius
 
 
 class SimulatedRobot(RobotAbc):
@@ -144,6 +146,11 @@ class MobileRobot(SimulatedRobot, Localization):
         """Return the true pose after the last step."""
         return Pose(*self.simulation.pose(self.definition))
 
+    def last_pose(self) -> Pose | None:
+        """Return the pose that the last step read, without a request; None before the first step."""
+        known = self.simulation.known_pose(self.definition) if self.definition else None
+        return None if known is None else Pose(*known)
+
 
 class SimulatedScene(Scene, JointScene):
     """The scene around a simulated robot. Each start of the simulator looks for the mark.
@@ -165,6 +172,8 @@ class SimulatedScene(Scene, JointScene):
         self._robot = robot
         self._target = target or robot.target
         self._put: dict[str, tuple[float, float, float]] = {}  # since the last begin
+        self._floor: FloorLayout | None = None
+        self._aim: Point | None = None
         self.resets = 0
         if self._target:
             mark = self._target
@@ -179,6 +188,7 @@ class SimulatedScene(Scene, JointScene):
         """
         self.resets += 1
         self._put.clear()
+        self._floor = self._aim = None
         self._robot.simulation.reset(seed)
 
     def layout(self) -> FloorLayout:
@@ -195,7 +205,8 @@ class SimulatedScene(Scene, JointScene):
                 low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
             else:
                 obstacles += _obstacles(thing._replace(place=self._put.get(thing.name, thing.place)))
-        return FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
+        self._floor = FloorLayout(low=low, high=high, obstacles=tuple(obstacles))
+        return self._floor
 
     def place(self, start: Pose, target: Point) -> None:
         """Put the robot at rest at `start` and the mark at `target` (x, y in meters); update all readings.
@@ -221,6 +232,7 @@ class SimulatedScene(Scene, JointScene):
             SimulatorDead, SimulatorHung
             WrongData: also when the world lacks the mark's node.
         """
+        self._aim = target
         if self._target:
             self.supervisor.place(self._target, *target)
 
@@ -233,6 +245,17 @@ class SimulatedScene(Scene, JointScene):
         """
         self.supervisor.set_field(name, "translation", place)
         self._put[name] = place
+
+    def sight(self) -> Sight | None:
+        """Return where robot and target are, without a request; None: the robot does not drive on a floor."""
+        robot = self._robot
+        pose = robot.last_pose() if isinstance(robot, MobileRobot) else None
+        if pose is None:
+            return None
+        radius_m = getattr(robot, "radius_m", DOT_M)
+        return Sight(
+            pose=pose, target=self._aim, floor=self._floor, radius_m=radius_m, period_s=robot.period_s
+        )
 
     def set_joint(self, name: str, position: float) -> None:
         """Move the joint with DEF `name` to radians or meters, at rest; `begin` undoes it.

@@ -9,7 +9,7 @@ data. One thread uses the services and subscribers of one simulator.
 
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
-from palaestra_trainer.ros.service import RosService, call_together
+from palaestra_trainer.ros.service import RosService, call_together, is_served
 from palaestra_trainer.ros.subscriber import RosSubscriber
 
-__all__ = ["Master", "RosService", "RosSubscriber", "call_together", "ensure_node"]
+__all__ = ["Master", "RosService", "RosSubscriber", "call_together", "ensure_node", "is_served"]

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import xmlrpc.client
 from typing import Any
 from urllib.parse import urlsplit
 
+from palaestra_protocol.xmlrpc import client
+from palaestra_protocol.xmlrpc.documents import UnreadableDocument
 from palaestra_protocol.xmlrpc.responses import OK, RpcResponse
 from palaestra_trainer.errors import MasterLost, UnreadableAnswer
 from palaestra_trainer.ros.xmlrpc import call
@@ -71,17 +74,20 @@ class Master:
     def runs(self, node: str) -> bool:
         """Return whether a node of that full name is running; the name of a killed node stays registered."""
         answer = self._answer("lookupNode", node)
-        if answer.code != OK:
-            return False
+        return answer.code == OK and self._is_node(str(answer.value))
+
+    def _is_node(self, uri: str) -> bool:
+        """Return whether a node of this master has that address; the port may be another program's now."""
         try:
-            call(str(answer.value), _NODE_TIMEOUT_S, "getPid", self._caller)
+            answer = client.call(uri, _NODE_TIMEOUT_S, "getMasterUri", self._caller)
         except TimeoutError:
-            return True
-        except OSError:
+            return True  # a node may hang
+        except (OSError, UnreadableDocument):
             return False
-        except UnreadableAnswer:
-            return True
-        return True
+        except xmlrpc.client.Fault:
+            return True  # a node without this method
+        # Nodes may write the host of one master in several ways.
+        return _port(answer[-1] if isinstance(answer, list) and answer else None) in {None, _port(self.uri)}
 
     def _call(self, method: str, *arguments: Any) -> RpcResponse:
         answer = self._answer(method, *arguments)
@@ -93,7 +99,14 @@ class Master:
         try:
             return call(self.uri, self._timeout_s, method, self._caller, *arguments)
         except OSError as error:
-            raise MasterLost(f"no ROS master answers at {self.uri} ({error}); is it running?") from error
+            raise MasterLost(f"no ROS master responds at {self.uri} ({error}); is it running?") from error
 
     def _unreadable(self, wanted: str, answer: RpcResponse) -> UnreadableAnswer:
-        return UnreadableAnswer(f"the ROS master answered with {answer.value!r} instead of {wanted}")
+        return UnreadableAnswer(f"the ROS master responded with {answer.value!r} instead of {wanted}")
+
+
+def _port(uri: object) -> int | None:
+    try:
+        return urlsplit(str(uri)).port
+    except ValueError:
+        return None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 try:
     from palaestra_trainer.ros.rospy_node import ensure_node, node_uri
-except ImportError:  # of rospy, or of a package that it needs
+except ImportError:  # rospy, or a package that it needs, is missing
     from palaestra_trainer.ros.own_node import ensure_node, node_uri
 
 __all__ = ["ensure_node", "node_uri"]

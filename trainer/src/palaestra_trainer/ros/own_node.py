@@ -1,12 +1,15 @@
 """This process as a ROS node, without rospy: a name, and an address at which the master and tools reach it.
 
 It registers nothing by itself. `RosSubscriber` registers in its name and connects by itself, so an update of
-a topic's publishers needs no action. `rosnode kill` cannot end it: signals end a training in good order.
+a topic's publishers needs no action. `rosnode kill`, and the master if another node takes the name, end the
+process as SIGTERM does: a training saves a checkpoint first.
 """
 
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +21,9 @@ from palaestra_protocol.xmlrpc.responses import FAILED, OK
 from palaestra_protocol.xmlrpc.server import Method, RpcServer, bind_address, host_name
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.ros.master import Master
+from palaestra_trainer.ros.node_name import full_name
+
+_RESPONDING_S = 0.2  # the time to send the response to `shutdown`, before a signal ends the process
 
 log = structlog.get_logger(__name__)
 
@@ -29,7 +35,7 @@ class _Node:
     Attributes:
         name: its full name.
         uri: at which it answers.
-        pid: of the process; a fork is another node.
+        pid: the process ID of the process; a fork is another node.
     """
 
     name: str
@@ -45,11 +51,12 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
     """Return the full name of this process's node; create the node unless there is one already.
 
     Args:
-        name: the node's name; a number is added so that several programs may share a master.
+        name: the node's name; a number is added so that several programs may share a master. As with rospy,
+            `__name:=` and `__ns:=` among the program's arguments replace it.
 
     Raises:
         MasterLost: no master answers.
-        ConfigurationError: the process cannot listen.
+        ConfigurationError: the process cannot listen, or an argument has an impossible name.
     """
     return _ensured(name).name
 
@@ -67,9 +74,8 @@ def _ensured(name: str) -> _Node:
 
 
 def _made(name: str) -> _Node:
-    namespace = os.environ.get("ROS_NAMESPACE", "").strip("/")
-    full_name = f"/{namespace}/{name}_{os.getpid()}" if namespace else f"/{name}_{os.getpid()}"
-    master = Master(full_name)
+    in_full = full_name(f"{name}_{os.getpid()}", sys.argv, os.environ)
+    master = Master(in_full)
     master.ping()
     host = host_name(os.environ)
     try:
@@ -78,7 +84,7 @@ def _made(name: str) -> _Node:
         fact = f"{host}: cannot listen there as a ROS node: {error.strerror}"
         raise ConfigurationError(f"{fact}; set ROS_HOSTNAME, for example to localhost") from error
     server.start()
-    return _Node(name=full_name, uri=f"http://{host}:{server.port}/", pid=os.getpid())
+    return _Node(name=in_full, uri=f"http://{host}:{server.port}/", pid=os.getpid())
 
 
 def _answers(master_uri: str) -> dict[str, Method]:
@@ -93,7 +99,7 @@ def _answers(master_uri: str) -> dict[str, Method]:
         "publisherUpdate": _constant(lambda: 0),
         "paramUpdate": _constant(lambda: 0),
         "requestTopic": lambda _: [FAILED, "this node publishes no topic", 0],
-        "shutdown": _asked_to_end,
+        "shutdown": _Shutdown(),
     }
 
 
@@ -102,8 +108,17 @@ def _constant(value: Callable[[], Any]) -> Method:
     return lambda _: [OK, "", value()]
 
 
-def _asked_to_end(parameters: tuple[Any, ...]) -> list[Any]:
-    log.warning(
-        "the ROS node was asked to end, and continues; send a signal to the process", asked=parameters
-    )
-    return [OK, "this process ends only at a signal", 0]
+class _Shutdown:
+    """The call `shutdown`: the first one ends this process as SIGTERM does."""
+
+    def __init__(self) -> None:
+        self._first = threading.Lock()
+
+    def __call__(self, parameters: tuple[Any, ...]) -> list[Any]:
+        """Return the response, and let the signal follow it."""
+        if self._first.acquire(blocking=False):  # a second signal would end a training without its checkpoint
+            log.warning("the ROS node was asked to end", asked=parameters)
+            timer = threading.Timer(_RESPONDING_S, os.kill, (os.getpid(), signal.SIGTERM))
+            timer.daemon = True
+            timer.start()
+        return [OK, "this process ends", 0]

@@ -120,6 +120,15 @@ class RosService:
         return self._wire
 
 
+def is_served(name: str) -> bool:
+    """Return whether a node serves a service, given its full name.
+
+    Raises:
+        MasterLost: no master responds.
+    """
+    return Master(ensure_node()).service_address(name) is not None
+
+
 def call_together(
     calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[RosService], None] | None = None
 ) -> list[Any]:
@@ -141,7 +150,7 @@ def call_together(
         if meanwhile is not None and sent:
             meanwhile(sent[-1])
         return [service.finish() for service in sent]
-    except BaseException:  # also Ctrl-C
+    except BaseException:  # also Ctrl-C: the next calls would read the responses to these requests
         for service in sent:
             service.close()
         raise

@@ -141,7 +141,7 @@ class RosSubscriber:
             raise SimulatorDead(self.simulator, f"{self.name} has a publisher that is gone") from error
         except UnreadableAnswer as error:
             raise WrongData(
-                self.simulator, f"{self.name} has a publisher that answers wrongly: {error}"
+                self.simulator, f"{self.name} has a publisher that sends invalid responses: {error}"
             ) from error
         if answer.code != OK:
             raise SimulatorDead(self.simulator, f"{self.name} is not published: {answer.text}")

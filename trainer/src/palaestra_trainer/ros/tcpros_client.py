@@ -80,7 +80,7 @@ class TcprosClient:
         try:
             self._socket.sendall(data)
         except OSError as error:
-            raise self._fault("does not take requests", error) from error
+            raise self._fault("does not accept requests", error) from error
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
         """Return the next frame, with the `ahead` bytes before its length; it is valid until the next call.
@@ -111,7 +111,7 @@ class TcprosClient:
                 return self._take(ahead, end)
             self._make_room(end)
             if give_up and time.monotonic() > give_up:
-                raise SimulatorHung(self._simulator, f"sent part of an answer in {self._deadline_s:g} s")
+                raise SimulatorHung(self._simulator, f"sent part of a response within {self._deadline_s:g} s")
             self._read_more()
             give_up = give_up or time.monotonic() + self._deadline_s
 

@@ -25,8 +25,8 @@ def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> RpcRespons
     try:
         answer: Any = client.call(uri, timeout_s, method, *arguments)
     except (UnreadableDocument, xmlrpc.client.Fault) as error:
-        raise UnreadableAnswer(f"{uri} answered {method} with invalid XML-RPC: {error}") from error
+        raise UnreadableAnswer(f"{uri} responded to {method} with invalid XML-RPC: {error}") from error
     match answer:
         case [int(code), str(text), value]:
             return RpcResponse(code, text, value)
-    raise UnreadableAnswer(f"{uri} answered {method} with {answer!r}, not with a code, a text and a value")
+    raise UnreadableAnswer(f"{uri} responded to {method} with {answer!r}, not a code, a text and a value")

@@ -33,8 +33,8 @@ class Update(NamedTuple):
     """A call that the master makes to a node.
 
     Attributes:
-        uri: of the node.
-        method: of the Slave API.
+        uri: the URI of the node.
+        method: the method of the Slave API.
         subject: what it is about; a newer update of the same method and subject replaces it.
         value: the new value, or the reason of a shutdown.
         node: the node's full name.
@@ -74,7 +74,7 @@ class MasterApi:
 
     Args:
         uri: at which the master answers.
-        pid: of the master's process.
+        pid: the process ID of the master's process.
     """
 
     def __init__(self, uri: str, pid: int) -> None:

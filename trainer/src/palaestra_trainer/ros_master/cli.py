@@ -12,7 +12,7 @@ import threading
 from collections.abc import Sequence
 
 from palaestra_protocol.http import Address
-from palaestra_protocol.signals import obeyed
+from palaestra_protocol.signals import obeyed, set_at_signals
 from palaestra_protocol.xmlrpc.server import host_name
 from palaestra_trainer.ros_master.serving import MasterServer
 
@@ -33,8 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = _options(arguments)
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     ended = threading.Event()
-    for number in obeyed((signal.SIGTERM, signal.SIGINT, signal.SIGHUP)):
-        signal.signal(number, lambda *_: ended.set())
+    set_at_signals(ended, obeyed((signal.SIGTERM, signal.SIGINT, signal.SIGHUP)))
     if options.until_stdin_closes:
         threading.Thread(target=_end_with_owner, daemon=True).start()
     host, port = options.listen
@@ -79,7 +78,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 def _name(host: str) -> str:
     """Return the name under which nodes reach the master; they choose theirs in the same way."""
     if host == LOOPBACK:
-        return "localhost"
+        return LOOPBACK
     chosen = os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP")
     if chosen or ipaddress.ip_address(host).is_unspecified:
         return host_name(os.environ)

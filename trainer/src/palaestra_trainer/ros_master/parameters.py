@@ -19,7 +19,7 @@ class Change(NamedTuple):
 
     Attributes:
         subscribed: the name for which they are registered; it ends with a slash.
-        name: of the parameter or namespace that has changed; it ends with a slash.
+        name: the name of the parameter or namespace that has changed; it ends with a slash.
         value: its new value.
         by_caller: whether the change is at or below the subscribed name; its author gets no update of it.
     """
@@ -113,7 +113,7 @@ def changes(name: str, value: Any, subscribed: list[str]) -> Iterator[Change]:
     """Yield the change of each subscribed name after `name` was set, or deleted with `{}`.
 
     Args:
-        name: of the parameter or namespace.
+        name: the name of the parameter or namespace.
         value: its new value.
         subscribed: names of parameters; each ends with a slash.
     """
@@ -127,7 +127,7 @@ def changes(name: str, value: Any, subscribed: list[str]) -> Iterator[Change]:
 
 
 def as_subscribed(name: str) -> str:
-    """Return a global name with a slash at its end, so that one is below another if it begins with it."""
+    """Return a global name that ends with a slash: then A is below B if A begins with B."""
     return SEPARATOR.join(("", *parts(name), ""))
 
 

@@ -1,4 +1,4 @@
-"""Which node publishes, subscribes and serves what, and where each node is.
+"""The registrations of nodes: their topics, services and addresses.
 
 Pure: no thread, socket or clock. A node is known from its first registration to the end of its last one.
 A node that registers with another address is a new one of the same name: everything of the old one is
@@ -14,7 +14,7 @@ ANY_TYPE = "*"
 
 
 class Kind(Enum):
-    """What a node registers for."""
+    """The role in which a node registers."""
 
     PUBLISHER = auto()
     SUBSCRIBER = auto()
@@ -40,7 +40,7 @@ class Registrations:
         self._nodes: dict[str, _Node] = {}
         # By kind, and then by the name of topic, service or parameter, the URIs of nodes by their names.
         self._members: dict[Kind, dict[str, dict[str, str]]] = {kind: {} for kind in Kind}
-        self._service_uris: dict[str, tuple[str, str]] = {}  # of each service, its node and address
+        self._service_uris: dict[str, tuple[str, str]] = {}  # the node and address of each service
         self._types: dict[str, str] = {}
 
     def register(self, kind: Kind, name: str, node: str, uri: str) -> str | None:
@@ -48,7 +48,7 @@ class Registrations:
 
         Args:
             kind: not SERVICE, which `register_service` is for.
-            name: of the topic or parameter.
+            name: the name of the topic or parameter.
             node: its full name.
             uri: at which the node answers.
         """
@@ -68,7 +68,7 @@ class Registrations:
 
         Args:
             kind: not SERVICE.
-            name: of the topic or parameter.
+            name: the name of the topic or parameter.
             node: its full name.
             uri: at which the node answers; a registration with another URI stays.
         """

@@ -62,7 +62,7 @@ class MasterServer:
         with self._lock:
             response, updates = self._api.call(method, arguments)
             if updates:
-                self._updates.add(updates)  # before the next call, whose updates must come after these
+                self._updates.add(updates)  # now, because the updates of the next call must come after these
         return tuple(response)  # XML-RPC has no named tuples
 
     def _stop_updates(self, update: Update) -> None:

@@ -38,7 +38,7 @@ class Updates:
         self._refused = refused
         self._deadline_s = deadline_s
         self._lock = threading.Lock()
-        self._queues: dict[str, _Queue] = {}  # by the URI of the node, the oldest update first
+        self._queues: dict[str, _Queue] = {}  # keys: URIs of nodes; each queue begins with the oldest update
         self._turns: deque[str] = deque()  # URIs with updates and without a thread
         self._threads = 0
 

@@ -18,7 +18,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
-from palaestra_protocol.pod.status import Cause, ExitCode, Termination
+from palaestra_protocol.pod.status import Cause, ExitCode
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
@@ -33,6 +33,7 @@ from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.directory_check import inspect
+from palaestra_trainer.run.end_record import write_end
 from palaestra_trainer.run.her_reward_env import make_judge
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.logger import CurvesLogger, hide_points
@@ -41,12 +42,12 @@ from palaestra_trainer.run.summary import finished, last_word_of, summarise, wri
 from palaestra_trainer.run.tensorboard_link import link_curves
 from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.training_callback import Resumed, TrainingCallback
+from palaestra_trainer.run.versions import versions
 from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.interface import Member
-from palaestra_trainer.telemetry.display import Lines, ProgressDisplay
-from palaestra_trainer.telemetry.logs import last_lines
+from palaestra_trainer.telemetry.fault_log import FaultLog
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.progress_sources import follow
@@ -75,13 +76,11 @@ class AttemptDependencies:
 
     Attributes:
         make_members: creates the simulators of a configuration, not yet started.
-        display: shows the progress of the run.
         must_resume: whether a new run must not begin.
         environment: the environment variables of the process.
     """
 
     make_members: MakeMembers
-    display: ProgressDisplay
     must_resume: bool = False
     environment: Mapping[str, str]
 
@@ -90,7 +89,6 @@ def run(
     configuration: Configuration,
     directory: RunDirectory,
     make_members: MakeMembers,
-    display: ProgressDisplay | None = None,
     *,
     must_resume: bool = False,
 ) -> int:
@@ -101,7 +99,6 @@ def run(
     """
     around = AttemptDependencies(
         make_members=make_members,
-        display=display or Lines(),
         must_resume=must_resume,
         environment=os.environ,
     )
@@ -125,7 +122,7 @@ def _reported(end: End, attempt: Attempt) -> int:
     """Log the end of an attempt, write its termination message, and return its exit code."""
     for line in end.message.splitlines():
         log.log(logging.INFO if end.code == ExitCode.DONE else logging.ERROR, line, reason=end.reason)
-    write_last_word(attempt.last_word(end))
+    attempt.write_end(end)
     return int(end.code)
 
 
@@ -168,7 +165,7 @@ class Attempt:
         """
         with ExitStack() as stack:
             end = self._trained(stack)
-            hurry = leave_after(STOPPED_S, int(end.code), lambda: write_last_word(self.last_word(end)))
+            hurry = leave_after(STOPPED_S, int(end.code), lambda: self.write_end(end))
             try:
                 stack.close()
             except ENDING as error:
@@ -186,19 +183,9 @@ class Attempt:
             return _logged(error)
         return DONE if learned else NOTHING_LEARNED
 
-    def last_word(self, end: End) -> Termination:
-        """Return the termination message of an attempt that ends now."""
-        return Termination(
-            step=self._progress.step,
-            success_rate=self._progress.success_rate,
-            success_interval=self._progress.success_interval,
-            reason=f"{end.reason}: {end.message}",
-            last_checkpoint=self._progress.checkpoint,
-            attempt=self._progress.attempt,
-            restarts=self._progress.restarts(),
-            log=last_lines(),
-            faults=self._progress.faults(),
-        )
+    def write_end(self, end: End) -> None:
+        """Write the termination message of an attempt that ends now, and the report of the run."""
+        write_end(self._directory, self._progress, end)
 
     def _prepare(self, stack: ExitStack) -> tuple[RunContext, Learning, SavedCheckpoint | None]:
         """Return a run whose simulators are up, its model and environment, and the checkpoint to resume from.
@@ -213,10 +200,9 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before the server starts, as Prometheus reads a later jump as an increase
+        self._take_over(found)  # before the server starts: Prometheus would read a later jump as an increase
         known = constants(configuration)
         stack.enter_context(status_server(configuration.status_address, progress, known))
-        stack.enter_context(self._around.display)
         self._begin(found)
         members = self._around.make_members(configuration)
         follow(progress, members)
@@ -234,7 +220,6 @@ class Attempt:
             fleet=fleet,
             progress=progress,
             interruption=interruption,
-            display=self._around.display,
         )
         return run, learning, found
 
@@ -251,6 +236,7 @@ class Attempt:
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
+        self._progress.moments = env.moments
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
         model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
@@ -330,19 +316,20 @@ class Attempt:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
+        self._directory.end.unlink(missing_ok=True)
         self._directory.summary.unlink(missing_ok=True)  # a finished run may continue with more steps
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
-        self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)
+        self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason, versions())
+        self._progress.fault_log = FaultLog(self._directory.faults, attempt)
         link_curves(self._directory, self._configuration)
         log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
 
     def _learn_with_callbacks(self, model: BaseAlgorithm, conductor: TrainingCallback) -> None:
-        try:
+        with ExitStack() as failed:
+            failed.callback(self._callbacks.end_after_error)
             self._learn(model, conductor)
-        except BaseException:
-            self._callbacks.end_after_error()
-            raise
+            failed.pop_all()
         self._callbacks.end()
 
     def _learn(self, model: BaseAlgorithm, conductor: TrainingCallback) -> None:
@@ -380,7 +367,7 @@ class Attempt:
         return Watchdog(
             self._progress.idle_s,
             self._configuration.stall_deadline_seconds,
-            lambda: write_last_word(self.last_word(stalled(self._progress))),
+            lambda: self.write_end(stalled(self._progress)),
         )
 
 

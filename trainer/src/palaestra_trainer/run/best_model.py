@@ -26,6 +26,8 @@ from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.run.context import RunContext
+from palaestra_trainer.run.logger import CurvesLogger
+from palaestra_trainer.run.replays import films_of, keep_replays
 from palaestra_trainer.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
 from palaestra_trainer.simulators.fleet import resting, running
 from palaestra_trainer.telemetry.progress import Progress
@@ -72,6 +74,7 @@ class Selection:
         self._model = model
         self._directory = run.directory
         self._best = best_of(run.directory)
+        self._confirmation: tuple[int, EvaluationResult] | None = None
 
     @property
     def measures(self) -> bool:
@@ -122,7 +125,7 @@ class Selection:
             return
         if confirmation_of(self._directory, best.step) is None:
             with self._acting_as_best(best, step):
-                self._confirm(best.step, step)
+                self._keep_replays(self._confirm(best.step, step), step)
 
     def _confirmed(self, evaluation: EvaluationResult, goal: float, step: int) -> bool:
         if evaluation.success_rate is None:
@@ -142,6 +145,7 @@ class Selection:
         before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
         evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
         self._log("confirm", now, evaluation, of_step=step)
+        self._confirmation = (step, evaluation)
         line = {"step": step, "confirmed_at": now} | evaluation.record()
         append_line(self._directory.confirmations, line)
         return evaluation
@@ -181,6 +185,23 @@ class Selection:
                 archive.writestr(BEST, json.dumps(asdict(best)))
 
         replace_file(self._directory.model, write)
+        self._keep_replays(evaluation, step)
+
+    def _keep_replays(self, evaluation: EvaluationResult, now: int) -> None:
+        """Keep recorded episodes of the best policy, and show them in TensorBoard.
+
+        They are those of its confirmation, else of its evaluation.
+        """
+        if self._best is None:
+            return
+        step, confirmation = self._confirmation or (-1, evaluation)
+        if step == self._best.step:
+            kept = keep_replays(self._directory, confirmation, f"the confirmation of step {step:,}")
+        else:
+            kept = keep_replays(self._directory, evaluation, f"the evaluation at step {self._best.step:,}")
+        logger = self._model.logger
+        if isinstance(logger, CurvesLogger):  # a callback may have set another one
+            logger.show({f"episodes/{title}": film for title, film in films_of(kept).items()}, now)
 
     @contextmanager
     def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:

@@ -22,10 +22,10 @@ from stable_baselines3.common.callbacks import (
     StopTrainingOnRewardThreshold,
 )
 
-from palaestra_trainer import user_imports
 from palaestra_trainer.configuration import Callback
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError, fact_of
-from palaestra_trainer.kwargs_check import AcceptedArguments
+from palaestra_trainer.user_code import imports
+from palaestra_trainer.user_code.kwargs import AcceptedArguments
 
 log = structlog.get_logger(__name__)
 
@@ -179,9 +179,9 @@ def _about_arguments(field: str, cls: type[BaseCallback], callback: Callback) ->
 
 
 def _class(field: str, name: str) -> type[BaseCallback]:
-    if not user_imports.names_class(name):
-        raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
-    cls = user_imports.class_named(name, field, BaseCallback)
+    if not imports.names_class(name):
+        raise ConfigurationError(f"{field}: {name} does not name a class; write it as module:Class")
+    cls = imports.class_named(name, field, BaseCallback)
     if cls in _OF_EVALUATION:
         raise ConfigurationError(f"{field}: {name} is refused: {_OF_EVALUATION[cls]}")
     if inspect.isabstract(cls):

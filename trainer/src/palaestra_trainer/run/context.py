@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.fleet import Fleet
-from palaestra_trainer.telemetry.display import ProgressDisplay
 from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.waiting.signals import Interruption
 
@@ -22,7 +21,6 @@ class RunContext:
         fleet: the simulators.
         progress: the progress of the run.
         interruption: raises after a signal has arrived.
-        display: shows the progress to a person.
     """
 
     configuration: Configuration
@@ -30,4 +28,3 @@ class RunContext:
     fleet: Fleet
     progress: Progress
     interruption: Interruption
-    display: ProgressDisplay

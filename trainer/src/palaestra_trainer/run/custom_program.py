@@ -25,7 +25,7 @@ from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.status_server import status_server
 
 _lock = threading.Lock()
-_EVALUATING_S = 60.0  # a step of an environment does not take longer
+_EVALUATING_S = 60.0  # no step of an environment takes longer
 
 
 class ProgramReport(Progress):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +13,64 @@ import structlog
 from palaestra_protocol.pod.enums import ExitCode, Role
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
-from palaestra_trainer.episodes.evaluation import evaluate_on_all
+from palaestra_trainer.episodes.evaluation import ActingPolicy, evaluate_on_all
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
 from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import NullWatcher
+from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.exit import leave_after
+from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 
 
 def _nobody(result: dict[str, Any]) -> None:
     """Ignore a result."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Playing:
+    """The policy of a run, and started simulators for its episodes."""
+
+    policy: ActingPolicy
+    restarters: Sequence[Restarter]
+
+
+@contextmanager
+def playing(
+    configuration: Configuration, model: Path, make_members: MakeMembers, check: Check = go_on
+) -> Iterator[Playing]:
+    """Yield the policy in a model.zip with started simulators; stop the simulators at the end.
+
+    Args:
+        configuration: of the run, with the simulators to start; all of them evaluate.
+        model: the model.zip of the run directory.
+        make_members: creates the simulators.
+        check: called while the simulators start; it raises to cancel that.
+
+    Raises:
+        ConfigurationError: the model is missing, or does not fit the configuration.
+        FaultBudgetSpent: a simulator broke more often than its budget allows.
+    """
+    if not model.exists():
+        raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
+    use_threads()
+    with ExitStack() as stack:
+        fleet = Fleet(configuration, make_members(configuration), NullWatcher())
+        stack.callback(fleet.stop)
+        begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
+        task = fleet.evaluating[0].member.env
+        algorithms.refuse_without_masks(begun, task, configuration.environment.id)
+        fleet.start(check)
+        env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
+        trained = algorithms.make_model(begun, env, configuration.seed, configuration.device)
+        checkpoint.load_tensors(model, trained)
+        yield Playing(policy=algorithms.policy_of(trained), restarters=fleet.evaluating)
 
 
 def measure(
@@ -53,27 +97,15 @@ def measure(
             the process ends.
 
     Raises:
-        ConfigurationError: the model is missing, or does not fit the configuration.
-        FaultBudgetSpent: a simulator broke more often than its budget allows.
+        As `playing`.
     """
-    evaluating = _evaluating(configuration)
-    if not model.exists():
-        raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
-    use_threads()
-    only = configuration.model_copy(update={"simulators": evaluating})
-    with ExitStack() as last, ExitStack() as stack:
-        fleet = Fleet(only, make_members(only), NullWatcher())
-        stack.callback(fleet.stop)
-        begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
-        task = fleet.evaluating[0].member.env
-        algorithms.refuse_without_masks(begun, task, configuration.environment.id)
-        fleet.start()
-        env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
-        trained = algorithms.make_model(begun, env, configuration.seed, configuration.device)
-        checkpoint.load_tensors(model, trained)
+    only = configuration.model_copy(update={"simulators": _warned(configuration)})
+    with ExitStack() as last, playing(only, model, make_members) as player:
         seeds = episode_seeds(configuration.seed, stream, episodes)
-        evaluation = evaluate_on_all(algorithms.policy_of(trained), fleet.evaluating, seeds)
+        evaluation = evaluate_on_all(player.policy, player.restarters, seeds)
+        interval = evaluation.success_interval
         result = evaluation.summary() | {
+            "success_interval": None if interval is None else interval.to_json(),
             "seeds": stream,
             "run_seed": configuration.seed,
             "seconds": round(evaluation.seconds, 2),
@@ -83,10 +115,40 @@ def measure(
     return result
 
 
-def _evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
+def in_each(
+    drivers: Sequence[str],
+    configuration: Configuration,
+    model: Path,
+    make_members: MakeMembers,
+    **wanted: Any,
+) -> Iterator[dict[str, Any]]:
+    """Yield the results of `measure` for the same episodes in each of several simulator programs, one by one.
+
+    Each result has the name of the program as `simulator`.
+
+    Raises:
+        ConfigurationError: before any simulator starts: one of them cannot run here; or as `measure`.
+        FaultBudgetSpent: as `measure`.
+    """
+    entries = _warned(configuration)
+    each = {driver: tuple(in_driver(entry, driver) for entry in entries) for driver in drivers}
+    for driver, simulators in each.items():
+        only = configuration.model_copy(update={"simulators": simulators})
+        yield {"simulator": driver, **measure(only, model, make_members, **wanted)}
+
+
+def evaluating(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
     """Return the simulators with role Evaluate; if none has that role, the first collecting one."""
     if found := configuration.with_role(Role.EVALUATE):
         return found
-    collecting = configuration.with_role(Role.COLLECT)[0]
-    log.warning("no simulator has role Evaluate: the world is that of a collecting one", name=collecting.name)
-    return (collecting.model_copy(update={"role": Role.EVALUATE}),)
+    return (configuration.with_role(Role.COLLECT)[0].model_copy(update={"role": Role.EVALUATE}),)
+
+
+def _warned(configuration: Configuration) -> tuple[SimulatorConfiguration, ...]:
+    """Return the simulators that evaluate; log a warning if their world is not made for it."""
+    found = evaluating(configuration)
+    if not configuration.with_role(Role.EVALUATE):
+        log.warning(
+            "no simulator has role Evaluate: the world is that of a collecting one", name=found[0].name
+        )
+    return found

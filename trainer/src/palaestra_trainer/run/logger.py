@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
 from palaestra_trainer.telemetry.metric_values import Logged
 from palaestra_trainer.telemetry.progress import Progress
+
+_RGB = 3  # Summary.Image.colorspace; source: tensorflow/core/framework/summary.proto
 
 
 class CurvesLogger(Logger):
@@ -19,8 +23,8 @@ class CurvesLogger(Logger):
     """
 
     def __init__(self, folder: Path, progress: Progress) -> None:
-        formats = [TensorBoardOutputFormat(str(folder)), Logged(progress.figures)]
-        super().__init__(str(folder), formats)
+        self._curves = TensorBoardOutputFormat(str(folder))
+        super().__init__(str(folder), [self._curves, Logged(progress.figures)])
         self._progress = progress
 
     def dump(self, step: int = 0) -> None:
@@ -28,6 +32,21 @@ class CurvesLogger(Logger):
         for name, value in self._progress.scalars().items():
             self.record(name, value)
         super().dump(step)
+
+    def show(self, films: Mapping[str, bytes], step: int) -> None:
+        """Write animated GIFs by name, as images of TensorBoard.
+
+        SummaryWriter writes each picture as a PNG, so the summaries are made here.
+        """
+        summary = import_module("tensorboard.compat.proto.summary_pb2").Summary  # slow to import
+        images = {
+            name: summary.Image(encoded_image_string=film, colorspace=_RGB) for name, film in films.items()
+        }
+        values = [summary.Value(tag=name, image=image) for name, image in images.items()]
+        writer = self._curves.writer.file_writer  # None once the logger is closed
+        if values and writer is not None:
+            writer.add_summary(summary(value=values), step)
+            writer.flush()
 
 
 def hide_points(folder: Path, *, after: int) -> None:

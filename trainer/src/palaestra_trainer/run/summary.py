@@ -14,7 +14,7 @@ from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_fi
 from palaestra_trainer.telemetry.goodput import trained_share
 from palaestra_trainer.telemetry.progress import Progress
 
-_NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # of a finished run
+_NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # fields of a finished run
 
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:

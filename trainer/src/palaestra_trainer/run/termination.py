@@ -48,7 +48,7 @@ class End:
     message: str
 
 
-# The first match counts.
+# The first row that matches decides.
 ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),

@@ -25,11 +25,13 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.run.best_model import Selection, last_evaluated
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.journal import Journal
+from palaestra_trainer.telemetry.progress_log import ProgressLog
 from palaestra_trainer.waiting import shutdown_deadline
 
 log = structlog.get_logger(__name__)
 
-# A shorter learning phase is not worth the pause, with two service calls per simulator, and a model copy.
+# A pause costs two service calls per simulator, and a copy of the model; a shorter learning phase is not
+# worth that.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 
@@ -55,6 +57,7 @@ class TrainingCallback(BaseCallback):
             resumed.checkpoint if resumed else None,
         )
         self._journal = Journal(run.directory.journal)
+        self._log = ProgressLog()
         self._boundary = self._resumed = resumed.state if resumed else None
         self._step = self._saved = resumed.checkpoint.manifest.step if resumed else 0
         self._evaluated = last_evaluated(run.directory, self._step)
@@ -146,8 +149,8 @@ class TrainingCallback(BaseCallback):
         self._run.progress.collected(self._step, infos)
         self._journal.keep(self._run.progress)
         self._record_rewards(infos, self.locals["dones"])
-        if self._run.display.due:
-            self._run.display.show(self._run.progress.status())
+        if self._log.due:
+            self._log.write(self._run.progress.status())
         # A rollout may take longer than the grace period, so a signal ends it here, and it is played again.
         self._run.interruption.check()
         return True

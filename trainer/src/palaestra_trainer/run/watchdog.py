@@ -74,7 +74,7 @@ def stalled(progress: Progress) -> End:
     """Return the end of a run whose environments have not stepped within the deadline; never blocks."""
     fact = f"no environment step for {progress.idle_s():.0f} s while {progress.phase}"
     if down := progress.down():
-        return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not up: {', '.join(down)}")
+        return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not ready: {', '.join(down)}")
     if progress.awaits_simulators:
         return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; a simulator's step does not end")
     return End(ExitCode.STALLED, "Stalled", fact)

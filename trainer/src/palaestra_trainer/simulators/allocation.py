@@ -11,7 +11,7 @@ from typing import NamedTuple
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.locks import FileLock
+from palaestra_trainer.launching.locks import FileLock
 
 
 class Allocation(NamedTuple):

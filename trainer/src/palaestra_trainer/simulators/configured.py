@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 from palaestra_protocol.pod.enums import Role
@@ -89,12 +90,11 @@ def configured_simulator(role: Role) -> Configured:
     """
     configuration = load()
     allocated = allocate(configuration, role)
-    try:
+    with ExitStack() as undo:
+        undo.callback(allocated.lock.release)
         [simulator] = connect(_alone(configuration, allocated.simulator.name))
         simulator.start()
-    except BaseException:
-        allocated.lock.release()
-        raise
+        undo.pop_all()
 
     def release() -> None:
         if allocated.lock.held:

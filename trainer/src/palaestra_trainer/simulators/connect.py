@@ -7,6 +7,7 @@ sidecars as processes of this program.
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -118,12 +119,11 @@ class OwnSimulator:
         open_facades.withdraw(self.webots)
         self.robot = robot_class(robot)(self.webots)
         self.scene = SimulatedScene(self.webots, self.robot)
-        try:
+        with ExitStack() as undo:
+            undo.callback(self.close)
             self.webots.start()  # connects the robot too
             self.webots.supervisor.set_mode(Mode.FAST)
-        except BaseException:
-            self.close()
-            raise
+            undo.pop_all()
 
     def close(self) -> None:
         """End it; safe to repeat."""

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import structlog
 
@@ -79,22 +79,21 @@ class Fleet:
             restarter.stepped = stepped
             restarter.begin_start()
         began, report_at_s = time.monotonic(), LONG_S
-        try:
+        with ExitStack() as undo:
+            undo.callback(self._abandon_all)
             while not self._enough():
                 check()
                 if (waited_s := time.monotonic() - began) >= report_at_s:
                     report_at_s = 2 * waited_s
                     log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
-                # Any finished work ends the wait: a group may be large enough after a start that failed, too.
+                # Any start that finishes ends the wait, even a failed one: the group may still be large
+                # enough.
                 wait(
                     [work for restarter in self._all if (work := restarter.under_way)],
                     LOOK_EVERY_S,
                     FIRST_COMPLETED,
                 )
-        except BaseException:
-            for restarter in self._all:
-                restarter.abandon()
-            raise
+            undo.pop_all()
         for restarter in self._all:
             restarter.stepped = True  # other members may step from now on, even while this one still starts
 
@@ -104,6 +103,10 @@ class Fleet:
         wait(stops)
         for stop in stops:
             stop.result()
+
+    def _abandon_all(self) -> None:
+        for restarter in self._all:
+            restarter.abandon()
 
     def _down(self) -> list[str]:
         return [restarter.name for restarter in self._all if not restarter.up()]

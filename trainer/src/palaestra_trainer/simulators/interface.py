@@ -12,6 +12,7 @@ import gymnasium
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.robots.sight import Sight
 
 Environment = gymnasium.Env[Any, Any]
 Step = tuple[Any, Any, bool, bool, dict[str, Any]]
@@ -76,6 +77,18 @@ class ReportsLeftOut(Protocol):
         """Return the parts of its world that the simulator left out at its last start, in lines for people.
 
         It is empty before the first start. Never blocks.
+        """
+        ...
+
+
+@runtime_checkable
+class Located(Protocol):
+    """A member whose robot can be recorded from above."""
+
+    def sight(self) -> Sight | None:
+        """Return where robot and target are after the last step, without a request to the simulator.
+
+        None: the robot does not drive on a floor.
         """
         ...
 

@@ -21,7 +21,6 @@ import numpy as np
 import structlog
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer.copies import copied
 from palaestra_trainer.environments.masks import mask_of
 from palaestra_trainer.errors import (
     ConfigurationError,
@@ -37,6 +36,7 @@ from palaestra_trainer.simulators.finite_check import check_observation, check_r
 from palaestra_trainer.simulators.interface import Member, NullWatcher, Step, Watcher
 from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
+from palaestra_trainer.user_code.copies import copied
 from palaestra_trainer.waiting.greenlets import away_s, let_others
 from palaestra_trainer.waiting.signals import Check, go_on
 
@@ -74,7 +74,7 @@ class Restarter:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        self._refusal = ""  # the fault by which the last process showed a mistake of the configuration
+        self._refusal = ""  # the fault of the last process, if it shows a mistake in the configuration
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
@@ -295,7 +295,7 @@ class Restarter:
         try:
             switch()
         except SimulatorFault as fault:
-            log.warning("simulator does not answer", simulator=self.name, fact=str(fault))
+            log.warning("simulator does not respond", simulator=self.name, fact=str(fault))
 
     def _recycle_when_due(self, check: Check) -> None:
         reason = self.member.due()

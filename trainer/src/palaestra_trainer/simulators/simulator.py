@@ -16,6 +16,7 @@ from palaestra_trainer.errors import ConfigurationError, SimulatorFault
 from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.sight import Sight
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.recycle_policy import RecyclePolicy
 from palaestra_trainer.webots import Mode, Webots
@@ -93,6 +94,10 @@ class Simulator:
     def left_out(self) -> tuple[str, ...]:
         """Return the parts of its world that the simulator left out at its last start, as text lines."""
         return self.sidecar.left_out
+
+    def sight(self) -> Sight | None:
+        """Return where robot and target are after the last step; None: not on a floor."""
+        return self.scene.sight()
 
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""

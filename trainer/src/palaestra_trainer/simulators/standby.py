@@ -27,6 +27,7 @@ from palaestra_trainer.errors import (
     SimulatorHung,
     WorldMisfit,
 )
+from palaestra_trainer.robots.sight import Sight
 from palaestra_trainer.simulators.budget import RestartBudget, RestartLimit
 from palaestra_trainer.simulators.interface import Environment
 from palaestra_trainer.simulators.simulator import Simulator
@@ -79,6 +80,10 @@ class Standby:
     def left_out(self) -> tuple[str, ...]:
         """Return the parts that the first simulator left out; the other one has the same world."""
         return self._both[0].left_out()
+
+    def sight(self) -> Sight | None:
+        """Return where robot and target are in the active simulator; None: not on a floor."""
+        return self._active.simulator.sight()
 
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle the active simulator before the next `episodes`; None: no reason."""
@@ -170,7 +175,7 @@ class Side:
             raise SimulatorHung(simulator.name, f"its standby was not ready within {deadline_s:g} s")
         preparation.result()
         if not simulator.webots.available():
-            raise SimulatorDead(simulator.name, "its standby no longer answers")
+            raise SimulatorDead(simulator.name, "its standby no longer responds")
         simulator.unpause()
         simulator.wear.begin()
 

@@ -1,1 +1,1 @@
-"""Reports of a run while it trains: progress, metrics, /status, /metrics, the log and the display."""
+"""Reports of a run while it trains: progress, metrics, /status, /metrics and the log."""

@@ -18,7 +18,7 @@ _last_lines: deque[str] = deque(maxlen=MOST_LINES)
 
 
 def configure_logs() -> None:
-    """Write log lines to the current `sys.stderr`, because a progress bar replaces that stream."""
+    """Write log lines to the current `sys.stderr`, because a library may replace that stream."""
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,

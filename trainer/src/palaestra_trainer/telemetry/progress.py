@@ -1,7 +1,7 @@
 """The progress of a run, in one object for all of its readers.
 
 The training loop, the VecEnv and the evaluations report to it, each from its
-own thread. /status, /metrics, the display, the summary and the watchdog read it.
+own thread. /status, /metrics, the log, the summary and the watchdog read it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,11 @@ from palaestra_protocol.pod.status import (
     SuccessInterval,
     TrainerStatus,
 )
+from palaestra_protocol.scene import SceneState
 from palaestra_trainer.episodes.evaluation import EvaluationResult
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.infos import extra_steps
+from palaestra_trainer.telemetry.fault_log import FaultLog
 from palaestra_trainer.telemetry.goodput import GoodputLedger
 from palaestra_trainer.telemetry.metric_values import EPISODES_IN_MEAN, MetricValues
 from palaestra_trainer.telemetry.simulator_status import AskLeftOut, AskStandby, SimulatorStatuses
@@ -51,7 +53,7 @@ class Counters:
     Attributes:
         episodes: collected episodes that ended without a fault.
         faults: by kind: dead, hung, wrong_data; and slow, which is not a fault.
-        restarts: of simulators, after faults.
+        restarts: the restarts of simulators, after faults.
         recycled: restarts of healthy simulators.
         given_up: simulators that the run continued without.
         extra_steps: simulation steps taken because a message was late.
@@ -104,6 +106,8 @@ class Progress:
         checkpoint: the newest checkpoint; None before the first.
         attempt: this attempt's number in the run directory; None before it is recorded.
         figures: values of this attempt only, for /metrics.
+        fault_log: the file of faults; None: they are not written.
+        moments: returns where the collecting simulators are in their episodes, for viewers.
     """
 
     def __init__(
@@ -120,6 +124,8 @@ class Progress:
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
         self.figures = MetricValues()
+        self.fault_log: FaultLog | None = None
+        self.moments: Callable[[], Mapping[str, SceneState]] = dict
         self._clock = clock
         self._lock = threading.Lock()
         self._standings = SimulatorStatuses(simulators, clock)
@@ -166,19 +172,20 @@ class Progress:
 
     def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
         """Count a fault and the steps of the episode that it truncated; mark the simulator as down."""
+        record = FaultRecord(
+            time=timestamp(time.time()),
+            simulator=simulator,
+            kind=fault.kind,
+            fact=str(fault),
+            step=self.step,
+        )
         with self._lock:
             self.counters.steps_lost += steps_lost
             self.counters.faults[fault.kind] += 1
             self._goodput.in_vain()
-            self._standings.broke(
-                FaultRecord(
-                    time=timestamp(time.time()),
-                    simulator=simulator,
-                    kind=fault.kind,
-                    fact=str(fault),
-                    step=self.step,
-                )
-            )
+            self._standings.broke(record)
+        if self.fault_log is not None:
+            self.fault_log.broke(record, steps_lost)
 
     def slow(self, simulator: str, seconds: float) -> None:
         """Count a step that took much longer than others, which is not a fault."""
@@ -230,6 +237,8 @@ class Progress:
             else:
                 self.counters.restarts += 1
                 self._standings.restarted(simulator)
+        if self.fault_log is not None:
+            self.fault_log.is_up(simulator)
 
     def collected(self, step: int, infos: Sequence[Mapping[str, Any]]) -> None:
         """Set the step of training, and count a vector step by its infos."""

@@ -1,4 +1,4 @@
-"""The HTTP server of a trainer for /status, /metrics and /healthz."""
+"""The HTTP server of a trainer for /status, /metrics, /healthz and /watch."""
 
 from __future__ import annotations
 
@@ -37,6 +37,9 @@ def status_server(
             status=HTTPStatus.OK, body=generate_latest(registry), content_type=CONTENT_TYPE_PLAIN_0_0_4
         ),
         ("GET", "/healthz"): lambda _: probe_response(),
+        ("GET", "/watch"): lambda _: json_response(
+            HTTPStatus.OK, {name: moment.to_json() for name, moment in progress.moments().items()}
+        ),
     }
     host, _, port = address.rpartition(":")
     try:

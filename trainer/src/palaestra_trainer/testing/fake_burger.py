@@ -48,7 +48,7 @@ class FakeBurger(FakeWheels, Scanner):
     floor = COURT
     axle_m = 0.16
     radius_m = 0.111
-    speed_m_s = 0.22  # the fastest rim of a wheel
+    speed_m_s = 0.22  # the rim speed of the fastest wheel
     turn_rad_s = 2.0 * speed_m_s / axle_m
     scan_view_rad = 2.0 * math.pi
     scan_range_m = (0.12, 3.5)
@@ -66,12 +66,12 @@ class FakeBurger(FakeWheels, Scanner):
         return self._scan.copy()
 
     def _look(self) -> None:
-        eye = (
+        origin = (
             self._x_m + SCANNER_M * math.cos(self._heading_rad),
             self._y_m + SCANNER_M * math.sin(self._heading_rad),
         )
         least, most = self.scan_range_m
-        seen = nearest(self.layout, eye, self._heading_rad + ROWS)
+        seen = nearest(self.layout, origin, self._heading_rad + ROWS)
         seen[seen < least] = most  # an object that is too near is not detected
         noise = NOISE_M * self._random.standard_normal(RAYS)
         self._scan = np.clip(seen + noise, least, most).astype(np.float32)

@@ -69,15 +69,15 @@ def look(pose: Pose, target: Point, cylinders: Sequence[Point]) -> tuple[Colors,
 
 def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_Thing]:
     c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
-    eye = pose.x_m + FORWARD_M * c, pose.y_m + FORWARD_M * s
-    ways = c - s * _LEFT, s + c * _LEFT  # x and y per meter forward, by column
-    walls = np.minimum(_to_wall(eye[0], ways[0]), _to_wall(eye[1], ways[1]))
+    origin = pose.x_m + FORWARD_M * c, pose.y_m + FORWARD_M * s
+    ways = c - s * _LEFT, s + c * _LEFT  # for each column, x and y of its rays per meter forward
+    walls = np.minimum(_to_wall(origin[0], ways[0]), _to_wall(origin[1], ways[1]))
     yield _Thing(walls, WALL_HEIGHT_M, WALL)
     for x, y in cylinders:
         yield _Thing(
-            _to_circle((x - eye[0], y - eye[1]), ways, CYLINDER_RADIUS_M), CYLINDER_HEIGHT_M, CYLINDER
+            _to_circle((x - origin[0], y - origin[1]), ways, CYLINDER_RADIUS_M), CYLINDER_HEIGHT_M, CYLINDER
         )
-    pole = target[0] - eye[0], target[1] - eye[1]
+    pole = target[0] - origin[0], target[1] - origin[1]
     yield _Thing(_to_circle(pole, ways, POLE_RADIUS_M), POLE_HEIGHT_M, POLE)
 
 

@@ -51,7 +51,7 @@ class FakeEPuck(FakeWheels, Distances):
     floor = PEN
     axle_m = 0.052
     radius_m = 0.037
-    speed_m_s = 0.125  # the fastest rim of a wheel
+    speed_m_s = 0.125  # the rim speed of the fastest wheel
     turn_rad_s = 2.0 * speed_m_s / axle_m
     bearings_rad = tuple(
         math.radians(angle) for angle in (17.1, 45.8, 90.0, 151.2, 208.5, 270.0, 314.1, 342.8)

@@ -10,7 +10,7 @@ from palaestra_trainer.robots.base import Scene
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 
-HALF_SIDE_M = 2.0  # from the center of the arena to the inner faces of the walls
+HALF_SIDE_M = 2.0  # distance from the center of the arena to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
 CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
 CYLINDER_HEIGHT_M = 0.4

@@ -15,36 +15,36 @@ Rays = NDArray[np.float64]
 Eye = tuple[float, float] | tuple[Rays, Rays]
 
 
-def nearest(layout: FloorLayout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
+def nearest(layout: FloorLayout, origin: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
     """Return meters along each ray to the walls and to the obstacles on the floor.
 
     Args:
         layout: the floor; its walls are at its edges.
-        eye: x, y in meters of the origin of the rays; one for all, or arrays of one for each.
+        origin: x, y in meters of the origin of the rays; one for all, or arrays of one for each.
         angles: directions of the rays in the world, in radians.
     """
     way = np.cos(angles), np.sin(angles)
-    seen = _to_edges(layout, eye, way)
+    seen = _to_edges(layout, origin, way)
     for thing in layout.obstacles:
         if thing.standing:
-            seen = np.minimum(seen, _to_thing(thing, eye, way))
+            seen = np.minimum(seen, _to_thing(thing, origin, way))
     return seen
 
 
-def _to_edges(layout: FloorLayout, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
+def _to_edges(layout: FloorLayout, origin: Eye, way: tuple[Rays, Rays]) -> Rays:
     """Return meters along each ray to the walls at the edges of the floor."""
     seen = np.full(len(way[0]), math.inf)
     for axis in (0, 1):
         slope = _sloping(way[axis])
         edge = np.where(slope > 0.0, layout.high[axis], layout.low[axis])
-        seen = np.minimum(seen, (edge - eye[axis]) / slope)
+        seen = np.minimum(seen, (edge - origin[axis]) / slope)
     return seen
 
 
-def _to_thing(thing: Obstacle, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
+def _to_thing(thing: Obstacle, origin: Eye, way: tuple[Rays, Rays]) -> Rays:
     """Return meters along each ray to a circle or a rectangle; infinite beside it."""
     c, s = math.cos(thing.heading_rad), math.sin(thing.heading_rad)
-    dx, dy = eye[0] - thing.x_m, eye[1] - thing.y_m
+    dx, dy = origin[0] - thing.x_m, origin[1] - thing.y_m
     x, y = dx * c + dy * s, dy * c - dx * s
     ux, uy = way[0] * c + way[1] * s, way[1] * c - way[0] * s
     if thing.radius_m:

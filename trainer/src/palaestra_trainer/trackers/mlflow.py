@@ -23,7 +23,7 @@ NAME = "mlflow"
 URI_VARIABLE = "MLFLOW_TRACKING_URI"
 # With the client's own limits, a server that does not respond would block training for minutes.
 PATIENCE = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "10", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2"}
-MOST_PARAMETERS = 100  # in one request
+MOST_PARAMETERS = 100  # the server's limit for one request
 LONGEST_PARAMETER = 6000
 
 
@@ -66,7 +66,7 @@ class MLflow(Tracker):
             self._client.log_batch(self._run, metrics=metrics)
         except MlflowException as error:
             if not self._lost:
-                log.warning("MLflow does not answer: points are lost", step=step, fact=str(error))
+                log.warning("MLflow does not respond: points are lost", step=step, fact=str(error))
             self._lost += len(metrics)
 
     def end(self) -> None:
@@ -76,7 +76,7 @@ class MLflow(Tracker):
         try:
             self._client.set_terminated(self._run)
         except MlflowException as error:
-            log.warning("MLflow does not answer: its run stays marked as running", fact=str(error))
+            log.warning("MLflow does not respond: its run stays marked as running", fact=str(error))
 
     def _create(self, configuration: Mapping[str, Any]) -> str:
         found = self._client.get_experiment_by_name(self._experiment)

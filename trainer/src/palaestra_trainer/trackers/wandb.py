@@ -17,7 +17,7 @@ log = structlog.get_logger(__name__)
 
 NAME = "wandb"
 MODES = ("offline", "online")
-# The rest of the default grace period, after waits for simulators and the checkpoint; see
+# The default grace period, less the time for the simulators and the checkpoint; see
 # `waiting.shutdown_deadline`.
 FINISH_S = 5
 

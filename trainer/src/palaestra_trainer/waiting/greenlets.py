@@ -20,9 +20,9 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer.waiting import shutdown_deadline
 from palaestra_trainer.waiting.wait_time import count_wait
 
-# After this time the first greenlet waits alone; its own deadline and fault attribution then apply. The time
-# is longer than a step, because the wait alone counts as its turn. It is short compared with the deadline,
-# which begins only then.
+# After this time the first greenlet waits alone, with its own deadline, and a fault is attributed to it.
+# The time is longer than a step, because waiting alone counts as this greenlet's turn. It is short compared
+# with the deadline, which begins only then.
 _SOON_MS = 500
 
 
@@ -127,7 +127,7 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
             for turn in _ready(waiting):
                 turn.switch()
             waiting = [turn for turn in waiting if not turn.done]
-    except BaseException:
+    except BaseException:  # also Ctrl-C: no work may continue in a later call
         for turn in turns:
             if not turn.dead:
                 turn.throw()

@@ -33,7 +33,7 @@ class Attached:
 
     def failure(self) -> str | None:
         """Return the reason why it cannot be used; called only while it does not respond."""
-        return "no simulator answers under this name; start it, or remove launcher=Attached()"
+        return "no simulator responds under this name; start it, or remove launcher=Attached()"
 
     def refused(self) -> bool:
         """Return False, because this process cannot know the exit code."""

@@ -243,7 +243,7 @@ class Webots:
     ) -> None:
         self._entered -= 1
         if self._entered or self._stopped:
-            return  # an enclosing block continues, or nothing is left to pause
+            return  # an enclosing block still steps, or the simulator has stopped
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 Message = bytes | memoryview
 
-_HEAD_AT: Final = 12  # after sequence number and stamp, which change
+_HEAD_AT: Final = 12  # the offset behind sequence number and stamp, which change
 _LENGTH: Final = struct.Struct("<I")
 _SIZE: Final = struct.Struct("<II")  # height, width
 _IMAGE: Final = struct.Struct("<BII")  # is_bigendian, step, bytes of data

@@ -18,7 +18,7 @@ FLOAT64 = "d"
 POINT = "ddd"  # geometry_msgs/PointStamped: x, y, z
 
 _FRAME_ID_LENGTH = struct.Struct("<I")
-_FRAME_ID_AT = 12  # after sequence number and stamp
+_FRAME_ID_AT = 12  # the offset behind sequence number and stamp
 
 
 class NumberReading:

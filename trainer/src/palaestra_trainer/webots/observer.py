@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Any
+from typing import Any, Final, TypeVar
 
+from palaestra_protocol.fields import ProtocolError, decoded
+from palaestra_protocol.scene import MOST_SCENE_BYTES, MOST_STATE_BYTES, SceneState, VisibleScene
 from palaestra_trainer.errors import WrongData
-from palaestra_trainer.ros import RosService
+from palaestra_trainer.ros import RosService, is_served
 from palaestra_trainer.webots.obstacles import ObstacleReader, Thing
 from palaestra_trainer.webots.services import Services
+
+_Data = TypeVar("_Data", VisibleScene, SceneState)
+
+_SCENE: Final = "palaestra/scene"
+_SCENE_STATE: Final = "palaestra/scene_state"
 
 
 class Mode(enum.IntEnum):
@@ -105,6 +112,16 @@ class Observer:
         """
         return self._surroundings.read()
 
+    def scene(self) -> VisibleScene | None:
+        """Return the looks of the world; None if the simulator does not describe them, as Webots."""
+        if not is_served(f"/{self.node_name}/{_SCENE}"):
+            return None
+        return self._read(VisibleScene, _SCENE, MOST_SCENE_BYTES)
+
+    def scene_state(self) -> SceneState:
+        """Return the poses of the last step, for a scene that was read before."""
+        return self._read(SceneState, _SCENE_STATE, MOST_STATE_BYTES)
+
     def node(self, name: str) -> int:
         """Return the handle of the node with DEF `name`; it is valid until the world is reloaded.
 
@@ -152,6 +169,13 @@ class Observer:
             self._services.get("supervisor/node/get_position", "node_get_position"),
             self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
         )
+
+    def _read(self, kind: type[_Data], path: str, most_bytes: int) -> _Data:
+        text = self._services.ask(path, "get_string")
+        try:
+            return kind.from_json(decoded(text.encode(), most_bytes))
+        except ProtocolError as error:
+            raise WrongData(self.node_name, f"answered {path} with {error}") from error
 
     def _known(self, handle: Any, fact: str) -> int:
         if not handle:

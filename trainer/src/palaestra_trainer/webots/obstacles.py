@@ -17,7 +17,10 @@ from palaestra_trainer.errors import WorldMisfit
 from palaestra_trainer.webots.services import Services
 
 FLOOR = "FLOOR"  # DEF name
-_FLOOR_FIELDS = {"RectangleArena": "floorSize", "Floor": "size"}  # of PROTOs of Webots
+_FLOOR_FIELDS = {
+    "RectangleArena": "floorSize",
+    "Floor": "size",
+}  # the fields with the size, by PROTO of Webots
 _ROUND = ("Cylinder", "Capsule", "Sphere")
 _WRAPPERS = ("Pose", "Transform", "Group", "ObstacleShape")
 
@@ -125,7 +128,7 @@ class ObstacleReader:
         if known.name == FLOOR:
             return 0.0  # the sides of a layout are parallel to the axes of the world
         if all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in known.shapes):
-            return 0.0  # its rotation about z makes no difference
+            return 0.0  # a rotation about z makes no difference
         orientation = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=known.node)
         turn = orientation.orientation
         return math.remainder(2.0 * math.atan2(turn.z, turn.w), 2.0 * math.pi)

@@ -10,12 +10,14 @@ receive the request that ends the pause.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Protocol
 
 from palaestra_trainer.errors import Paused, SimulatorFault, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
-from palaestra_trainer.waiting.greenlets import let_others
+from palaestra_trainer.waiting.greenlets import away_s, let_others
+from palaestra_trainer.waiting.wait_time import waited_s
 from palaestra_trainer.webots.device_check import require_devices, require_node
 from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.observer import Observer
@@ -58,13 +60,14 @@ class Stepper:
 
     Attributes:
         simulated_s: seconds of simulated time since this object was created.
+        transport_s: seconds of this program in complete steps, without the waits for the simulator.
     """
 
     def __init__(
         self, robots: Sequence[str], supervisor: Supervisor, observer: Observer, period_ms: int
     ) -> None:
         self.period_ms = period_ms
-        self.simulated_s = 0.0
+        self.simulated_s = self.transport_s = 0.0
         self._observer = observer
         self._supervisor = supervisor
         self._steps = [RosService(f"/{robot}/robot/time_step", "webots_ros/set_int") for robot in robots]
@@ -127,6 +130,10 @@ class Stepper:
         """
         return self._tracked[name] or self._observer.pose(name)
 
+    def known_pose(self, name: str) -> tuple[float, float, float] | None:
+        """Return the pose of a tracked node after the last step, without a request; None before the first."""
+        return self._tracked.get(name)
+
     def connect(self) -> None:
         """Enable every sensor and release every motor, after the simulator has started.
 
@@ -151,6 +158,7 @@ class Stepper:
         """
         if self._supervisor.paused:
             raise self._paused()
+        began_s = _busy_s()
         silent = self._advance_and_read()
         extra_steps = 0
         while silent is not None:
@@ -158,6 +166,7 @@ class Stepper:
                 raise SimulatorHung(self._supervisor.node_name, f"{silent.device} sends no message")
             extra_steps += 1
             silent = self._advance_and_read()
+        self.transport_s += _busy_s() - began_s
         return extra_steps
 
     def reset(self, seed: int) -> None:
@@ -238,3 +247,8 @@ class Stepper:
     def _release_motors(self) -> None:
         for motor in self._motors:
             motor.release()
+
+
+def _busy_s() -> float:
+    """Return seconds that pass while this thread works, for this simulator and not for others."""
+    return time.perf_counter() - away_s() - waited_s()

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import importlib
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
 from palaestra_trainer.errors import ConfigurationError, fact_of
 
+_INSTALL = "install its package in the image, or add its folder to PYTHONPATH"
 NAME = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -36,7 +39,7 @@ def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
     found = object_named(name, f"{field}: {name}")
     if not (isinstance(found, type) and issubclass(found, base)):
         raise ConfigurationError(
-            f"{field}: {name} is no subclass of {base.__name__}; name a class that is one"
+            f"{field}: {name} is not a subclass of {base.__name__}; name a class that is one"
         )
     return found
 
@@ -53,10 +56,8 @@ def object_named(name: str, subject: str) -> Any:
     """
     module, _, attribute = name.partition(":")
     found = module_named(module, subject)
-    try:
+    with _reported(subject, "correct the name"):  # a module may import its parts on access
         return getattr(found, attribute)
-    except Exception as error:  # a module may import its parts on access, which can raise anything
-        raise _refusal(subject, error, "correct the name") from error
 
 
 def module_named(name: str, subject: str) -> ModuleType:
@@ -65,14 +66,15 @@ def module_named(name: str, subject: str) -> ModuleType:
     Raises:
         ConfigurationError: it cannot be imported.
     """
-    try:
+    with _reported(subject, "correct the module", _INSTALL):
         return importlib.import_module(name)
-    except ImportError as error:
-        remedy = "install its package in the image, or add its folder to PYTHONPATH"
-        raise _refusal(subject, error, remedy) from error
+
+
+@contextmanager
+def _reported(subject: str, remedy: str, if_missing: str | None = None) -> Iterator[None]:
+    """Turn errors of the block into a ConfigurationError; `if_missing` is the remedy for an ImportError."""
+    try:
+        yield
     except (Exception, SystemExit) as error:  # the author's code may raise anything, and a script may exit
-        raise _refusal(subject, error, "correct the module") from error
-
-
-def _refusal(subject: str, error: BaseException, remedy: str) -> ConfigurationError:
-    return ConfigurationError(f"{subject} cannot be imported ({fact_of(error)}); {remedy}")
+        remedy = if_missing if if_missing and isinstance(error, ImportError) else remedy
+        raise ConfigurationError(f"{subject} cannot be imported ({fact_of(error)}); {remedy}") from error

@@ -1,0 +1,62 @@
+"""`palaestra-export`: the best policy of a run as one file for other programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from palaestra_protocol.imports import import_without, without_collections
+
+# With rich, structlog would format tracebacks, but the log has them as plain text.
+import_without("rich", "structlog")
+
+from palaestra_protocol.pod.status import ExitCode
+from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
+from palaestra_trainer.errors import TrainerError
+from palaestra_trainer.telemetry.logs import configure_logs
+
+EXPORT = """\
+Write the best policy of a run as one file for other programs.
+
+reads:
+  RUN_DIR/model.zip, RUN_DIR/training.yaml
+writes:
+  the file, once it has acted as the policy on 1,000 observations: discrete actions are equal, continuous
+  ones within 1e-5; its path and its largest difference as one JSON object to standard output
+
+The extra `export` of palaestra-trainer has the libraries. Stable-Baselines3 unpickles model.zip, so export
+only runs that you trust.
+"""
+EXIT_CODES = """\
+exit codes:
+  0   done
+  2   the run directory or the file name is wrong, or a library is missing
+  1   any other error, such as a policy whose file would act differently; nothing is written
+"""
+
+
+def export(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-export`; return its exit code."""
+    options = parser("palaestra-export", EXPORT, EXIT_CODES)
+    options.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
+    options.add_argument("--to", choices=("onnx", "safetensors"), required=True, help="format of the file")
+    options.add_argument("--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT")
+    chosen = options.parse_args(arguments)
+    configure_logs()
+    with without_collections():
+        from palaestra_trainer import exporting
+
+    try:
+        written = exporting.export(chosen.run, chosen.to, chosen.output)
+    except (TrainerError, OSError) as error:
+        return refuse_without_run(error)
+    sys.stdout.write(json.dumps(asdict(written), default=str) + "\n")
+    return ExitCode.DONE
+
+
+def export_and_leave() -> int:
+    """Run `palaestra-export` as a program that ends soon, even if a thread of the job's code still runs."""
+    return leaving(export())

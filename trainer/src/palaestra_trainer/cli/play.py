@@ -1,0 +1,60 @@
+"""`python -P -m palaestra_trainer.cli.play RUN`: the policy of a run plays episodes until it is interrupted.
+
+It is the program of a TrainingJob (`trainer.command`), whose simulators it uses; it learns nothing. It prints
+a line for each episode. A simulator that breaks is restarted, and the next episode begins.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from palaestra_protocol.pod.status import ExitCode
+from palaestra_trainer import load_policy, make_env
+from palaestra_trainer.cli.program import write_line
+from palaestra_trainer.errors import TrainerError
+
+USAGE = "usage: python -P -m palaestra_trainer.cli.play RUN"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Play until SIGTERM, and return the exit code."""
+    if len(arguments) != 1:
+        sys.stderr.write(f"{USAGE}\n")
+        return ExitCode.CONFIGURATION
+    interrupted = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
+    try:
+        policy = load_policy(Path(arguments[0]))
+        with make_env(policy.environment_id, **policy.environment_options) as env:
+            _play(policy, env, interrupted)
+    except TrainerError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return ExitCode.INTERRUPTED  # so the runner does not call the run complete
+
+
+def _play(policy: Any, env: Any, interrupted: threading.Event) -> None:
+    played = succeeded = 0
+    while not interrupted.is_set():
+        observation, _ = env.reset(seed=played)
+        steps, info, over = 0, {}, False
+        while not (over or interrupted.is_set()):
+            action, _ = policy.predict(observation)
+            observation, _, terminated, truncated, info = env.step(action)
+            over, steps = terminated or truncated, steps + 1
+        fault = info.get("palaestra", {}).get("sim_fault")
+        if fault:
+            write_line(f"the simulator broke: {fault}; it is restarted")
+        elif over:
+            played, succeeded = played + 1, succeeded + bool(info.get("is_success"))
+            outcome = str(info.get("outcome", "ended")).replace("_", " ")
+            write_line(f"episode {played}: {outcome} after {steps} steps; {succeeded} of {played} succeeded")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,61 @@
+"""Common parts of this package's programs: their help, and their end with a line and an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import structlog
+
+from palaestra_protocol.pod.status import ExitCode, Termination
+from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
+from palaestra_trainer.telemetry.logs import last_lines
+from palaestra_trainer.waiting.exit import leave_after
+from palaestra_trainer.waiting.signals import Interrupted
+
+log = structlog.get_logger(__name__)
+
+LEFT_S = 10.0  # for the work of libraries at the exit of Python, such as an upload
+KEYBOARD_INTERRUPT = 130  # the exit status that shells give a process ended by SIGINT
+_KEPT = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET)
+
+
+def parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentParser:
+    """Return the parser of a program; its help ends with the exit codes."""
+    return argparse.ArgumentParser(
+        prog=name,
+        description=description,
+        epilog=exit_codes,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def refuse(error: BaseException) -> int:
+    """Log an error, a line for each mistake, write it as termination message, and return its exit code."""
+    end = end_of(error)
+    for line in end.message.splitlines():
+        log.error(line, reason=end.reason)
+    write_last_word(Termination(step=0, reason=f"{end.reason}: {end.message}", log=last_lines()))
+    return int(end.code)
+
+
+def refuse_without_run(error: BaseException) -> int:
+    """Log the error of a program that saves nothing to resume from, and return its exit code."""
+    if isinstance(error, KeyboardInterrupt | Interrupted):
+        log.error("ended by Ctrl-C")
+        return KEYBOARD_INTERRUPT
+    code = refuse(error)
+    return code if code in _KEPT else UNEXPECTED
+
+
+def write_line(line: str) -> None:
+    """Write a line to standard output at once, also if that is a pipe."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def leaving(code: int) -> int:
+    """Return an exit code, and end the process soon even if a thread of the job's code still runs."""
+    sys.stdout.flush()
+    leave_after(LEFT_S, code)
+    return code

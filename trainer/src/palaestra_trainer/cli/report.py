@@ -1,0 +1,85 @@
+"""`palaestra-report`: the report of runs, or a film of one, from their directories."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from palaestra_protocol.pod.enums import ExitCode
+from palaestra_trainer.reporting.write_film import write_film
+from palaestra_trainer.reporting.write_report import write_report
+from palaestra_trainer.run_directory import RunDirectory
+
+REPORT = """\
+Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. It refers to
+no address, so it can be mailed. A running or damaged run is reported as far as its files can be read.
+With --film, write instead the best recorded episode of one run from above.
+
+reads:
+  RUN_DIR/*.json, *.jsonl, *.yaml, tensorboard/
+writes:
+  the file; its path to standard output
+"""
+EXIT_CODES = """\
+exit codes:
+  0   done
+  2   a run directory is wrong, has no recorded episode for --film, or FILE is neither .gif nor .mp4
+  1   the file cannot be written
+"""
+FAILED = 1
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-report`; return its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="palaestra-report",
+        description=REPORT,
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN_DIR", help="run directory")
+    to = parser.add_mutually_exclusive_group()
+    to.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="default: report.html in RUN_DIR, or in the current folder for several runs",
+    )
+    to.add_argument(
+        "--film", type=Path, metavar="FILE", help="animated GIF of at most 200 kB (.gif), or video (.mp4)"
+    )
+    chosen = parser.parse_args(arguments)
+    runs = [RunDirectory(folder.absolute()) for folder in chosen.runs]
+    wrong = [given for given, run in zip(chosen.runs, runs, strict=True) if not run.configuration.exists()]
+    if wrong:
+        sys.stderr.writelines(f"{one}: has no training.yaml; give a run directory\n" for one in wrong)
+        return ExitCode.CONFIGURATION
+    if chosen.film is not None:
+        return _film(runs, chosen.film)
+    out = chosen.out or (runs[0] if len(runs) == 1 else RunDirectory(Path())).report
+    return _written(out, "--out", lambda: write_report(runs, out))
+
+
+def _film(runs: Sequence[RunDirectory], film: Path) -> int:
+    """Write a film of the one run."""
+    if len(runs) > 1:
+        sys.stderr.write(f"{film}: a film shows one run; give one run directory\n")
+        return ExitCode.CONFIGURATION
+    try:
+        return _written(film, "--film", lambda: write_film(runs[0], film))
+    except ValueError as error:
+        sys.stderr.write(f"{error}\n")
+        return ExitCode.CONFIGURATION
+
+
+def _written(to: Path, option: str, write: Callable[[], None]) -> int:
+    """Write a file and print its path."""
+    try:
+        write()
+    except OSError as error:
+        sys.stderr.write(f"{to}: {error.strerror}; choose another file with {option}\n")
+        return FAILED
+    sys.stdout.write(f"{to}\n")
+    return ExitCode.DONE

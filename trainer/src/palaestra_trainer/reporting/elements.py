@@ -1,0 +1,62 @@
+"""HTML elements as text. Every text inside them is escaped, because no function takes HTML as plain text."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from typing import Any
+
+# Not allowed in HTML, or not in UTF-8: control characters and surrogates.
+_REFUSED = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
+_VOID = frozenset({"input", "meta"})
+
+
+class Markup(str):
+    """Text that is HTML already; only this module makes it from other text."""
+
+    __slots__ = ()
+
+
+def escaped(text: str) -> Markup:
+    """Return text as HTML, also for an attribute in double quotes."""
+    return Markup(html.escape(_REFUSED.sub("\ufffd", text)))
+
+
+def joined(*children: str) -> Markup:
+    """Return texts and elements one after the other."""
+    return Markup("".join(child if isinstance(child, Markup) else escaped(child) for child in children))
+
+
+def element(name: str, /, *children: str, **attributes: str | float | None) -> Markup:
+    """Return an element; its children are texts, which are escaped, and elements.
+
+    An attribute that is None is left out. In the name of an attribute `_` stands for `-`, and a last `_` is
+    dropped, as in `class_`.
+    """
+    words = [name]
+    for key, value in attributes.items():
+        if value is not None:
+            text = value if isinstance(value, str) else f"{value:.6g}"
+            words.append(f'{key.rstrip("_").replace("_", "-")}="{escaped(text)}"')
+    start = f"<{' '.join(words)}>"
+    return Markup(start if name in _VOID else f"{start}{joined(*children)}</{name}>")
+
+
+def json_script(content: Any) -> Markup:
+    """Return data for a script of the page; nothing in it can end the element."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII only
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return Markup(f'<script type="application/json">{text}</script>')
+
+
+def own_code(name: str, text: str) -> Markup:
+    """Return an element with a script or a style of this package, which is not escaped.
+
+    Raises:
+        ValueError: the text could end the element.
+    """
+    if "</" in text:
+        raise ValueError(f"a {name} of a report has the characters </, which would end it; write <\\/")
+    return Markup(f"<{name}>{text}</{name}>")

@@ -1,0 +1,65 @@
+"""The recorded episodes of a run, from the content of replays.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from palaestra_trainer.reporting.plain_values import number, numbers, record, records, text
+from palaestra_trainer.reporting.run_data import Replay
+
+MOST_POSES = 2_000
+MOST_OUTLINES = 400
+
+
+def replays_of(content: Mapping[str, Any]) -> Iterator[Replay]:
+    """Yield the episodes that have poses."""
+    for episode in records(content.get("episodes")):
+        film = record(episode.get("film"))
+        frame_s = number(film.get("frame_s"))
+        poses = _rows(film.get("poses"), 3, MOST_POSES)
+        if not poses or not frame_s or frame_s <= 0:
+            continue
+        floor = [_rows([film.get(side)], 2, 1) for side in ("low", "high")]
+        low, high = ((x, y) for [(x, y)] in floor) if all(floor) else (None, None)
+        yield Replay(
+            title=text(episode.get("title")),
+            facts=_facts(episode),
+            poses=tuple((x, y, heading) for x, y, heading in poses),
+            frame_s=frame_s,
+            targets=tuple((int(frame), x, y) for frame, x, y in _rows(film.get("targets"), 3, MOST_POSES)),
+            low=low,
+            high=high,
+            outlines=tuple(
+                (x, y, half_length, half_width, radius, heading)
+                for x, y, half_length, half_width, radius, heading in _rows(
+                    film.get("obstacles"), 6, MOST_OUTLINES
+                )
+            ),
+            radius_m=_number_or(film.get("radius_m"), 0.1),
+        )
+
+
+def _rows(value: object, length: int, most: int) -> list[tuple[float, ...]]:
+    """Return the first lists of `length` numbers in a list; its other members are left out."""
+    lists = value[:most] if isinstance(value, list) else []
+    return [row for one in lists if len(row := numbers(one)) == length]
+
+
+def _facts(episode: Mapping[str, Any]) -> str:
+    outcome = text(episode.get("outcome")).replace("_", " ")
+    succeeded = episode.get("success")
+    success = ("success" if succeeded else "no success") if isinstance(succeeded, bool) else ""
+    parts = (
+        outcome or success,
+        f"return {_number_or(episode.get('return'), 0.0):.2f}",
+        f"{_number_or(episode.get('length'), 0.0):,.0f} steps",
+        f"seed {text(episode.get('seed'))}",
+    )
+    return " \u00b7 ".join(part for part in parts if part)
+
+
+def _number_or(value: object, otherwise: float) -> float:
+    """Return a number, or another one."""
+    known = number(value)
+    return otherwise if known is None else known

@@ -1,0 +1,128 @@
+"""The contents of a report, as data. All texts may be any text, and every number is finite."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+Points = tuple[tuple[float, float], ...]  # step and value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluated:
+    """One evaluation or confirmation.
+
+    Attributes:
+        step: the step of its policy.
+        success_rate: 0 to 1; None: the environment reports no success.
+        low: lower bound of the rate's 95 % interval; None as the rate.
+        high: upper bound.
+        returns: return of each episode.
+        mean_length: mean number of steps of an episode.
+    """
+
+    step: float
+    success_rate: float | None = None
+    low: float | None = None
+    high: float | None = None
+    returns: tuple[float, ...] = ()
+    mean_length: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportedFault:
+    """One fault of a simulator.
+
+    Attributes:
+        time: when it was noticed.
+        step: step of the run at that time.
+        simulator: its name.
+        kind: dead, hung or wrong_data.
+        fact: the message.
+        steps_lost: steps of the episode that it truncated.
+        seconds: from the fault until the simulator was up again; None: it did not come up in that attempt.
+    """
+
+    time: str
+    step: float
+    simulator: str
+    kind: str
+    fact: str
+    steps_lost: float = 0
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replay:
+    """One recorded episode of an evaluation.
+
+    Attributes:
+        title: why it was chosen: best, median or failed.
+        facts: its return, length, outcome and seed, as texts.
+        poses: x and y in meters and heading in radians, for each frame.
+        frame_s: seconds of simulated time from one frame to the next.
+        targets: the frame from which on the target is at x, y.
+        low: smallest x and y of the floor; None: unknown.
+        high: greatest x and y of the floor.
+        outlines: obstacles as x, y, half length, half width, radius of the rounding, heading.
+        radius_m: radius of the robot.
+    """
+
+    title: str
+    facts: str
+    poses: tuple[tuple[float, float, float], ...]
+    frame_s: float
+    targets: tuple[tuple[int, float, float], ...] = ()
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    outlines: tuple[tuple[float, float, float, float, float, float], ...] = ()
+    radius_m: float = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunData:
+    """One run.
+
+    Attributes:
+        name: job and replica.
+        ended: good, interrupted, failed, or open while the end is not known.
+        end: the end in words.
+        figures: name and value of the main results, in order.
+        asked: name and value of what the job asked for, in order.
+        versions: name and version of programs and machine.
+        evaluations: in the order of steps.
+        confirmations: in the order of steps.
+        curves: the other curves by name.
+        faults: in the order of time.
+        fault_count: number of all faults of the run; `faults` may have fewer.
+        goodput: seconds by cause.
+        checkpoints: step, size and time of each checkpoint, as texts.
+        attempts: start and reason of each attempt, as texts.
+        replays: recorded episodes.
+        replayed: which evaluation they are from, in words.
+        repeat: commands that repeat the run.
+        files: the name and text of files to show.
+    """
+
+    name: str
+    ended: str = "open"
+    end: str = ""
+    figures: Mapping[str, str] = field(default_factory=dict)
+    asked: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    evaluations: tuple[Evaluated, ...] = ()
+    confirmations: tuple[Evaluated, ...] = ()
+    curves: Mapping[str, Points] = field(default_factory=dict)
+    faults: tuple[ReportedFault, ...] = ()
+    fault_count: int = 0
+    goodput: Mapping[str, float] = field(default_factory=dict)
+    checkpoints: tuple[tuple[str, str, str], ...] = ()
+    attempts: tuple[tuple[str, str], ...] = ()
+    replays: tuple[Replay, ...] = ()
+    replayed: str = ""
+    repeat: tuple[tuple[str, str], ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+FromJson = Mapping[str, Any]

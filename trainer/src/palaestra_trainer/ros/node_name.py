@@ -1,0 +1,48 @@
+"""The name of a ROS node, with the arguments that rename it, as rospy reads them.
+
+`__name:=NAME` and `__ns:=NAMESPACE` rename the node. The other forms, `TOPIC:=OTHER` and `_PARAMETER:=VALUE`,
+have no effect: topics and services of simulators have full names, and the trainer reads no parameter.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from palaestra_trainer.errors import ConfigurationError
+
+_NAME, _NAMESPACE = "__name:=", "__ns:="
+_LEGAL = re.compile(r"/|/?[A-Za-z][A-Za-z0-9_/]*")
+
+
+def full_name(name: str, arguments: Sequence[str], environment: Mapping[str, str]) -> str:
+    """Return the full name of the node that a program calls `name`.
+
+    Args:
+        name: the program's own choice.
+        arguments: of the program. The last name counts, and the first namespace.
+        environment: of the process; a namespace in ROS_NAMESPACE counts if no argument has one.
+
+    Raises:
+        ConfigurationError: an argument has a name that no node can have.
+    """
+    chosen = _values(arguments, _NAME)
+    namespaces = [*_values(arguments, _NAMESPACE), environment.get("ROS_NAMESPACE", "")]
+    if chosen:
+        name = chosen[-1]
+    namespace = namespaces[0].strip("/")
+    return name if name.startswith("/") else f"/{namespace}/{name}" if namespace else f"/{name}"
+
+
+def _values(arguments: Sequence[str], option: str) -> list[str]:
+    """Return the values of an option.
+
+    Raises:
+        ConfigurationError: a value is not a name.
+    """
+    values = [word.removeprefix(option) for word in arguments if word.startswith(option)]
+    for value in values:
+        if not _LEGAL.fullmatch(value):
+            fact = f"{option}{value}: is not a name of ROS"
+            raise ConfigurationError(f"{fact}; begin with a letter, and use letters, digits, _ and / only")
+    return values
