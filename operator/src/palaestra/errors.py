@@ -45,6 +45,12 @@
     ├── NotLeading                   this operator may have lost its Lease (operator.fenced_client)
     ├── Outdated                     the cluster has changed since the decision (operator.preconditions)
     ├── TooLarge                     a file is larger than a file of its kind can be (bounded_read)
+    ├── UnknownField                 a TrainingJob has no such field (api.field_lookup)
+    ├── ViewError                    a run cannot be shown (live_view.source)
+    │   ├── NoRun                    the folder has no run with simulators (live_view.local_run)
+    │   ├── NotNow                   the simulator does not respond now
+    │   ├── NotShown                 the simulator describes no world
+    │   └── ViserMissing             the optional package of the page is not installed (cli.view_process)
     ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.hyperparameter_file)
     └── TrialFailed                  the trial's job did not succeed in time (smoke_test)
 

@@ -21,7 +21,8 @@ from palaestra.objects import Object
 
 PERIOD_S = 2.0
 
-# If a trial is killed, these limits end and delete its job, long after people have read the result.
+# If the smoke test is killed, these limits end and delete its job. They are so long that people can read
+# the result first.
 SLACK_S = 60
 TTL_S = 3600
 
@@ -113,7 +114,7 @@ def _status(api: Api, namespace: str, name: str, report: Report) -> Object | Non
     except ApiError as error:
         if not error.retryable:
             raise
-        report(f"{namespace}/{name}: {error}; asked again")
+        report(f"{namespace}/{name}: {error}; retrying")
         return None
 
 
@@ -129,7 +130,7 @@ def _why(status: Object) -> str:
     """Return reason and message of the condition with the job's whole message."""
     conditions = {condition["type"]: condition for condition in status.get("conditions", ())}
     if not conditions:
-        return "nothing has looked at it: does the operator run, and does it look after this namespace?"
+        return "no operator has reconciled it; check that the operator runs and watches this namespace"
     accepted = conditions.get("Accepted", {}).get("status") != "False"
     subject = conditions.get(status.get("phase")) or conditions.get("Running" if accepted else "Accepted")
     return f"{subject['reason']}: {subject['message']}" if subject else ""

@@ -86,7 +86,8 @@ def schema() -> Schema:
     freeze(fields["spec"])
     for heading in ("apiVersion", "kind"):  # the API server checks these itself
         fields[heading] = {"type": "string", "maxLength": 63}
-    name = fields["metadata"]["properties"]["name"]  # of metadata, a schema may restrict only the names
+    # A schema may restrict no field of metadata but the names.
+    name = fields["metadata"]["properties"]["name"]
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
     # Generations begin at 1. Without this default, kstatus would report a job as reconciled before an
     # operator has read it.

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from palaestra.api.crd import crd
 from palaestra.api.generated_sections import between_marks
-from palaestra.api.reasons import ROWS
+from palaestra.api.reason_texts import ROWS
 from palaestra.api.reference import page
 from palaestra.api.yaml_io import write
 

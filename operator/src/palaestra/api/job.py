@@ -1,5 +1,6 @@
 """The TrainingJob: metadata, spec and status."""
 
+from enum import StrEnum
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
@@ -18,7 +19,6 @@ from palaestra.api.fields import (
     Word,
 )
 from palaestra.api.model import ApiModel, Rule
-from palaestra.api.network import Network
 from palaestra.api.scheduling import Scheduling
 from palaestra.api.simulators import SimulatorGroup
 from palaestra.api.status import Status
@@ -51,6 +51,21 @@ _SERVER_FIELDS = frozenset(
         "selfLink",
     }
 )
+
+
+class Egress(StrEnum):
+    """Whether the pods may open connections."""
+
+    OPEN = "Open"
+    CLOSED = "Closed"
+
+
+class Network(ApiModel):
+    """Connections that the pods may open; a job cannot change which connections reach its pods."""
+
+    egress: Egress = Field(default=Egress.OPEN, strict=False)
+    """`Open`: the pods may connect to anything. `Closed`: to nothing, not even to DNS; training needs no
+    connection."""
 
 
 class Metadata(ApiModel):
@@ -142,7 +157,7 @@ class Spec(ApiModel):
 
     stall_deadline_seconds: Seconds = Field(default=600, json_schema_extra={MAY_CHANGE: True})
     """Seconds without a training or evaluation step after which the trainer exits and is retried. The
-    trainer uses the value with which its replica was started. If a trainer still answers and its step count
+    trainer uses the value with which its replica was started. If a trainer still responds and its step count
     has not changed for the current value plus two minutes, the operator replaces its pod, at most
     `backoffLimit` times."""
 

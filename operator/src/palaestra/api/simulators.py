@@ -81,8 +81,8 @@ class WorldSource(ApiModel):
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
     """Absolute path of a `.wbt` file, or of a model of MuJoCo (`.xml`), in the simulator's image (`palaestra
-    run`: on this machine). PROTOs, meshes and textures are beside it; the rest of its Webots project, such as
-    `controllers/`, is beside its folder."""
+    run`: on this machine). PROTOs, meshes and textures are next to it; the rest of its Webots project, such
+    as `controllers/`, is next to its folder."""
 
     root: Annotated[str, Field(max_length=1024, pattern=ABSOLUTE_FOLDER)] | None = None
     """Absolute path of a folder above `file`, with all files that the world names. A model of MuJoCo that

@@ -23,3 +23,8 @@ def flat(text: str, most: int) -> str:
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", masked(plain))
     return words if len(words) <= most else words[: most - 3] + "..."
+
+
+def either(words: list[str]) -> str:
+    """Return `a`, `a or b`, or `a, b or c`."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

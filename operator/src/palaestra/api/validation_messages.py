@@ -12,13 +12,14 @@ from palaestra.api.fields import ALGORITHM, PATTERNS
 from palaestra.api.job import TrainingJob
 from palaestra.api.model_walk import fields_of, model_at, walk
 from palaestra.api.paths import Path, shown
+from palaestra.api.text import either
 from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, NO_ALGORITHM, OF_ZOO
 
 _LONGEST_QUOTE = 60
 _SIMILAR = 0.6
 _MISSPELLED = 0.92  # for a name in Python's style: every_steps is everySteps, but n_steps is not steps
 _OF_TRAINING = (("spec",), ("trainer",), ("algorithm",))  # sections in which people write keys of Zoo
-_VARIABLES = "env"  # it more likely means the environment variables of a container than an environment
+_VARIABLES = "env"  # `env` more likely means the environment variables of a container than an environment
 
 
 def sentence(path: Path, error: ErrorDetails) -> str:
@@ -60,7 +61,7 @@ def _unknown(path: Path, _: Any, __: dict[str, Any]) -> str:
         return f"is not a field; did you mean {near[0]}?"
     if of_training and "_" in name:
         return f"is not a field; write a hyperparameter as spec.trainer.algorithm.hyperparameters.{name}"
-    return f"is not a field; use {_either(known)}"
+    return f"is not a field; use {either(known)}"
 
 
 def _elsewhere(name: str) -> str:
@@ -70,10 +71,6 @@ def _elsewhere(name: str) -> str:
 
 def _camel(name: str) -> str:
     return re.sub(r"[_-]([a-z])", lambda match: match[1].upper(), name)
-
-
-def _either(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
 
 
 def _no_member(path: Path, value: Any, ctx: dict[str, Any]) -> str:

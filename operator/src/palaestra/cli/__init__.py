@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 
 from palaestra.api.text import printable
 from palaestra.cli.commands import COMMANDS
@@ -13,6 +14,7 @@ from palaestra.cli.subcommands import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMES
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import KILLED, LocalError
 from palaestra_protocol.imports import import_without, without_collections
+from palaestra_protocol.linux import require_linux
 from palaestra_sim.errors import SimError
 
 __all__ = ["main"]
@@ -35,6 +37,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(error, WRONG_INPUT)
     except KeyboardInterrupt:  # before a run was started
         return KILLED
+
+
+def _module(name: str, module: str) -> ModuleType:
+    """Return the module of a command.
+
+    Raises:
+        SystemExit: it needs modules that this system's Python lacks.
+    """
+    try:
+        return import_module(f"palaestra.cli.{module}")
+    except ImportError:
+        require_linux(f"{_typed()} {name}")
+        raise
 
 
 def _failed(error: Exception, exit_code: int) -> int:
@@ -68,5 +83,5 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
     else:
         with without_collections():
             import_without("rich", "structlog")  # structlog would format tracebacks with it
-            import_module(f"palaestra.cli.{named.module}").add(commands)
+            _module(first[0], named.module).add(commands)
     return parser

@@ -24,9 +24,14 @@ class Command(NamedTuple):
 COMMANDS: Mapping[str, Command] = MappingProxyType(
     {
         "run": Command("run", "train on this machine"),
+        "demo": Command("demo", "watch a robot learn, and break its simulator"),
         "sweep": Command("sweep", "train with different values and compare"),
+        "compare": Command("compare", "find out which of two policies is better"),
+        "report": Command("report", "write the report of runs as one HTML file"),
+        "view": Command("view", "look at the simulators of a run in a browser"),
         "export": Command("export", "write a policy as one file for other programs"),
         "from-zoo": Command("from_zoo", "write a job from a file of RL-Baselines3-Zoo"),
+        "explain": Command("explain", "show what a field of a job means"),
         "plan": Command("offline_commands", "print the objects that a job needs"),
         "world": Command("offline_commands", "print one simulator's own world"),
         "crd": Command("offline_commands", "print the CustomResourceDefinition"),
@@ -42,6 +47,6 @@ COMMANDS: Mapping[str, Command] = MappingProxyType(
         "delete": Command("lifecycle_commands", "delete jobs"),
         "fetch": Command("fetch", "copy the results of a run"),
         "doctor": Command("doctor", "find out why jobs do not run"),
-        "try": Command("smoke_test", "run a small job in a cluster as a test"),
+        "try": Command("smoke_test", "run a small job in a cluster, or a few episodes here, as a test"),
     }
 )

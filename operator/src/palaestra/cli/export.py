@@ -1,11 +1,14 @@
 """`palaestra export`: a policy as one file for other programs."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
 
 from palaestra.cli.subcommands import Commands, command
-from palaestra.local.export import export
+from palaestra.local.trainer_program import run_program
 
+PROGRAM = "palaestra-export"
 EXPORT = """\
 Writes the best policy of the run directory RUN as one file, for programs without Palaestra or PyTorch. With
 the observation as the environment returned it, the file returns the action that the environment takes. It is
@@ -35,4 +38,5 @@ def add(commands: Commands) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    return export(options.run, options.to, options.output)
+    chosen = [] if options.output is None else ["--output", str(options.output)]
+    return run_program([PROGRAM, str(options.run), "--to", options.to, *chosen])

@@ -12,10 +12,10 @@ from palaestra.plan.resources import in_bytes
 from palaestra_protocol.numbers import seconds, whole
 
 FETCH = """\
-Copies policy, evaluations and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must not exist
-yet; it is written completely or not at all. The data is read in the pod that trains. If that pod has ended,
-the command creates a pod that mounts the claim read-only, and deletes it afterwards. You need the rights to
-create and delete pods and to run commands in them.
+Copies policy, evaluations, report and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must
+not exist yet; it is written completely or not at all. The data is read in the pod that trains. If that pod
+has ended, the command creates a pod that mounts the claim read-only, and deletes it afterwards. You need the
+rights to create and delete pods and to run commands in them.
 """
 
 

@@ -12,8 +12,8 @@ from palaestra.zoo import convert
 
 FROM_ZOO = """\
 Reads a hyperparameter file of RL-Baselines3-Zoo, such as ppo.yml, and prints the TrainingJob for one of its
-environments. Expressions such as dict(net_arch=[64, 64]) are read as data and never evaluated. Each thing
-that the job does not do exactly as Zoo is a line on standard error and a comment in the job.
+environments. Expressions such as dict(net_arch=[64, 64]) are read as data and never evaluated. Each point
+in which the job differs from Zoo is a line on standard error and a comment in the job.
 """
 EXIT_CODES = """\
 exit codes:
@@ -27,7 +27,7 @@ def add(commands: Commands) -> None:
     parser = command(commands, "from-zoo", _from_zoo, FROM_ZOO, EXIT_CODES)
     parser.add_argument("file", metavar="FILE", type=Path, help="hyperparameter file, such as Zoo's ppo.yml")
     parser.add_argument(
-        "--env", metavar="ID", help="environment; one that FILE does not name gets its entry default"
+        "--env", metavar="ID", help="environment; if FILE does not name it, the entry `default` is used"
     )
     parser.add_argument(
         "--algorithm", metavar="NAME", help="default: FILE's name, such as ppo, ppo_lstm or sac"

@@ -113,7 +113,9 @@ def _add_plan(commands: Commands) -> None:
 def _add_world(commands: Commands) -> None:
     parser = command(commands, "world", _world, WORLD)
     parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt, or .xml of MuJoCo)")
-    parser.add_argument("--check", action="store_true", help="print what each simulator makes of it")
+    parser.add_argument(
+        "--check", action="store_true", help="print what each simulator can and cannot do with it"
+    )
     parser.add_argument(
         "--leave-out",
         action="append",

@@ -1,24 +1,26 @@
 """`palaestra run`: train on this machine."""
 
 import argparse
+from contextlib import nullcontext
 from importlib.metadata import version
 from pathlib import Path
 
 from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.subcommands import Commands, command
+from palaestra.cli.view_process import viewed
 from palaestra.job_input import changed
 from palaestra.local.run import RunOptions, run
 from palaestra_protocol.numbers import MOST_PORT, whole
 
 MODEL = "model.zip"  # the best policy of a run
 RUN = """\
-Trains as the TrainingJob in FILE specifies, and writes <dir>/<job name>/<replica>/: checkpoints/,
-tensorboard/, evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. The same command
-resumes from the newest checkpoint, and with more trainer.steps in FILE it prolongs a finished run. Replicas
-run one after another; --replica chooses one. Ctrl-C saves a checkpoint and exits; a second Ctrl-C exits at
-once. SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start, as by nohup or in
-the background of a script, stays ignored.
+Trains as the TrainingJob in FILE specifies, and prints a line about its progress every 10 s. Writes
+<dir>/<job name>/<replica>/: checkpoints/, tensorboard/, evaluations.jsonl, model.zip, the source worlds,
+training.yaml and logs/. The same command resumes from the newest checkpoint, and with more trainer.steps in
+FILE it prolongs a finished run. Replicas run one after another; --replica chooses one. Ctrl-C saves a
+checkpoint and exits; a second Ctrl-C exits at once. SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that
+was ignored at the start, as by nohup or in the background of a script, stays ignored.
 """
 
 
@@ -43,23 +45,27 @@ def add(commands: Commands) -> None:
         type=whole(1, MOST_PORT),
         help="port of the ROS master; default: a free one",
     )
+    parser.add_argument("--view", action="store_true", help="show the simulators in a browser; see `view`")
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="show all logs, each line with its container"
     )
 
 
 def _run(options: argparse.Namespace) -> int:
-    return run(
-        _wanted(options),
-        RunOptions(
-            runs=options.dir,
-            version=version("palaestra"),
-            replica=options.replica,
-            fresh=options.fresh,
-            verbose=options.verbose,
-            ros_port=options.ros_port,
-        ),
-    )
+    wanted = _wanted(options)
+    folder = options.dir / wanted.metadata.name / str(options.replica or 0)
+    with viewed(folder) if options.view else nullcontext():
+        return run(
+            wanted,
+            RunOptions(
+                runs=options.dir,
+                version=version("palaestra"),
+                replica=options.replica,
+                fresh=options.fresh,
+                verbose=options.verbose,
+                ros_port=options.ros_port,
+            ),
+        )
 
 
 def _wanted(options: argparse.Namespace) -> TrainingJob:

@@ -26,8 +26,10 @@ exit codes of all commands:
   0    done
   1    failed, or the cluster has no such job, refused, or the deadline passed; the last lines give the reason
   2    the command line, a file, the kubeconfig or this machine is not suitable; nothing was started
+  3    of `compare` only: undecided
   75   of `run` and `sweep`: interrupted after a checkpoint
-  80, 81, 82  of `run` only
+  80   of `run`, `compare` and `try --local`
+  81, 82  of `run` only
   130  ended by Ctrl-C
 `COMMAND --help` explains the exit codes of one command.
 """

@@ -6,7 +6,7 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` has the public class. `not_found_errors` raises an error for a missing object, `watch` waits for
+`client` has the public class, `errors` its errors and the way from a response to one. `watch` waits for
 changes, `wait_progress` describes them as lines, and `events` reads events. `fetch` copies a run out of its
 volume: the pod of `volume_reader_pod` runs `tar_stream`, and `tar_extraction` unpacks its output.
 """
@@ -24,9 +24,10 @@ from palaestra.client.errors import (
     NotInstalled,
     QueueDecides,
     TookTooLong,
+    asked,
+    check_namespace,
 )
 from palaestra.client.events import Event
-from palaestra.client.not_found_errors import asked, check_namespace
 from palaestra.client.wait_progress import why
 
 __all__ = [

@@ -10,10 +10,17 @@ from typing import Literal, Self
 from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, PodReference
-from palaestra.client.errors import EndedOtherwise, HasEnded, NoPod, NoSuchJob, NothingLost, QueueDecides
+from palaestra.client.errors import (
+    EndedOtherwise,
+    HasEnded,
+    NoPod,
+    NoSuchJob,
+    NothingLost,
+    QueueDecides,
+    asked,
+)
 from palaestra.client.events import Event, events_about
 from palaestra.client.fetch import fetch
-from palaestra.client.not_found_errors import asked
 from palaestra.client.wait_progress import News, current, why
 from palaestra.client.watch import changes
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
@@ -191,7 +198,7 @@ class Client:
             NoPod: the replica has no pod or no such container, or its container did not start.
         """
         job = self.get(name)
-        pod = _newest_pod(job, replica)
+        pod = newest_pod(job, replica)
         try:
             yield from self.api.logs(
                 self.namespace, pod.name, container, follow=follow, tail=tail, within_s=deadline_s
@@ -284,7 +291,7 @@ class Client:
         deadline_s: float = FETCH_S,
         most_bytes: int | None = None,
     ) -> Path:
-        """Copy policy, evaluations and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
+        """Copy policy, report and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
 
         Needs the permissions to create and delete pods and to run commands in them. The data from the pod is
         untrusted: `most_bytes` limits its size, by default to four times the volume that the job requests.
@@ -302,7 +309,7 @@ class Client:
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, {"spec": {"suspend": suspend}}))
 
 
-def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
+def newest_pod(job: TrainingJob, replica: int) -> PodReference:
     """Return the newest pod of a replica.
 
     Raises:

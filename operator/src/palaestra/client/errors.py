@@ -15,9 +15,13 @@
 A request that the API server refuses raises an ApiError (palaestra.cluster.errors).
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Self
 
 from palaestra.api.job import API_VERSION
+from palaestra.cluster import Api, Forbidden, NoSuchKind, NotFound
+from palaestra.cluster.resources import NAMESPACES
 from palaestra.errors import PalaestraError
 
 INSTALL = "`palaestra crd | kubectl apply --server-side -f -`"
@@ -111,3 +115,35 @@ class NoPod(ClientError, LookupError):
 
 class NotFetched(ClientError):
     """A run could not be copied; no file was written."""
+
+
+@contextmanager
+def asked(name: str | None, namespace: str) -> Iterator[None]:
+    """Run requests about TrainingJobs; `name` is the name of one job, or None.
+
+    Raises:
+        NotInstalled: the cluster has no TrainingJob definition.
+        NoSuchJob: no job has this name.
+    """
+    try:
+        yield
+    except NoSuchKind as error:
+        raise NotInstalled from error
+    except NotFound as error:
+        if name is None:
+            raise
+        raise NoSuchJob.of(name, namespace) from error
+
+
+def check_namespace(api: Api, name: str) -> None:
+    """Check that a namespace exists; without permission to read it, it is assumed to exist.
+
+    Raises:
+        NoSuchNamespace: the namespace does not exist.
+    """
+    try:
+        api.get(NAMESPACES, None, name)
+    except Forbidden:
+        return
+    except NotFound as error:
+        raise NoSuchNamespace.of(name) from error

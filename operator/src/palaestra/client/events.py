@@ -22,7 +22,7 @@ class Event:
     """One event.
 
     Attributes:
-        time: of the last occurrence.
+        time: the time of the last occurrence.
         warning: whether its type is Warning.
         about: kind and name of the object: `Pod/job-0-x7k2p`.
         reason: one word; docs/reference/reasons.md explains those about the TrainingJob.

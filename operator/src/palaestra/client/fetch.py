@@ -31,6 +31,10 @@ PARTS = (
     "model.zip",
     "evaluations.jsonl",
     "confirmations.jsonl",
+    "faults.jsonl",
+    "replays.json",
+    "end.json",
+    "report.html",
     "summary.json",
     "attempts.jsonl",
     "tensorboard",
@@ -53,7 +57,7 @@ class RunSource:
 def fetch(
     api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: float, most_bytes: int | None = None
 ) -> Path:
-    """Return the new folder `into/<job>/<replica>`: policy, evaluations and TensorBoard data of a run.
+    """Return the new folder `into/<job>/<replica>`: policy, report and TensorBoard data of a run.
 
     Args:
         api: the cluster.

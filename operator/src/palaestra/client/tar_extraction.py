@@ -31,7 +31,7 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
         chunks: the chunks of the stream.
         into: the folder.
         wanted: names of the requested files, and of folders with requested files.
-        most_bytes: of all files together.
+        most_bytes: the most bytes of all files together.
 
     Raises:
         WrongArchive: it is not a tar, has other members, or is too large.
@@ -86,7 +86,7 @@ def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> Pure
     _refuse(f"{shown} is not a plain file", when=not member.isreg() or member.issparse())
     long = len(path.parts) > MOST_PARTS or any(len(part.encode()) > MOST_NAME_BYTES for part in path.parts)
     _refuse(f"{shown} has too long a name", when=long)
-    _refuse(f"{shown} is there twice, or is a file and a folder", when=seen.clashes_with(path))
+    _refuse(f"{shown} occurs twice, or is a file and a folder", when=seen.clashes_with(path))
     _refuse(f"it has more than {MOST_FILES} files", when=len(seen.files) >= MOST_FILES)
     return path
 

@@ -4,7 +4,8 @@ import re
 from collections.abc import Iterator
 
 from palaestra.api import TrainingJob
-from palaestra.api.reasons import ROWS, Reason
+from palaestra.api.reason_texts import ROWS
+from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, ConditionStatus, ReplicaStatus, Status
 
 _NUMBERS = re.compile(r"\d+")

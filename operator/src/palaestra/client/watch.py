@@ -29,8 +29,8 @@ def changes(
     Args:
         api: the cluster.
         resource: kind of the object.
-        namespace: of the object.
-        name: of the object.
+        namespace: the namespace of the object.
+        name: the name of the object.
         deadline: on the monotonic clock.
         uid: uid of the object; empty: that of the first object found.
 

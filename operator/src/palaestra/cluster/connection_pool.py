@@ -2,6 +2,7 @@
 
 import socket
 import ssl
+from contextlib import ExitStack
 from typing import Any
 
 from urllib3 import PoolManager, ProxyManager
@@ -12,12 +13,12 @@ from palaestra.cluster.proxies import Proxy
 
 POOL = 32  # connections kept open: more than the number of workers and watches
 # With these options the kernel detects dead peers, also behind silent proxies.
+_TIMES = (("TCP_KEEPIDLE", 30), ("TCP_KEEPINTVL", 30), ("TCP_KEEPCNT", 9))
 KEPT_ALIVE = (
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),  # urllib3's own default, which these options replace
     (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 30),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 30),
-    (socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 9),
+    # macOS has no TCP_KEEPIDLE.
+    *((socket.IPPROTO_TCP, getattr(socket, name), value) for name, value in _TIMES if hasattr(socket, name)),
 )
 
 
@@ -48,7 +49,7 @@ def connections(
 def _through_socks(proxy: Proxy, options: dict[str, Any]) -> PoolManager:
     manager = SOCKSProxyManager(proxy.address, proxy.user, proxy.password, **options)
     its = manager.connection_pool_kw["_socks_options"]
-    its["proxy_host"] = its["proxy_host"].strip("[]")  # of IPv6 addresses
+    its["proxy_host"] = its["proxy_host"].strip("[]")  # an IPv6 address comes in brackets
     return manager
 
 
@@ -66,10 +67,9 @@ def dialed(pool: PoolManager, server: str, wait_s: float) -> socket.socket:
     )
     if target.proxy is not None:
         connection.set_tunnel(target.host, target.port, target.proxy_headers, target.proxy.scheme)
-    try:
+    with ExitStack() as undo:
+        undo.callback(connection.close)
         connection.connect()
-    except BaseException:
-        connection.close()
-        raise
+        undo.pop_all()
     found: socket.socket = connection.sock
     return found

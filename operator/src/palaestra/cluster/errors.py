@@ -181,7 +181,8 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
     if code == NOT_FOUND and not status:  # for a path that is not served, the response is plain text
         return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
-    message = str(status.get("message") or "the API server gave no message")
+    # `error` is what our own servers send, by way of the API server.
+    message = str(status.get("message") or status.get("error") or "the API server gave no message")
     fallback = ServerError if code >= SERVER_ERROR else ApiError
     kind = _by_cause(status) or BY_REASON.get(reason, BY_CODE.get(code, fallback))
     error = kind(code, reason, message)

@@ -52,7 +52,7 @@ def authorization(
     if user.get(EXEC):
         if not isinstance(user[EXEC], Mapping):
             raise NotConfigured(
-                f"{EXEC}: {user[EXEC]!r} is no program; write command and apiVersion under it"
+                f"{EXEC}: {user[EXEC]!r} is not a mapping; write command and apiVersion under it"
             )
         return _OfPlugin(Plugin(user[EXEC], folder, cluster), context)
     return _always(None)
@@ -101,5 +101,5 @@ def _always(header: str | None) -> Authorization:
 def _one_line(text: object, field: str) -> str:
     found = str(text).strip()
     if not found or not found.isascii() or not found.isprintable():
-        raise NotConfigured(f"{field} is no text of one line; write it as it was given")
+        raise NotConfigured(f"{field} is not one line of text; write it as it was given")
     return found

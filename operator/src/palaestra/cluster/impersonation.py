@@ -11,7 +11,8 @@ from palaestra.cluster.client_config import Headers
 from palaestra.cluster.errors import NotConfigured
 
 USER, UID, GROUPS, EXTRA = "as", "as-uid", "as-groups", "as-user-extra"
-_LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").encode())  # RFC 7230, without %
+# The characters of an HTTP token (RFC 7230) except %.
+_LEGAL = frozenset((string.ascii_letters + string.digits + "!#$&'*+-.^_`|~").encode())
 
 
 def impersonation(user: Mapping[str, Any]) -> Headers:
@@ -22,7 +23,7 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
     """
     groups, extra = user.get(GROUPS) or [], user.get(EXTRA) or {}
     if not isinstance(groups, list):
-        raise NotConfigured(f"{GROUPS}: {groups!r} is no list; write a list of groups")
+        raise NotConfigured(f"{GROUPS}: {groups!r} is not a list; write a list of groups")
     if not isinstance(extra, Mapping) or not all(isinstance(values, list) for values in extra.values()):
         raise NotConfigured(f"{EXTRA}: {extra!r} is not usable; write a list of texts under each key")
     name, uid = user.get(USER) or "", user.get(UID) or ""
@@ -43,7 +44,7 @@ def impersonation(user: Mapping[str, Any]) -> Headers:
 
 def _text(value: object, field: str) -> str:
     if not isinstance(value, str) or not value.isprintable():
-        raise NotConfigured(f"{field}: {value!r} is no text of one line; write it as text, in quotes")
+        raise NotConfigured(f"{field}: {value!r} is not one line of text; write it as text, in quotes")
     return value
 
 

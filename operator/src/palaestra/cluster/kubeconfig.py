@@ -55,7 +55,7 @@ class _Entry:
             try:
                 return base64.b64decode(str(given), validate=True)
             except ValueError as error:
-                raise NotConfigured(f"{field}-data is no base64 ({error}); copy it anew") from error
+                raise NotConfigured(f"{field}-data is not base64 ({error}); copy it again") from error
         return (self.folder / str(path)).read_bytes() if path else None
 
 
@@ -145,7 +145,7 @@ def _verification(authority: bytes | None, user: _Entry, *, insecure: bool) -> s
         pem = authority.decode("ascii", "ignore") if authority else None  # comments may be non-ASCII
         found = verification(pem=pem, verified=not insecure)
     except (OSError, ValueError) as error:
-        raise NotConfigured(f"{AUTHORITY} is no certificate in PEM ({error}); copy it anew") from error
+        raise NotConfigured(f"{AUTHORITY} is not a certificate in PEM ({error}); copy it again") from error
     certificate, key = user.bytes_of(CERTIFICATE), user.bytes_of(KEY)
     if certificate and key:
         try:
@@ -170,7 +170,7 @@ def _host(cluster: _Entry, *, secure: bool) -> str:
     except LocationParseError:
         url = parse_url("")
     if url.scheme not in ("http", "https") or not url.host:
-        raise NotConfigured(f"{SERVER}: {text!r} is no address; write https://HOST:PORT")
+        raise NotConfigured(f"{SERVER}: {text!r} is not an address; write https://HOST:PORT")
     return text
 
 
@@ -204,7 +204,7 @@ def _of_provider(merger: KubeConfigMerger, context: str, provider: Mapping[str, 
         try:
             settings = configuration.auth_settings()  # requests a new token if it has expired
         except (*WRONG, OpenApiException) as error:
-            raise Unreachable(0, "NoCredentials", f"{PROVIDER} gave no token ({error})") from error
+            raise Unreachable(0, "NoCredentials", f"{PROVIDER} returned no token ({error})") from error
         return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
 
     return header

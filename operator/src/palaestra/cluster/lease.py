@@ -47,8 +47,8 @@ class Leadership:
 
         Args:
             api: the API server that stores the Lease.
-            namespace: of the Lease.
-            name: of the Lease.
+            namespace: the namespace of the Lease.
+            name: the name of the Lease.
             identity: the identity of this process; no other process may have it.
             duration_s: whole seconds after which another candidate may replace a leader that has died.
             renew_s: seconds between renewals, or between reads of another leader's Lease; at most a third of
@@ -192,7 +192,7 @@ class Leadership:
 
     def _lose(self) -> None:
         self._tenure = None
-        log.warning("leads no more", lease=self._name, identity=self._identity)
+        log.warning("no longer leads", lease=self._name, identity=self._identity)
         self._stopped()
 
     def _release(self) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from palaestra.objects import Object
 
-SHARE = 2 / 3  # of a Lease's duration, for its leader; the rest is for writes in flight
+SHARE = 2 / 3  # a leader uses this share of a Lease's duration; the rest is for writes in flight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,8 +29,8 @@ class Credentials:
 
     Attributes:
         token: for the header `Authorization`, or None.
-        certificate: of the client, as PEM, or None.
-        key: of that certificate.
+        certificate: the certificate of the client, as PEM, or None.
+        key: the key of that certificate.
         expires: time after which the plugin must run again; None: never.
     """
 
@@ -121,10 +121,10 @@ class Plugin:
         try:
             answer = json.loads(text)
         except ValueError as error:
-            raise self._failure(f"gave an answer that is no JSON ({error})") from error
+            raise self._failure(f"returned output that is not JSON ({error})") from error
         status = answer.get("status") if isinstance(answer, dict) else None
         if not isinstance(status, dict) or answer.get("kind") != "ExecCredential":
-            raise self._failure("gave an answer that is no ExecCredential with a status")
+            raise self._failure("returned output that is not an ExecCredential with a status")
         if answer.get("apiVersion") != self._version:
             given = answer.get("apiVersion")
             raise self._failure(f"returned apiVersion {given!r}; the kubeconfig requires {self._version}")
@@ -134,9 +134,9 @@ class Plugin:
         token = str(status.get("token") or "").strip()
         certificate, key = status.get("clientCertificateData"), status.get("clientKeyData")
         if not token and not certificate:
-            raise self._failure("gave neither a token nor a certificate")
+            raise self._failure("returned neither a token nor a certificate")
         if bool(certificate) is not bool(key):
-            raise self._failure("gave a certificate without its key, or a key without its certificate")
+            raise self._failure("returned a certificate without its key, or a key without its certificate")
         if token and not (token.isascii() and token.isprintable()):
             raise self._failure("returned a token that is not one line of text")
         return Credentials(
@@ -163,4 +163,6 @@ def _variables(entries: Any) -> dict[str, str]:
     try:
         return {str(entry["name"]): str(entry["value"]) for entry in entries}
     except (TypeError, KeyError) as error:
-        raise NotConfigured("exec: env is no list of names and values; write `name` and `value`") from error
+        raise NotConfigured(
+            "exec: env is not a list of names and values; write `name` and `value`"
+        ) from error

@@ -27,8 +27,8 @@ def open_socket(connection: socket, url: str, headers: Headers, wait_s: float) -
 
     Args:
         connection: to the API server, with TLS and the proxy, if any.
-        url: of the command.
-        headers: of the request.
+        url: the url of the command.
+        headers: the headers of the request.
         wait_s: longest time until the command runs.
 
     Raises:

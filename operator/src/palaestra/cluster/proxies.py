@@ -25,7 +25,7 @@ class Proxy:
     Attributes:
         address: `http://proxy:3128`, without credentials.
         user: the user name for the proxy, or None.
-        password: of that user.
+        password: the password of that user.
     """
 
     address: str
@@ -49,7 +49,7 @@ def proxy_named(text: str, where: str) -> Proxy:
     text = text if "://" in text else f"http://{text}"
     url = _parsed(text)
     if url is None or not url.host or url.scheme not in PORTS:
-        raise NotConfigured(f"{where}: {masked(text)} is no proxy; {REMEDY}")
+        raise NotConfigured(f"{where}: {masked(text)} is not a proxy; {REMEDY}")
     scheme = "socks5h" if url.scheme == "socks5" else url.scheme
     user, password = url.auth_decoded
     address = f"{scheme}://{url.host}:{url.port or PORTS[scheme]}"
@@ -79,7 +79,7 @@ def connects_directly(host: str, port: int, exceptions: str) -> bool:
 
     Args:
         host: a name or an address, the latter without brackets.
-        port: of the connection.
+        port: the port of the connection.
         exceptions: the text of NO_PROXY: names with their subdomains, addresses, networks, each with a port
             or without one, separated by commas; `*` is everything.
     """
@@ -104,7 +104,7 @@ def _covers(
     its_address = _address(name)
     if address is not None or its_address is not None:
         return address == its_address
-    if name.startswith(("*.", ".")):  # only its subdomains
+    if name.startswith(("*.", ".")):  # matches subdomains, but not the domain itself
         return host.endswith(name.removeprefix("*"))
     return host == name or host.endswith(f".{name}")
 

@@ -179,5 +179,5 @@ class Reflector:
             return
         try:
             self._changed(known)
-        except Exception:  # as above
+        except Exception:  # one unexpected object must not hide all others
             log.exception("deletion not reported", resource=self._resource.plural, key=key)

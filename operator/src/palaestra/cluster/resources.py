@@ -25,7 +25,8 @@ class Resource:
     plural: str
     namespaced: bool = True
     metadata_only: bool = False
-    page: int = 25  # of about 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB
+    # Items of about 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB.
+    page: int = 25
 
     def address(self, namespace: str | None = None, name: str | None = None) -> str:
         """Return the path of one object, or of the collection.
@@ -44,7 +45,7 @@ class Resource:
         return "/".join(parts)
 
     def only_metadata(self) -> "Resource":
-        """Return the same kind, of which only the metadata is read."""
+        """Return the same kind, reduced to its metadata."""
         return replace(self, metadata_only=True)
 
 
@@ -52,7 +53,7 @@ TRAINING_JOBS = Resource(
     api_version="palaestra.dev/v1alpha1",
     kind="TrainingJob",
     plural="trainingjobs",
-    page=10,  # of up to 1.5 MB each, the limit of an API server
+    page=10,  # items of up to 1.5 MB each, the limit of an API server
 )
 JOBS = Resource(api_version="batch/v1", kind="Job", plural="jobs")
 PODS = Resource(api_version="v1", kind="Pod", plural="pods")
@@ -61,7 +62,7 @@ CLAIMS = Resource(api_version="v1", kind="PersistentVolumeClaim", plural="persis
 SECRETS = Resource(api_version="v1", kind="Secret", plural="secrets")
 EVENTS = Resource(
     api_version="v1", kind="Event", plural="events"
-)  # of the core group, which `kubectl describe` shows
+)  # events of the core group, which `kubectl describe` shows
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )

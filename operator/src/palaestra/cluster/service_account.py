@@ -30,7 +30,7 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
     folder = files or FILES
     host, port = os.environ.get(HOST), os.environ.get(PORT)
     if not host or not port:
-        raise NotConfigured(f"{HOST} and {PORT} are not set, as they are in a pod")
+        raise NotConfigured(f"{HOST} and {PORT} are not set, although a pod has both")
     authority = folder / "ca.crt"
     if not text_of(authority):
         raise NotConfigured(f"{authority} is missing or empty")
@@ -41,7 +41,7 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
     try:
         tls = verification(authority)
     except (OSError, ValueError) as error:
-        raise NotConfigured(f"{authority} is no certificate in PEM ({error})") from error
+        raise NotConfigured(f"{authority} is not a certificate in PEM ({error})") from error
     return Access(
         host=server,
         pool=connections(tls, proxy),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 # Source: OpenSSL's x509_vfy.h. All other codes are about the chain.
 DATES = {9: "is not valid yet", 10: "has expired"}
-NAMES = (62, 64)  # a host's name, an IP address
+NAMES = (62, 64)  # the certificate lacks the host's name, or the IP address
 DATES_REMEDY = "compare this machine's clock with the certificate's dates, or have the certificate renewed"
 NAMES_REMEDY = (
     "connect by a name that the certificate has, or set `tls-server-name` of the kubeconfig's cluster"

@@ -189,7 +189,7 @@ class Transport:
         response = self._send(call, Timeout(connect=min(self.limits.connect_s, left_s), read=left_s))
         try:
             return self._answer(response, call, deadline)
-        except BaseException:
+        except BaseException:  # also Ctrl-C: the next request would read the rest of this response
             response.close()
             raise
         finally:

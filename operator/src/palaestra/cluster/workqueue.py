@@ -55,7 +55,8 @@ class WorkQueue(Generic[Item]):
         self._clock = clock
         self._changed = threading.Condition()
         self._ready: dict[Hashable, deque[Item]] = {}  # by lane; the lane of the next turn is first
-        self._since: dict[Item, float] = {}  # names that wait for a worker, even if a worker has them now
+        # Names that wait for a worker, even if another worker has the same name in work.
+        self._since: dict[Item, float] = {}
         self._working: set[Item] = set()
         self._later: list[tuple[float, int, Item]] = []
         self._due: dict[Item, float] = {}

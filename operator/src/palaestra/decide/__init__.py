@@ -1,7 +1,7 @@
 """Decide the status of a job and the actions for it, from the job and an observation.
 
 Pure: the clocks are passed in. Decisions are ordered lists of small named checks. `HOLDS` in `preconditions`
-lists the checks that keep a job from starting; `JUDGED` in `replica_policy` lists those of a replica.
+lists the checks that keep a job from starting; `replica_policy` lists those of a replica.
 
     job = accept(raw)                                  # JobRefused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
@@ -39,8 +39,7 @@ from palaestra.decide.preconditions import (
     wants_whole,
     worlds_to_check,
 )
-from palaestra.decide.status_patch import as_data, write_in_s
-from palaestra.decide.status_size import fitted
+from palaestra.decide.status_write import as_data, fitted, write_in_s
 from palaestra.decide.validation import JobRefused, accept, managed_here, reject
 
 __all__ = [

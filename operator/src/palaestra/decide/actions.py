@@ -1,12 +1,17 @@
-"""The actions for a job, in order: stop, replace pods, suspend or resume, discard, create missing objects."""
+"""The actions for a job, in order: stop, replace pods, suspend or resume, discard, create missing objects.
+
+The last one is the deletion of an ended TrainingJob when its time to live has passed.
+"""
 
 from collections.abc import Iterator, Sequence
+from datetime import datetime
 
 from palaestra.api import TrainingJob
-from palaestra.api.status import TERMINAL, ReplicaStatus
-from palaestra.decide.decision import Action, Basis, Create, Discard, Replace, SetSuspend, Stop
+from palaestra.api.status import TERMINAL, ReplicaStatus, Status
+from palaestra.decide.clocks import after, seconds_between
+from palaestra.decide.decision import Action, Basis, Create, Delete, Discard, Replace, SetSuspend, Stop
 from palaestra.decide.preconditions import Prepared
-from palaestra.decide.replicas import Decided
+from palaestra.decide.replica_policy import Decided
 from palaestra.decide.suspend import mark, to_set
 from palaestra.objects import Object
 from palaestra.observe.models import JobView, Observed, PodView, ReplicaObserved
@@ -137,3 +142,19 @@ def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
 
 def _basis(job: JobView, pods: Sequence[PodView] = ()) -> Basis:
     return Basis(uid=job.uid, version=job.version, pods=frozenset((pod.uid, pod.version) for pod in pods))
+
+
+def expires(status: Status, ttl_s: int | None) -> datetime | None:
+    """Return the time at which to delete an ended job; None: never, or it has not ended."""
+    if ttl_s is None or status.phase not in TERMINAL or status.completion_time is None:
+        return None
+    return after(status.completion_time, ttl_s)
+
+
+def expired(
+    name: str, uid: str | None, at: datetime | None, status: Status, now: datetime
+) -> tuple[Delete, ...]:
+    """Return the deletion of the TrainingJob, if its time `at` has come."""
+    if at is None or at > now or uid is None:
+        return ()
+    return (Delete(name=name, uid=uid, after_s=seconds_between(status.completion_time or now, now)),)

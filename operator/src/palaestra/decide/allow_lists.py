@@ -11,7 +11,7 @@ from typing import Any
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason
-from palaestra.decide.hold import Hold, held
+from palaestra.decide.explanation import Hold, held
 from palaestra.plan import Allowed
 from palaestra.plan.replica import JOB_LABEL, UID_LABEL
 from palaestra.plan.resources import asks_for

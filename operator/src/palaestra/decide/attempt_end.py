@@ -7,27 +7,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from palaestra.api.reasons import Reason
-from palaestra.decide.checkpoints import next_pod
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.oom_kills import killed_for_memory, kills_of, limit_of, memory_kills
-from palaestra.decide.replica_context import ReplicaContext, explain
-from palaestra.decide.restart_counts import exit_code, failed_by_itself
-from palaestra.decide.suspend import ended_by_suspension, suspended_by
-from palaestra.decide.waiting_reasons import (
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.pod_end import (
     full_volume,
     how_it_failed,
+    killed_for_memory,
+    kills_of,
+    limit_of,
     mark_of,
+    memory_kills,
     probe_failed,
     storage_eviction,
 )
+from palaestra.decide.replica_context import ReplicaContext, next_pod
+from palaestra.decide.restart_counts import exit_code, failed_by_itself
+from palaestra.decide.suspend import ended_by_suspension, suspended_by
 from palaestra.observe.models import JobView, PodView
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.enums import SILENT
 from palaestra_protocol.pod.status import ExitCode, Termination
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # exit codes that a deletion may cause
-GONE = "its pod is gone; no last word"
-TAKEN, AGAIN = ", which took it back", "; it continues when it is admitted again"
+GONE = "its pod is gone; it left no termination message"
+TAKEN, AGAIN = ", which evicted it", "; it continues when it is admitted again"
 _HUNG = "SimulatorHung"  # the start of a termination message
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 
-from palaestra.decide.conditions import Explanation
+from palaestra.decide.explanation import Explanation
 
 WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide.attempt_end import AGAIN, paused
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.replica_context import Finding, ReplicaContext, explain, found
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.replica_context import Finding, ReplicaContext, found
 from palaestra.decide.suspend import ended_by_suspension, unheeded
 from palaestra.observe.models import PodView
 
-UNASKED = "; why that takes long was not asked, as too many others wait"
+UNASKED = "; the cause was not looked up, because too many other replicas wait"
 DESCRIBE = "; `kubectl describe` shows it"
 DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # only this object has Kueue's message
 
@@ -29,7 +29,7 @@ def suspending(situation: ReplicaContext) -> Finding | None:
     pod = situation.pod if situation.seen.job is not None else None
     if pod is None or not (situation.suspended or ended_by_suspension(situation.seen, pod)):
         return None
-    by = paused(situation).message if situation.suspended else "then the next pod goes on from there"
+    by = paused(situation).message if situation.suspended else "then the next pod continues from there"
     return Finding(explanation=explain(Reason.SUSPENDING, pod=pod.name, by=by), phase=Phase.PENDING)
 
 
@@ -55,7 +55,7 @@ def trainer_has_ended(situation: ReplicaContext) -> Finding | None:
     pod = situation.seen.pod if situation.seen.job is not None else None
     if pod is None or pod.trainer is None or pod.trainer.exit is None:
         return None
-    what = f"attempt {situation.counted.attempt} has ended, its simulators are stopped"
+    what = f"attempt {situation.counted.attempt} has ended; its simulators are being stopped"
     return Finding(explanation=explain(Reason.TRAINING, what=what), phase=Phase.RUNNING)
 
 
@@ -64,7 +64,7 @@ def trains(situation: ReplicaContext) -> Finding | None:
     if not runs(situation):
         return None
     if situation.seen.polled is not None and not situation.trains:
-        return found(Reason.STARTING, what="its simulators are on their way")
+        return found(Reason.STARTING, what="its simulators are starting")
     return found(
         Reason.TRAINING,
         what=f"attempt {situation.counted.attempt} trains{unheeded(situation.job, situation.seen)}",
@@ -82,7 +82,7 @@ def starts(situation: ReplicaContext) -> Finding | None:
     else:
         what = "its last pod has ended" if situation.seen.pod.ended else "its containers start"
         if situation.pod is not None and _in_trainer(situation.pod):
-            what = "its trainer starts, and has not answered yet"
+            what = "its trainer starts, and has not responded yet"
     return found(Reason.STARTING, what=what + (UNASKED + DESCRIBE if situation.seen.unasked else ""))
 
 

@@ -1,10 +1,11 @@
-"""Events for the changes between two statuses, and for the actions."""
+"""Events: for the changes between two statuses, for the actions, and for edits of the operator's objects."""
 
 from collections.abc import Iterator, Sequence
 
-from palaestra.api.reasons import ROWS, Reason, say
+from palaestra.api import TrainingJob
+from palaestra.api.reason_texts import ROWS, say
+from palaestra.api.reasons import Reason
 from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, ReplicaStatus, Status
-from palaestra.decide.conditions import condition
 from palaestra.decide.decision import (
     Action,
     Create,
@@ -16,7 +17,9 @@ from palaestra.decide.decision import (
     SetSuspend,
     Stop,
 )
-from palaestra.decide.oom_kills import limit_of
+from palaestra.decide.job_status import condition
+from palaestra.decide.pod_end import limit_of
+from palaestra.observe.models import JobView, Observed
 from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
@@ -111,3 +114,38 @@ def _of_lost_run(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Emit
     before = old.lost.restarted if old is not None and old.lost is not None else None
     if new.lost is not None and new.lost.restarted is not None and new.lost.restarted != before:
         yield emitted(Reason.RUN_RESTARTED, say(Reason.RUN_RESTARTED, step=new.lost.step), new.index)
+
+
+def edits(job: TrainingJob, observed: Observed) -> Iterator[EmittedEvent]:
+    """Yield an event for each edit by another client that is still there; none is reverted.
+
+    Its message is unique, so it is written once.
+    """
+    for name, generation in observed.edited:
+        fact = f"spec, generation {generation}; if you delete it, the operator creates it again as planned"
+        yield _event(f"NetworkPolicy {name}", fact, None)
+    for seen in observed.replicas:
+        if seen.job is not None and seen.job.end is None and (fact := _changed(job, seen.job)):
+            yield _event(f"Job {seen.job.name}", fact, seen.index)
+
+
+def _changed(job: TrainingJob, seen: JobView) -> str:
+    """Return the settings of a Job that differ from the plan; "" if none does."""
+    planned = {
+        "parallelism": 1,
+        "backoffLimit": job.spec.backoff_limit,
+        "activeDeadlineSeconds": None if seen.stopped is None else 1,
+        "ttlSecondsAfterFinished": None,
+    }
+    now = {**planned, **seen.settings}
+    changes = (
+        f"{name} {now[name]} instead of {planned[name]}" for name in planned if now[name] != planned[name]
+    )
+    return ", ".join(changes)
+
+
+def _event(what: str, fact: str, replica: int | None) -> EmittedEvent:
+    message = say(Reason.EDITED, what=what, fact=fact)
+    return EmittedEvent(
+        type=EventType.WARNING, reason=Reason.EDITED, message=message, replica=replica, once=True
+    )

@@ -1,4 +1,4 @@
-"""Checks for pods that the kubelet does not repair: the operator evicts them, and counts that.
+"""Checks for pods that the kubelet does not repair or end: the operator evicts them, and counts that.
 
 An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. The operator counts it
 in an annotation of the Job, the mark, before it evicts. If it is killed between the two writes, it finds the
@@ -6,21 +6,30 @@ mark of a running pod after its restart, and evicts again.
 
 A trainer that a failed probe interrupted exits with 75, which its Job does not count either. Its pod gets the
 mark too; it has ended, so no pod is evicted.
+
+A service mesh or an agent may add a container to the pod. Then the pod does not end, or ends as failed, even
+if the trainer succeeded. The operator waits a minute for these foreign containers and then ends the pod.
 """
 
 from dataclasses import replace
 
 from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase
+from palaestra.decide.attempt_end import of_pod, why
 from palaestra.decide.clocks import Wait
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.pod_end import mark_of, probe_failed
 from palaestra.decide.progress import standstill
-from palaestra.decide.remaining_containers import pod_outlives_trainer
-from palaestra.decide.replica_context import Check, Finding, ReplicaContext, after, explain, found
-from palaestra.decide.restart_counts import failed_by_itself
-from palaestra.decide.waiting_reasons import mark_of, probe_failed
+from palaestra.decide.replica_context import Finding, ReplicaContext, after, found
+from palaestra.decide.restart_counts import exit_code, failed_by_itself
+from palaestra.observe.models import PodView
 from palaestra.observe.pods import dropped
+from palaestra.plan.job import GIVEN_UP
+from palaestra_protocol.pod.status import ExitCode
 
 STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
 FORGOTTEN_S = 300  # the trainer starts in seconds: the ROS master has the same image
+OUTLIVED_S = 60  # a proxy that ends with the main process needs seconds
 
 
 def marked(situation: ReplicaContext) -> Finding | None:
@@ -58,7 +67,7 @@ def stalled(situation: ReplicaContext) -> Finding | None:
     if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None
     seconds = situation.job.spec.stall_deadline_seconds
-    what = f"no step was learned from for more than {seconds} s"
+    what = f"its step count has not changed for more than {seconds} s"
     return after(
         situation, replace(wait, seconds=seconds + STALL_GRACE_S), explain(Reason.STALLED, what=what)
     )
@@ -80,14 +89,51 @@ def replaced_too_often(situation: ReplicaContext) -> Finding | None:
     times = job.replaced.times if job is not None and job.replaced is not None else 0
     if situation.suspended or marked(situation) is not None or times < situation.job.spec.backoff_limit:
         return None
-    causes = (cause for check in REPLACED if (cause := check(situation)) is not None)
-    return min(causes, key=lambda cause: cause.left_s, default=None)
+    return min(situation.causes, key=lambda cause: cause.left_s, default=None)
 
 
-REPLACED: tuple[Check, ...] = (
-    restart_policy_dropped,
-    trainer_never_started,
-    stalled,
-    ended_by_probe,
-    pod_outlives_trainer,
-)
+def kept_alive(situation: ReplicaContext) -> Finding | None:
+    """The trainer has ended, and foreign containers keep its pod alive."""
+    pod = _outlived(situation)
+    if pod is None:
+        return None
+    names = ", ".join(pod.keeping)
+    reason = explain(Reason.KEPT_ALIVE, pod=pod.name, containers=names, seconds=OUTLIVED_S)
+    return Finding(explanation=reason, phase=Phase.RUNNING)
+
+
+def trainer_is_done(situation: ReplicaContext) -> Finding | None:
+    """The trainer has ended for good, and foreign containers keep its pod alive or made it fail."""
+    pod, job = situation.seen.pod, situation.seen.job
+    if pod is None or job is None or job.end is not None:
+        return None
+    if pod.phase == "Failed" and exit_code(pod) == ExitCode.DONE:
+        return Finding(explanation=_why(situation, pod))
+    outlived = _outlived(situation)
+    if outlived is None or exit_code(outlived) not in {ExitCode.DONE, *GIVEN_UP}:
+        return None
+    return _overdue(situation, outlived)
+
+
+def pod_outlives_trainer(situation: ReplicaContext) -> Finding | None:
+    """The trainer has ended and must be retried, and foreign containers keep its pod alive."""
+    pod = _outlived(situation)
+    if pod is None or exit_code(pod) in {ExitCode.DONE, *GIVEN_UP}:
+        return None
+    return _overdue(situation, pod)
+
+
+def _outlived(situation: ReplicaContext) -> PodView | None:
+    """Return the pod if only foreign containers keep it alive and it is not being deleted."""
+    pod = situation.pod if situation.seen.job is not None else None
+    if pod is None or pod.gone_by is not None or exit_code(pod) is None or not pod.keeping:
+        return None
+    return pod
+
+
+def _overdue(situation: ReplicaContext, pod: PodView) -> Finding:
+    return after(situation, Wait(key=("outlived", pod.uid), seconds=OUTLIVED_S), _why(situation, pod))
+
+
+def _why(situation: ReplicaContext, pod: PodView) -> Explanation:
+    return why(of_pod(situation, pod, situation.counted.attempt))

@@ -1,9 +1,25 @@
-"""Checks that stop a replica for good: limits that its author set, and causes that a retry cannot remove."""
+"""Checks that stop a replica for good: limits that its author set, and causes that a retry cannot remove.
 
-from palaestra.api.reasons import Reason
-from palaestra.decide.replica_context import Finding, ReplicaContext, explain, first_waiting, found
+While a replica waits for its first step, `trouble` remembers the cause, because a kubelet that restarts stops
+reporting it for a moment.
+"""
+
+from dataclasses import replace
+
+from palaestra.api.reasons import LONGEST_MESSAGE, Reason
+from palaestra.api.text import one_line
+from palaestra.decide.clocks import Wait, WaitingReason
+from palaestra.decide.current_state import runs
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.pod_end import mark_of, storage_eviction
+from palaestra.decide.replica_context import Finding, ReplicaContext, after, first_waiting, found
 from palaestra.decide.restart_counts import failed_by_itself, has_run
-from palaestra.decide.waiting_reasons import mark_of, of_image, storage_eviction
+from palaestra.decide.waiting_reasons import of_image
+
+FIRST_STEP = ("first step",)  # the key of the wait for the first step
+MOMENT_S = 60  # a kubelet that restarts or retries reports a reason again within this time
+
+_NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
 
 
 def active_deadline(situation: ReplicaContext) -> Finding | None:
@@ -37,6 +53,42 @@ def no_progress(situation: ReplicaContext) -> Finding | None:
     evictions = (storage_eviction(pod) for pod in reversed(situation.seen.pods) if pod.ended)
     cause = next(evictions, None)  # of the last that ended
     return Finding(explanation=cause) if cause is not None else found(Reason.NO_PROGRESS, pods=pods)
+
+
+def start_timeout(situation: ReplicaContext) -> Finding | None:
+    """It has not done its first step within `startTimeoutSeconds`; the reason is the cause of the delay."""
+    if (
+        situation.suspended
+        or situation.hold is not None
+        or situation.counted.furthest_step
+        or _is_past_its_start(situation)
+        or situation.shown is None
+    ):
+        return None
+    seconds = situation.job.spec.start_timeout_s
+    cause, why = trouble(situation, situation.shown), situation.shown.message
+    reason = Reason.START_TIMEOUT if cause is None else cause.explanation.reason
+    if cause is not None and cause.gone_s is not None:
+        why = f"a moment ago: {cause.explanation.message}"
+    words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why}"
+    explanation = Explanation(reason=reason, message=one_line(words, LONGEST_MESSAGE))
+    return after(situation, Wait(key=FIRST_STEP, seconds=seconds), explanation)
+
+
+def trouble(situation: ReplicaContext, shown: Explanation) -> WaitingReason | None:
+    """Return the cause that delays the first step, even if the kubelet stops reporting it for a moment."""
+    if shown.reason not in _NO_TROUBLE:
+        return WaitingReason(explanation=shown)
+    last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
+    if last is None:
+        return None
+    gone_s = now_s if last.gone_s is None else last.gone_s
+    return replace(last, gone_s=gone_s) if now_s - gone_s <= MOMENT_S else None
+
+
+def _is_past_its_start(situation: ReplicaContext) -> bool:
+    """Return whether the trainer runs and does not report that its simulators still start."""
+    return runs(situation) and (situation.seen.polled is None or situation.trains)
 
 
 def _taken_and_not_replaced(situation: ReplicaContext) -> bool:

@@ -4,31 +4,33 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from palaestra.api import TrainingJob
-from palaestra.api.reasons import Reason, say
+from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
-from palaestra.decide.actions import actions
+from palaestra.decide.actions import actions, expired, expires
 from palaestra.decide.clocks import ReconcileRecord, Times, first_of, seconds_to, whole
-from palaestra.decide.conditions import (
+from palaestra.decide.decision import Decision
+from palaestra.decide.events import edits, of_actions, of_change
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.job_status import (
     ConditionState,
     ConditionStates,
-    Explanation,
+    active,
+    as_first,
+    columns,
     condition_states,
     conditions,
     conditions_of_ended,
+    left_out,
     reconciliation,
+    standing,
+    started,
 )
-from palaestra.decide.decision import Decision
-from palaestra.decide.drift import edits
-from palaestra.decide.events import of_actions, of_change
-from palaestra.decide.job_status import active, as_first, columns, left_out, standing, started
 from palaestra.decide.last_attempt import late_word
 from palaestra.decide.lost_runs import new_word, restarted
 from palaestra.decide.preconditions import Prepared
 from palaestra.decide.replica_context import ReplicaContext, ReplicaVerdict
-from palaestra.decide.replica_policy import ReplicaActions
-from palaestra.decide.replicas import Decided, decided
+from palaestra.decide.replica_policy import Decided, ReplicaActions, decided
 from palaestra.decide.restart_counts import counted
-from palaestra.decide.ttl import expired, expires
 from palaestra.observe.json_access import MOST_COUNT
 from palaestra.observe.models import Observed, ReplicaObserved
 
@@ -188,9 +190,7 @@ def _accepted(job: TrainingJob, prepared: Prepared) -> ConditionState:
     if prepared.hold is not None and job.status.release is None:
         return ConditionState(holds=False, explanation=prepared.hold.explanation)
     note = EPHEMERAL if job.spec.storage.ephemeral else ""
-    return ConditionState(
-        holds=True, explanation=Explanation(reason=Reason.ACCEPTED, message=say(Reason.ACCEPTED, note=note))
-    )
+    return ConditionState(holds=True, explanation=explain(Reason.ACCEPTED, note=note))
 
 
 def _release(prepared: Prepared) -> Release | None:

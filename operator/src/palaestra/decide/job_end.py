@@ -12,10 +12,10 @@ from palaestra.api.status import Phase
 from palaestra.decide.attempt_end import CAUSES, EndedAttempt, ended_silently, first, of_pod, stop_of, success
 from palaestra.decide.attempt_end import why as why_of
 from palaestra.decide.clocks import Wait
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.replica_context import Finding, ReplicaContext, after, explain
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.pod_end import how_it_failed
+from palaestra.decide.replica_context import Finding, ReplicaContext, after
 from palaestra.decide.restart_counts import exit_code
-from palaestra.decide.waiting_reasons import how_it_failed
 from palaestra.observe.models import JobEnd, JobView, PodView
 from palaestra_protocol.pod.status import ExitCode
 
@@ -90,7 +90,7 @@ def job_failed(situation: ReplicaContext) -> Finding | None:
     if job is None or job.end is None:
         return None
     words = ": ".join(word for word in (job.end_reason, job.end_message) if word)
-    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it has no reason"))
+    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "no reason was given"))
 
 
 def _ended(situation: ReplicaContext, job: JobView, why: Explanation) -> Finding:

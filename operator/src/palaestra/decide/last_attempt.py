@@ -9,11 +9,11 @@ from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.status import TERMINAL
 from palaestra.api.text import one_line
 from palaestra.decide.attempt_end import EndedAttempt, of_pod, why
-from palaestra.decide.conditions import Explanation
+from palaestra.decide.explanation import Explanation
+from palaestra.decide.pod_end import left_by
 from palaestra.decide.progress import LONGEST_NAME
 from palaestra.decide.replica_context import ReplicaContext, ReplicaVerdict
 from palaestra.decide.restart_counts import exit_code, newer_pods
-from palaestra.decide.waiting_reasons import left_by
 from palaestra.observe.json_access import MOST_COUNT, as_time
 from palaestra.observe.models import PodView
 from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, FaultRecord

@@ -9,9 +9,9 @@ from collections.abc import Collection, Iterable
 from datetime import datetime
 
 from palaestra.api import TrainingJob
-from palaestra.api.reasons import Reason, say
+from palaestra.api.reasons import Reason
 from palaestra.api.status import LostPart, LostRun, ReplicaStatus
-from palaestra.decide.conditions import Explanation
+from palaestra.decide.explanation import Explanation, explain
 from palaestra.decide.restart_counts import counted
 from palaestra.observe.models import ReplicaObserved
 from palaestra.plan.claim import claim_name
@@ -36,9 +36,7 @@ def why_lost(job: TrainingJob, index: int, lost: LostRun) -> Explanation:
     fact = f"the run directory is empty, although the run was at step {lost.step}"
     if lost.what is LostPart.CLAIM:
         fact = f"claim {claim} does not exist, although the run on it was at step {lost.step}"
-    return Explanation(
-        reason=Reason.RUN_LOST, message=say(Reason.RUN_LOST, fact=fact, name=job.metadata.name)
-    )
+    return explain(Reason.RUN_LOST, fact=fact, name=job.metadata.name)
 
 
 def new_word(job: TrainingJob) -> str | None:

@@ -12,7 +12,7 @@ from palaestra.api import TrainingJob, broken_guards
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, LostPart, LostRun
 from palaestra.decide.allow_lists import not_allowed
-from palaestra.decide.hold import Hold, held
+from palaestra.decide.explanation import Hold, held
 from palaestra.decide.lost_runs import lost_runs, why_lost
 from palaestra.decide.suspend import to_resume
 from palaestra.errors import WorldCheckTooCostly, WorldRefused, WorldUnchecked

@@ -5,14 +5,18 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from palaestra.api import SimulatorGroup, TrainingJob
-from palaestra.api.reasons import Reason, say
+from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase, ReplicaStatus
 from palaestra.decide.clocks import Times, Wait
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.hold import Hold
+from palaestra.decide.explanation import Explanation, Hold, explain
 from palaestra.decide.restart_counts import Counted
 from palaestra.observe.models import ContainerView, PodView, ReplicaObserved
 from palaestra.plan.replica import SIMULATOR_PREFIX
+
+RESUMES = "the next pod resumes from the last checkpoint"
+BEGINS = "the next pod starts the run again, because no checkpoint was reported"
+FRESH_S = 45  # an older response does not describe the current state
+STARTING = "starting"  # the trainer's phase until all its simulators are up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +31,8 @@ class ReplicaContext:
         active_left_s: remaining seconds of the job's active time; None: it has no deadline, or its active
             time does not run now.
         hold: the cause that keeps its objects from being created, or None.
+        shown: the reason in its status if it continues; only the checks of `STOPS` have it.
+        causes: the causes to replace its pod, also those that will hold later; only for `STOPS` too.
     """
 
     job: TrainingJob
@@ -36,6 +42,8 @@ class ReplicaContext:
     times: Times
     active_left_s: float | None = None
     hold: Hold | None = None
+    shown: Explanation | None = None
+    causes: tuple["Finding", ...] = ()
 
     @property
     def now(self) -> datetime:
@@ -80,10 +88,6 @@ class ReplicaContext:
         return polled is not None and polled.status.phase != STARTING
 
 
-FRESH_S = 45  # an older response does not describe the current state
-STARTING = "starting"  # the trainer's phase until all its simulators are up
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """The result of a check.
@@ -112,11 +116,6 @@ class ReplicaVerdict:
 Check = Callable[[ReplicaContext], Finding | None]
 
 
-def explain(reason: Reason, **facts: object) -> Explanation:
-    """Return a reason with its message."""
-    return Explanation(reason=reason, message=say(reason, **facts))
-
-
 def found(reason: Reason, **facts: object) -> Finding:
     """Return a finding that holds at once."""
     return Finding(explanation=explain(reason, **facts))
@@ -139,3 +138,21 @@ def _members(job: TrainingJob) -> list[tuple[SimulatorGroup, int]]:
 
 def _container(group: SimulatorGroup, index: int) -> str:
     return f"{SIMULATOR_PREFIX}{group.name}-{index}"
+
+
+def next_pod(situation: ReplicaContext) -> str:
+    """Return the text about the start of a replica's next pod; a run resumes only from a reported checkpoint.
+
+    A custom program (`spec.trainer.command`) need not report its checkpoints, so its reported step counts as
+    one.
+    """
+    return RESUMES if has_checkpoint(situation) else BEGINS
+
+
+def has_checkpoint(situation: ReplicaContext) -> bool:
+    """Return whether an attempt of the replica has reported a checkpoint."""
+    seen = situation.seen
+    polled = seen.polled.status.last_checkpoint if seen.polled is not None else None
+    words = (word.last_checkpoint for word in seen.terminations.values())
+    own = situation.job.spec.trainer.command and situation.counted.furthest_step
+    return bool(situation.old.last_checkpoint or polled or any(words) or own)

@@ -1,46 +1,95 @@
-"""The ordered list of checks on a replica that has not ended.
+"""The judgment on a replica: three ordered lists of checks, and its new status and actions by them.
 
-`make golden` writes the list into docs/explain/judging.md. Each reconcile runs all checks, because a
-check may also return the time after which it will hold. The class of a check that holds sets the consequence:
+`make golden` writes the lists into docs/explain/judging.md. Each reconcile runs all checks, because a check
+may also return the time after which it will hold. Of each list, the first check that holds now counts:
 
-- ended: the replica has ended for the reason of the first one that holds; the others are ignored.
-- final: the first one that holds stops the replica for good, by a mark on its Job.
-- counted: the operator replaces the pod, or its Job does, at most `backoffLimit` times.
-- waiting: the status shows its reason; nothing is ended or counted.
-- shown: the status shows the state of the replica.
+- `ENDS`: the replica has ended for this reason; the other lists are ignored.
+- `STOPS`: the operator stops the replica for good, by a mark on its Job. These checks see the results of
+  `REASONS`.
+- `REASONS`: the reason in the status of a replica that continues. By its kind, the operator replaces the pod,
+  or does nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from palaestra.api.reasons import LONGEST_MESSAGE, Reason
-from palaestra.api.status import Phase
+from palaestra.api.reasons import LONGEST_MESSAGE
+from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
 from palaestra.api.text import one_line
-from palaestra.decide import (
-    current_state,
-    eviction,
-    failure_checks,
-    job_end,
-    remaining_containers,
-    waiting_reasons,
-)
+from palaestra.decide import current_state, eviction, failure_checks, job_end, waiting_reasons
 from palaestra.decide.clocks import Wait, WaitingReason
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.replica_context import STARTING, Check, Finding, ReplicaContext, ReplicaVerdict, after
+from palaestra.decide.explanation import Explanation
+from palaestra.decide.last_attempt import last_attempt
+from palaestra.decide.pod_end import memory_kills
+from palaestra.decide.progress import progress
+from palaestra.decide.replica_context import Check, Finding, ReplicaContext, ReplicaVerdict
 
-FIRST_STEP = ("first step",)  # the key of the wait for the first step
-MOMENT_S = 60  # a kubelet that restarts or retries reports a reason again within this time
+LONGEST_NODE = 253  # characters of a node's name, as the API server bounds it
 
 
 class CheckKind(StrEnum):
-    """The class of a check, which sets the consequence if it holds."""
+    """The kind of a check in `REASONS`, which sets the consequence if its reason is the first that holds."""
 
-    ENDED = "ended"
-    FINAL = "final"
     COUNTED = "counted"
+    """The operator replaces the pod, or its Job does, at most `backoffLimit` times."""
+
     WAITING = "waiting"
+    """The status shows why the replica waits; nothing is ended or counted."""
+
     SHOWN = "shown"
+    """The status shows the state of the replica."""
+
+
+ENDS: tuple[Check, ...] = (
+    job_end.ended_by_others,
+    job_end.job_is_complete,
+    job_end.stopped,
+    job_end.trainer_was_done,
+    job_end.would_end_the_same,
+    job_end.backoff_limit_spent,
+    job_end.job_failed,
+)
+STOPS: tuple[Check, ...] = (
+    eviction.trainer_is_done,
+    failure_checks.active_deadline,
+    failure_checks.cannot_be_planned,
+    failure_checks.image_name_is_invalid,
+    eviction.replaced_too_often,
+    failure_checks.no_progress,
+    failure_checks.start_timeout,
+)
+REASONS: tuple[tuple[CheckKind, Check], ...] = (
+    (CheckKind.WAITING, current_state.held),
+    (CheckKind.WAITING, waiting_reasons.objects_refused),
+    (CheckKind.WAITING, waiting_reasons.node_lost),
+    (CheckKind.SHOWN, current_state.suspending),
+    (CheckKind.SHOWN, current_state.suspended),
+    (CheckKind.WAITING, waiting_reasons.name_taken),
+    (CheckKind.WAITING, waiting_reasons.old_pod_holds_claim),
+    (CheckKind.WAITING, waiting_reasons.pods_refused),
+    (CheckKind.COUNTED, eviction.marked),
+    (CheckKind.COUNTED, eviction.restart_policy_dropped),
+    (CheckKind.WAITING, waiting_reasons.unschedulable),
+    (CheckKind.WAITING, waiting_reasons.volume_not_mounted),
+    (CheckKind.WAITING, waiting_reasons.image_does_not_come),
+    (CheckKind.WAITING, waiting_reasons.container_refused),
+    (CheckKind.COUNTED, eviction.trainer_never_started),
+    (CheckKind.COUNTED, eviction.stalled),
+    (CheckKind.COUNTED, eviction.ended_by_probe),
+    (CheckKind.COUNTED, eviction.pod_outlives_trainer),
+    (CheckKind.WAITING, eviction.kept_alive),
+    (CheckKind.WAITING, waiting_reasons.sidecar_out_of_memory),
+    (CheckKind.WAITING, waiting_reasons.sidecar_crash_loops),
+    (CheckKind.WAITING, waiting_reasons.simulator_not_up),
+    (CheckKind.WAITING, waiting_reasons.pod_filled_its_storage),
+    (CheckKind.WAITING, waiting_reasons.pod_was_taken),
+    (CheckKind.WAITING, waiting_reasons.volume_is_full),
+    (CheckKind.WAITING, waiting_reasons.pod_failed),
+    (CheckKind.SHOWN, current_state.trainer_has_ended),
+    (CheckKind.SHOWN, current_state.trains),
+    (CheckKind.SHOWN, current_state.starts),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,74 +112,83 @@ class ReplicaActions:
     trouble: WaitingReason | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decided:
+    """The status of a replica, and the actions for it."""
+
+    status: ReplicaStatus
+    course: ReplicaActions = field(default_factory=ReplicaActions)
+
+
+def decided(situation: ReplicaContext) -> Decided:
+    """Return the status and actions of a replica that had not ended."""
+    verdict, course = judge(situation)
+    return Decided(status=_status(situation, verdict), course=course)
+
+
+def _status(situation: ReplicaContext, verdict: ReplicaVerdict) -> ReplicaStatus:
+    old, reason = situation.old, verdict.explanation.reason.value
+    changed = (old.phase, old.reason) != (verdict.phase, reason) or old.since is None
+    counts = situation.counted
+    return old.model_copy(
+        update={
+            "phase": verdict.phase,
+            "reason": reason,
+            "message": verdict.explanation.message,
+            "since": situation.now if changed else old.since,
+            "attempt": counts.attempt,
+            "pod": counts.pod,
+            "node": _node(situation),
+            "restarts": counts.restarts,
+            "simulator_restarts": counts.simulator_restarts,
+            "furthest_step": counts.furthest_step,
+            "fruitless": counts.fruitless,
+            "last_attempt": last_attempt(situation, verdict if verdict.phase in TERMINAL else None),
+            "memory_kills": memory_kills(situation),
+            **progress(situation, verdict.phase),
+        }
+    )
+
+
+def _node(situation: ReplicaContext) -> str | None:
+    """Return the node of the newest pod; after the pod is gone, its last node."""
+    pod = situation.seen.pod
+    return situation.old.node if pod is None else one_line(pod.node, LONGEST_NODE) or None
+
+
 def judge(situation: ReplicaContext) -> tuple[ReplicaVerdict, ReplicaActions]:
-    """Return the verdict on a replica and its actions, by the first checks of the list that hold."""
-    asked = [(kind, finding) for kind, check in JUDGED if (finding := check(situation)) is not None]
-    left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
-    waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
-    holding = [(kind, finding) for kind, finding in asked if finding.left_s <= 0]
-    if (end := _first(holding, CheckKind.ENDED)) is not None:
+    """Return the verdict on a replica and its actions, by the first check of each order that holds."""
+    ends = _findings(ENDS, situation)
+    reasons = [(kind, finding) for kind, check in REASONS if (finding := check(situation)) is not None]
+    kind, shown = next((kind, finding) for kind, finding in reasons if finding.left_s <= 0)
+    causes = tuple(finding for kind, finding in reasons if kind is CheckKind.COUNTED)
+    stops = _findings(STOPS, replace(situation, shown=shown.explanation, causes=causes))
+    asked = (*ends, *stops, *(finding for _, finding in reasons))
+    waits = tuple(finding.wait for finding in asked if finding.wait is not None)
+    if (end := _first(ends)) is not None:
         return _verdict(situation, end), ReplicaActions(waits=waits)
-    stop = _first(holding, CheckKind.FINAL)
+    stop = _first(stops)
     if stop is not None and situation.seen.job is None:  # no Job exists, and none will be created
         return ReplicaVerdict(phase=Phase.FAILED, explanation=stop.explanation), ReplicaActions()
-    kind, shown = next(
-        (kind, each) for kind, each in holding if kind not in {CheckKind.ENDED, CheckKind.FINAL}
-    )
     replaced = kind is CheckKind.COUNTED and stop is None
+    waits_to_step = failure_checks.FIRST_STEP in {wait.key for wait in waits}
     course = ReplicaActions(
         stop=None if stop is None else stop.explanation,
         replace=shown.explanation if replaced else None,
-        left_s=left_s,
+        left_s=tuple(finding.left_s for finding in asked if finding.left_s > 0),
         waits=waits,
-        trouble=_trouble(situation, shown.explanation)
-        if FIRST_STEP in {wait.key for wait in waits}
-        else None,
+        trouble=failure_checks.trouble(situation, shown.explanation) if waits_to_step else None,
     )
     return _verdict(situation, _refused(situation, shown) if replaced else shown), course
 
 
-def start_timeout(situation: ReplicaContext) -> Finding | None:
-    """It has not done its first step within `startTimeoutSeconds`; the reason is the cause of the delay."""
-    if (
-        situation.suspended
-        or situation.hold is not None
-        or situation.counted.furthest_step
-        or _is_past_its_start(situation)
-    ):
-        return None
-    seconds = situation.job.spec.start_timeout_s
-    asked = (finding for kind, check in JUDGED if kind in SHOWN and (finding := check(situation)) is not None)
-    shown = next(finding.explanation for finding in asked if finding.left_s <= 0)
-    trouble = _trouble(situation, shown)
-    reason = Reason.START_TIMEOUT if trouble is None else trouble.explanation.reason
-    why = shown.message
-    if trouble is not None and trouble.gone_s is not None:
-        why = f"a moment ago: {trouble.explanation.message}"
-    words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why}"
-    explanation = Explanation(reason=reason, message=one_line(words, LONGEST_MESSAGE))
-    return after(situation, Wait(key=FIRST_STEP, seconds=seconds), explanation)
+def _findings(checks: Sequence[Check], situation: ReplicaContext) -> list[Finding]:
+    return [finding for check in checks if (finding := check(situation)) is not None]
 
 
-def _trouble(situation: ReplicaContext, shown: Explanation) -> WaitingReason | None:
-    """Return the cause that delays the first step, even if the kubelet stops reporting it for a moment."""
-    if shown.reason not in _NO_TROUBLE:
-        return WaitingReason(explanation=shown)
-    last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
-    if last is None:
-        return None
-    gone_s = now_s if last.gone_s is None else last.gone_s
-    return replace(last, gone_s=gone_s) if now_s - gone_s <= MOMENT_S else None
-
-
-def _is_past_its_start(situation: ReplicaContext) -> bool:
-    """Return whether the trainer runs and does not report that its simulators still start."""
-    polled = situation.seen.polled
-    return current_state.runs(situation) and (polled is None or polled.status.phase != STARTING)
-
-
-def _first(holding: Sequence[tuple[CheckKind, Finding]], kind: CheckKind) -> Finding | None:
-    return next((finding for each, finding in holding if each is kind), None)
+def _first(findings: Sequence[Finding]) -> Finding | None:
+    """Return the first finding that holds now."""
+    return next((finding for finding in findings if finding.left_s <= 0), None)
 
 
 def _refused(situation: ReplicaContext, shown: Finding) -> Finding:
@@ -146,55 +204,3 @@ def _refused(situation: ReplicaContext, shown: Finding) -> Finding:
 def _verdict(situation: ReplicaContext, finding: Finding) -> ReplicaVerdict:
     phase = Phase.RUNNING if current_state.runs(situation) else Phase.PENDING
     return ReplicaVerdict(phase=finding.phase or phase, explanation=finding.explanation)
-
-
-_NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
-SHOWN = frozenset(
-    {CheckKind.COUNTED, CheckKind.WAITING, CheckKind.SHOWN}
-)  # these classes set the reason of a replica that continues
-
-JUDGED: tuple[tuple[CheckKind, Check], ...] = (
-    (CheckKind.ENDED, job_end.ended_by_others),
-    (CheckKind.ENDED, job_end.job_is_complete),
-    (CheckKind.ENDED, job_end.stopped),
-    (CheckKind.ENDED, job_end.trainer_was_done),
-    (CheckKind.ENDED, job_end.would_end_the_same),
-    (CheckKind.ENDED, job_end.backoff_limit_spent),
-    (CheckKind.ENDED, job_end.job_failed),
-    (CheckKind.FINAL, remaining_containers.trainer_is_done),
-    (CheckKind.FINAL, failure_checks.active_deadline),
-    (CheckKind.FINAL, failure_checks.cannot_be_planned),
-    (CheckKind.FINAL, failure_checks.image_name_is_invalid),
-    (CheckKind.FINAL, eviction.replaced_too_often),
-    (CheckKind.FINAL, failure_checks.no_progress),
-    (CheckKind.FINAL, start_timeout),
-    (CheckKind.WAITING, current_state.held),
-    (CheckKind.WAITING, waiting_reasons.objects_refused),
-    (CheckKind.WAITING, waiting_reasons.node_lost),
-    (CheckKind.SHOWN, current_state.suspending),
-    (CheckKind.SHOWN, current_state.suspended),
-    (CheckKind.WAITING, waiting_reasons.name_taken),
-    (CheckKind.WAITING, waiting_reasons.old_pod_holds_claim),
-    (CheckKind.WAITING, waiting_reasons.pods_refused),
-    (CheckKind.COUNTED, eviction.marked),
-    (CheckKind.COUNTED, eviction.restart_policy_dropped),
-    (CheckKind.WAITING, waiting_reasons.unschedulable),
-    (CheckKind.WAITING, waiting_reasons.volume_not_mounted),
-    (CheckKind.WAITING, waiting_reasons.image_does_not_come),
-    (CheckKind.WAITING, waiting_reasons.container_refused),
-    (CheckKind.COUNTED, eviction.trainer_never_started),
-    (CheckKind.COUNTED, eviction.stalled),
-    (CheckKind.COUNTED, eviction.ended_by_probe),
-    (CheckKind.COUNTED, remaining_containers.pod_outlives_trainer),
-    (CheckKind.WAITING, remaining_containers.kept_alive),
-    (CheckKind.WAITING, waiting_reasons.sidecar_out_of_memory),
-    (CheckKind.WAITING, waiting_reasons.sidecar_crash_loops),
-    (CheckKind.WAITING, waiting_reasons.simulator_not_up),
-    (CheckKind.WAITING, waiting_reasons.pod_filled_its_storage),
-    (CheckKind.WAITING, waiting_reasons.pod_was_taken),
-    (CheckKind.WAITING, waiting_reasons.volume_is_full),
-    (CheckKind.WAITING, waiting_reasons.pod_failed),
-    (CheckKind.SHOWN, current_state.trainer_has_ended),
-    (CheckKind.SHOWN, current_state.trains),
-    (CheckKind.SHOWN, current_state.starts),
-)

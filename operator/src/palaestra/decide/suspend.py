@@ -68,7 +68,9 @@ def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
     """Return the client or field that suspended the Job of a replica, with the way to resume it."""
     if seen.job is None or not overruled(job, seen.job):
         return BY_SPEC
-    return f"{seen.switcher or SOMEBODY}, not by spec.suspend; it goes on when Job {seen.job.name} is resumed"
+    return (
+        f"{seen.switcher or SOMEBODY}, not by spec.suspend; it continues when Job {seen.job.name} is resumed"
+    )
 
 
 def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
@@ -76,7 +78,7 @@ def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
     if seen.job is None or not job.spec.suspend or seen.job.suspended:
         return ""
     if seen.job.queue:
-        return f"; spec.suspend is not heeded, as queue {seen.job.queue} starts and stops it"
+        return f"; spec.suspend has no effect, because queue {seen.job.queue} starts and stops it"
     if overruled(job, seen.job):
-        return f"; resumed by {seen.switcher or SOMEBODY} though spec.suspend is true"
+        return f"; resumed by {seen.switcher or SOMEBODY} although spec.suspend is true"
     return ""

@@ -7,19 +7,15 @@ from typing import Any
 from pydantic import ValidationError
 
 from palaestra.api import TrainingJob, validate
-from palaestra.api.reasons import Reason, say
+from palaestra.api.reason_texts import say
+from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase, Status
+from palaestra.decide.actions import expired, expires
 from palaestra.decide.clocks import first_of, seconds_to, whole
-from palaestra.decide.conditions import (
-    ConditionState,
-    Explanation,
-    condition_states,
-    conditions,
-    reconciliation,
-)
 from palaestra.decide.decision import Decision
 from palaestra.decide.events import emitted, of_actions, of_change
-from palaestra.decide.ttl import expired, expires
+from palaestra.decide.explanation import Explanation
+from palaestra.decide.job_status import ConditionState, condition_states, conditions, reconciliation
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.json_access import count, part, text
 

@@ -4,22 +4,29 @@ The API server, the scheduler and the kubelet retry by themselves. `palaestra.de
 order of these checks.
 """
 
+import re
 from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
-from palaestra.decide.checkpoints import next_pod
 from palaestra.decide.clocks import Wait
-from palaestra.decide.conditions import Explanation
-from palaestra.decide.oom_kills import killed_for_memory, kills_of, limit_of
-from palaestra.decide.pod_size_remedy import remedy_of
-from palaestra.decide.replica_context import Finding, ReplicaContext, after, explain, first_waiting, found
+from palaestra.decide.explanation import Explanation, explain
+from palaestra.decide.pod_end import (
+    full_volume,
+    how_it_failed,
+    killed_for_memory,
+    kills_of,
+    limit_of,
+    mark_of,
+    storage_eviction,
+)
+from palaestra.decide.replica_context import Finding, ReplicaContext, after, first_waiting, found, next_pod
 from palaestra.decide.restart_counts import exit_code, failed_by_itself
 from palaestra.decide.suspend import ended_by_suspension
-from palaestra.observe.models import ContainerKind, ContainerView, PodView
+from palaestra.observe.models import ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
-from palaestra.plan.replica import SIMULATOR_PREFIX
-from palaestra_protocol.pod.status import SimulatorStatus, Termination
+from palaestra.plan.replica import INSTALL_SIDECAR, ROS_MASTER, SIMULATOR_PREFIX, TRAINER
+from palaestra_protocol.pod.status import SimulatorStatus
 
 LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
 CRASHES = 3  # of one sidecar, after which the status reports a crash loop
@@ -31,7 +38,13 @@ MAKING = frozenset(
     {"CreateContainerConfigError", "CreateContainerError", "RunContainerError", "PreStartHookError",
      "PostStartHookError"}
 )  # fmt: skip
-FULL = "StorageFull"  # beginning of a termination message
+
+# These match the messages of Kubernetes' admission plugins ResourceQuota and LimitRanger.
+_UNSPECIFIED = re.compile(r"must specify (?P<containers>.+)$")
+_NAMES = re.compile(r"for: (?P<names>[a-z0-9,-]+)")
+_SIZES = re.compile(r"\b(?:usage|ratio) per (?:Container|Pod) is ")
+
+_EVERY = "spec.rosMaster.resources, spec.simulators[].resources and spec.trainer.resources"
 
 
 def objects_refused(situation: ReplicaContext) -> Finding | None:
@@ -71,7 +84,7 @@ def pods_refused(situation: ReplicaContext) -> Finding | None:
 
 def _not_admitted(words: str) -> Explanation:
     """Quote the API server's message, and add the fields of the job that it does not name."""
-    return explain(Reason.PODS_REFUSED, words=words, remedy=remedy_of(words))
+    return explain(Reason.PODS_REFUSED, words=words, remedy=_remedy_of(words))
 
 
 def node_lost(situation: ReplicaContext) -> Finding | None:
@@ -202,21 +215,6 @@ def of_image(stuck: ContainerView) -> Finding:
     return found(Reason.IMAGE_PULL, container=stuck.name, image=stuck.image, words=words)
 
 
-def mark_of(situation: ReplicaContext, pod: PodView) -> Explanation | None:
-    """Return the reason for the replacement of a pod, by the mark on its Job, or None."""
-    mark = situation.seen.job.replaced if situation.seen.job is not None else None
-    if mark is None or mark.pod != pod.uid:
-        return None
-    return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
-
-
-def probe_failed(situation: ReplicaContext, pod: PodView) -> Explanation:
-    """Return the explanation for a trainer that the kubelet ended because a probe failed."""
-    code, probe, begins = exit_code(pod), situation.seen.probe, next_pod(situation)
-    how = f"exit code {code}"
-    return explain(Reason.PROBE_FAILED, pod=pod.name, probe=probe, how=how, next_pod=begins)
-
-
 def _not_up(
     situation: ReplicaContext, pod: PodView, simulator: SimulatorStatus, sidecar: ContainerView
 ) -> Finding:
@@ -235,21 +233,6 @@ def crashing(pod: PodView | None) -> tuple[ContainerView, ...]:
     )
 
 
-def storage_eviction(pod: PodView) -> Explanation | None:
-    """Return the reason if a node evicted the pod because it wrote too much, else None."""
-    if pod.reason != "Evicted" or "ephemeral" not in pod.message.lower():
-        return None
-    return explain(Reason.EPHEMERAL_STORAGE, pod=pod.name, words=pod.message)
-
-
-def full_volume(word: Termination | None) -> Explanation | None:
-    """Return the reason if a trainer could not write to its full volume, else None."""
-    if word is None or not word.reason.startswith(FULL):
-        return None
-    fact = word.reason.partition(": ")[2].partition("; ")[0]  # the reason has its own remedy
-    return explain(Reason.STORAGE_FULL, words=fact or "no space left")
-
-
 def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation:
     """Return the reason for a sidecar that crashed."""
     if container.simulates and killed_for_memory(container):
@@ -260,46 +243,24 @@ def of_crash(situation: ReplicaContext, container: ContainerView) -> Explanation
     return explain(Reason.SIDECAR_CRASH_LOOP, container=container.name, times=times, how=f"exit code {code}")
 
 
-def how_it_failed(situation: ReplicaContext, pod: PodView) -> str:
-    """Return the most detailed known description of a pod's failure."""
-    word = situation.seen.terminations.get(pod.uid)
-    trainer = pod.trainer
-    if trainer is not None and killed_for_memory(trainer):
-        return "the trainer was killed because it ran out of memory"
-    code = exit_code(pod)
-    newest = situation.seen.pod is not None and situation.seen.pod.uid == pod.uid
-    if newest and situation.seen.probe:
-        return (
-            f"exit code {code}, the kubelet ended the trainer because its {situation.seen.probe} probe failed"
-        )
-    if word is not None and word.reason:
-        return f"exit code {code}, {word.reason}"
-    if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:
-        line = _last_line(before) or before.exit.reason or "no word"
-        return f"container {before.name}: exit code {before.exit.code}, {line}"
-    words = _last_line(trainer) or pod.message or pod.reason or "no message from the trainer"
-    return f"exit code {code}, {words}" if code is not None else words
+def _remedy_of(words: str) -> str:
+    """Return the clause that names the fields to set, for the end of a message; "" for any other refusal.
+
+    A quota on limits or a LimitRange refuses the pod. The API server's message names containers, but a person
+    sets fields. No field has the name of the ROS master's container or of `install-sidecar`.
+    """
+    if (unspecified := _UNSPECIFIED.search(words)) is not None:
+        names = ",".join(_NAMES.findall(unspecified["containers"])).split(",")
+        fields = " and ".join(sorted({field for name in names if (field := _field(name))}))
+    else:
+        fields = _EVERY if _SIZES.search(words) is not None else ""
+    return f"; a new job sets {fields}, the chart sets jobs.resources for all jobs" if fields else ""
 
 
-def _failed_before(pod: PodView) -> ContainerView | None:
-    """Return the failed container among those that must succeed before the others start, if any."""
-    init = (container for container in pod.containers if container.kind is ContainerKind.INIT)
-    return next((container for container in init if container.exit is not None and container.exit.code), None)
-
-
-def left_by(pod: PodView) -> str:
-    """Return the end of the log of a pod's trainer, or of the init container that kept it from starting."""
-    failed = _failed_before(pod)
-    trainer = pod.trainer
-    ends = [
-        container.exit
-        for container in (trainer, failed)
-        if container is not None and container.exit is not None
-    ]
-    return next((end.message for end in ends if end.message), "")
-
-
-def _last_line(container: ContainerView | None) -> str:
-    """Return the last line of a container's termination message."""
-    log = container.exit.message if container is not None and container.exit is not None else ""
-    return next(iter(log.strip().splitlines()[-1:]), "")
+def _field(container: str) -> str:
+    """Return the field with the resources of a container; "" if a webhook has added the container."""
+    if container == TRAINER:
+        return "spec.trainer.resources"
+    if container in {ROS_MASTER, INSTALL_SIDECAR}:
+        return "spec.rosMaster.resources"
+    return "spec.simulators[].resources" if container.startswith(SIMULATOR_PREFIX) else ""

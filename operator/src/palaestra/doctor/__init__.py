@@ -1,7 +1,8 @@
 """Check a cluster and report why TrainingJobs do not run in it, with the remedy.
 
+The order of the checks is here: causes come before their consequences. The modules have the checks:
+
 - `check_result`: the result of a check
-- `run`: all checks in their order
 - `platform`: the cluster: version, CRD, namespace, sidecars and storage
 - `installation`: the operator: its replicas, images, leader, rights and metrics
 - `rbac`: the permissions of the operator and of users
@@ -9,7 +10,56 @@
 No check changes anything; a check that must create an object does a dry run.
 """
 
-from palaestra.doctor.check_result import CheckResult, CheckStatus, Site
-from palaestra.doctor.run import CHECKS, examine
+from collections.abc import Iterator, Mapping
+
+from palaestra.cluster import ApiError, Forbidden, Untrusted
+from palaestra.doctor.check_result import Check, CheckResult, CheckStatus, Site, unknown, wrong
+from palaestra.doctor.installation import images, leads, metrics, operator_rights, runs
+from palaestra.doctor.platform import answers, definition, namespace, nodes, sidecars, storage
+from palaestra.doctor.rbac import own_rights
 
 __all__ = ["CHECKS", "CheckResult", "CheckStatus", "Site", "examine"]
+
+CHECKS: tuple[tuple[str, Check], ...] = (
+    ("API server", answers),
+    ("nodes", nodes),
+    ("TrainingJobs", definition),
+    ("namespace", namespace),
+    ("your rights", own_rights),
+    ("sidecars", sidecars),
+    ("storage class", storage),
+    ("operator", runs),
+    ("images", images),
+    ("leader", leads),
+    ("operator's rights", operator_rights),
+    ("metrics", metrics),
+)
+# If the key check fails, the other checks would fail too or mislead: RBAC also grants rights in a namespace
+# that does not exist.
+POINTLESS: Mapping[Check, frozenset[Check]] = {
+    answers: frozenset(check for _, check in CHECKS),
+    namespace: frozenset({own_rights, sidecars, operator_rights}),
+}
+
+
+def examine(site: Site) -> Iterator[CheckResult]:
+    """Yield the results of each check; after a failed check, skip those that `POINTLESS` lists for it."""
+    skipped: frozenset[Check] = frozenset()
+    for what, check in CHECKS:
+        if check in skipped:
+            continue
+        found = list(_findings(what, check, site))
+        yield from found
+        if any(finding.verdict is CheckStatus.WRONG for finding in found):
+            skipped |= POINTLESS.get(check, frozenset())
+
+
+def _findings(what: str, check: Check, site: Site) -> Iterator[CheckResult]:
+    try:
+        yield from check(site)
+    except Forbidden as error:
+        yield unknown(what, f"you have no permission: {error.message}", "ask a cluster administrator")
+    except Untrusted as error:
+        yield wrong(what, error.fact, error.remedy)
+    except ApiError as error:
+        yield wrong(what, str(error), "check the API server and the connection to it")

@@ -133,9 +133,8 @@ def metrics(site: Site) -> Iterator[CheckResult]:
     except ApiError as error:
         yield unknown(
             "metrics",
-            f"port {port} of pod {name} does not answer the API server: {error}",
-            "if a NetworkPolicy admits only Prometheus, look at Prometheus' targets; otherwise "
-            + _logs(site),
+            f"port {port} of pod {name} does not respond to the API server: {error}",
+            "if a NetworkPolicy admits only Prometheus, check Prometheus' targets; otherwise " + _logs(site),
         )
         return
     if "palaestra_" in text:

@@ -36,7 +36,7 @@ def nodes(site: Site) -> Iterator[CheckResult]:
     """Check whether the oldest kubelet supports sidecar containers."""
     versions = [node["status"]["nodeInfo"]["kubeletVersion"] for node in site.api.list(NODES)]
     if not versions:
-        yield wrong("nodes", "there are none", "add a node, so that pods can run")
+        yield wrong("nodes", "the cluster has no nodes", "add a node, so that pods can run")
         return
     yield judged_version("nodes", min(versions, key=release))
 
@@ -165,6 +165,6 @@ def storage(site: Site) -> Iterator[CheckResult]:
     names = ", ".join(class_["metadata"]["name"] for class_ in classes)
     yield wrong(
         "storage class",
-        f"none is the default; the classes are {names}" if names else "there is none",
+        f"none is the default; the classes are {names}" if names else "the cluster has no storage class",
         f"annotate one with {DEFAULT_CLASS}=true, or name one in spec.storage.storageClassName of each job",
     )

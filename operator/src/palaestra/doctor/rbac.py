@@ -64,7 +64,7 @@ OPERATOR = (
 OPERATOR_WITH_KUEUE = (may("kueue.x-k8s.io", "workloads", "list"),)
 
 TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
-    ("look at jobs", (may("palaestra.dev", "trainingjobs", "get list watch"), may("", "events", "list"))),
+    ("read jobs", (may("palaestra.dev", "trainingjobs", "get list watch"), may("", "events", "list"))),
     ("author jobs", (may("palaestra.dev", "trainingjobs", "create patch delete"),)),
     ("read logs", (may("", "pods/log", "get"),)),
     (
@@ -76,7 +76,7 @@ TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
         ),
     ),
 )
-NECESSARY = frozenset({"look at jobs", "author jobs"})  # only some people need the others
+NECESSARY = frozenset({"read jobs", "author jobs"})  # only some people need the other permissions
 
 
 def own_rights(site: Site) -> Iterator[CheckResult]:

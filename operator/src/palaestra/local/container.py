@@ -43,7 +43,7 @@ class Running:
         self.log = log
         self.ends = 0
         self.started = False  # it has passed its startup probe once, or has no startup probe
-        self._news = asyncio.Event()  # it started, or ended
+        self._news = asyncio.Event()  # set when the container has started or ended
         self._pod = pod
         self._env = marked(spec.env, pod.uid, spec.name)
         self._backoff = backoff

@@ -1,6 +1,6 @@
 """End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends the run too.
 
-A signal that was ignored when the program started stays ignored; SIGTERM always ends a run.
+A signal that was ignored when the program started stays ignored, except SIGTERM, which always ends a run.
 """
 
 import asyncio

@@ -7,6 +7,10 @@ A marker in their environment identifies a pod's processes. Grandchildren inheri
 forks and new process groups, where a parent-death signal or a process group would miss them. Between a fork
 and its exec a child still holds the pipe, so no process is missed.
 
+The reaper of a sidecar works in another way: it is the parent of a simulator's processes, so it needs no
+marker and also finds those that change their environment. This program cannot be the parent, because the
+runner itself starts and restarts the processes of a pod.
+
 It uses only the standard library and nothing from this package, because it is started as a file, with `python
 -I -S`.
 """

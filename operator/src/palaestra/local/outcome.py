@@ -93,9 +93,12 @@ def uses(run_directory: Path) -> tuple[str, ...]:
     """
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
+    report = run_directory / "report.html"
     ways = {
+        "report": str(report) if report.exists() else "",
         "look at it": typed("tensorboard", "--logdir", curves) if curves.exists() else "",
         "try the policy": typed("palaestra-eval", run_directory) if measurable else "",
+        "take it along": typed("palaestra", "export", run_directory, "--to", "onnx") if measurable else "",
     }
     return _lines(ways)
 

@@ -1,24 +1,34 @@
 """Write the output of containers to files, and show some of it.
 
 Every line goes to `logs/<container>.log`, a file of limited size (`bounded_log`). The lines of some
-containers are also shown, after the container's name. The trainer may draw on the person's terminal
-(`terminal`) instead.
+containers are also shown.
+
+The trainer may draw on the person's terminal instead. It gets a pseudo terminal of the same size, and its
+output is copied unchanged. The log gets only whole lines, without colors and without text that was redrawn in
+place, such as a progress bar.
 """
 
 import asyncio
+import fcntl
 import os
+import re
+import struct
 import sys
+import termios
+import tty
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
 from palaestra.local.bounded_log import LimitedFile
 from palaestra.local.errors import StorageFailed
-from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]
 KEPT_LINES = 20  # enough to see the reason of a program's end, without opening the file
 CHUNK = 65536
+RESTORED = b"\x1b[0m\x1b[?25h"  # no color, and a visible cursor; a killed program does not restore them
+_CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-_])")
+_NO_SIZE = struct.pack("HHHH", 24, 80, 0, 0)
 
 
 class Log:
@@ -32,7 +42,6 @@ class Log:
         """
         self.path = folder / f"{name}.log"
         self._show = show
-        self._prefix = f"[{name}] "
         self._rest = b""
         self._tail: deque[str] = deque(maxlen=KEPT_LINES)
         self._open: set[asyncio.Future[None]] = set()
@@ -100,7 +109,7 @@ class Log:
         self._tail.append(line)
         self._write(line)
         if self._show is not None:
-            self._show(self._prefix + line)
+            self._show(line)
 
     def _write(self, line: str) -> None:
         self._limited.write(line.encode(errors="replace") + b"\n")
@@ -113,3 +122,25 @@ def say(text: str) -> None:
         sys.stdout.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def open_like(terminal: int) -> tuple[int, int]:
+    """Return (ours, theirs): the two ends of a pseudo terminal with the size of `terminal`."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)  # line ends stay unchanged; the person's terminal converts them
+    resize(ours, terminal)
+    return ours, theirs
+
+
+def resize(ours: int, terminal: int) -> None:
+    """Set the size of our end to that of `terminal`."""
+    try:
+        size = fcntl.ioctl(terminal, termios.TIOCGWINSZ, _NO_SIZE)
+    except OSError:  # not a terminal, so it has no size
+        size = _NO_SIZE
+    fcntl.ioctl(ours, termios.TIOCSWINSZ, size)
+
+
+def as_seen(line: str) -> str:
+    """Return the visible text of a line, without overwritten text."""
+    return _CONTROL.sub("", line.rstrip("\r").rpartition("\r")[2])

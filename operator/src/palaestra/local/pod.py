@@ -20,7 +20,7 @@ from palaestra.local.pod_spec import Container, Pod
 from palaestra.local.process import OrphanKiller
 
 LONG_S = 10.0  # for the start of a container; the import of PyTorch takes several seconds
-TRIES = 3  # runs of a sidecar that others wait for, after which the pod has failed
+TRIES = 3  # if a sidecar that other containers wait for has failed so often, the pod fails
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Kubelet:
     `show` is called with a line for each container that has not started within `long_s`.
     """
 
-    logs: Mapping[str, Log]  # by container
+    logs: Mapping[str, Log]  # keys: the names of containers
     backoff: BackOff = field(default_factory=BackOff)
     start_deadline_s: float = 60.0
     show: Show | None = None

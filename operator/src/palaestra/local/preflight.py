@@ -15,6 +15,7 @@ from palaestra.local.errors import RunRefused
 from palaestra.local.files import without_locks
 from palaestra.local.run_directory import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
+from palaestra_protocol.linux import lack_of_linux
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import RootError, WorldError
@@ -51,6 +52,9 @@ def check(request: PreflightRequest) -> None:
 def processes_can_be_found(request: PreflightRequest) -> Iterator[str]:
     """The system has Linux' /proc, in which the runner finds the processes that a container leaves behind."""
     del request
+    if (problem := lack_of_linux()) is not None:
+        yield f"a run on this machine {problem}"
+        return
     try:
         ENVIRONMENT.read_bytes()
     except OSError as error:

@@ -10,12 +10,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from threading import Thread
 from typing import Self
 
 from palaestra.local import orphan_killer
-from palaestra.local.child_end import when_ended
 
 NOT_RUNNABLE = 127  # a shell's exit code for a program that it cannot find
 
@@ -30,7 +30,15 @@ class Process:
         when_ended(started.pid, self._report)
 
     @classmethod
-    def start(cls, command: Sequence[str], env: Mapping[str, str], *, stdout: int, stderr: int) -> Self:
+    def start(
+        cls,
+        command: Sequence[str],
+        env: Mapping[str, str],
+        *,
+        stdout: int,
+        stderr: int,
+        stdin: int = subprocess.DEVNULL,
+    ) -> Self:
         """Start `command` with exactly `env`; the caller still has to close the descriptors.
 
         Raises:
@@ -40,7 +48,7 @@ class Process:
             subprocess.Popen(
                 command,
                 env=env,
-                stdin=subprocess.DEVNULL,
+                stdin=stdin,
                 stdout=stdout,
                 stderr=stderr,
                 start_new_session=True,
@@ -120,3 +128,31 @@ def program_path() -> str:
 async def end_marked(pod_uid: str, container: str) -> None:
     """Kill the remaining processes of a container, because it ends with its first process."""
     await asyncio.to_thread(orphan_killer.sweep, f"{pod_uid}/{container}/")
+
+
+def when_ended(pid: int, report: Callable[[], object]) -> None:
+    """Call `report` from a thread once a child of this process has ended; the caller must still reap it.
+
+    `os.pidfd_open` would need no thread. But old kernels, Pythons that were built for an old kernel, and the
+    seccomp filters of older container runtimes do not allow it.
+    """
+    Thread(target=_wait, args=(pid, report), name=f"end of {pid}", daemon=True).start()
+
+
+def end_descriptor(pid: int) -> int:
+    """Return a descriptor that is readable once a child of this process has ended; the caller closes it."""
+    reader, writer = os.pipe()
+
+    def tell() -> None:
+        with contextlib.suppress(BrokenPipeError):  # the reader is closed
+            os.write(writer, b"\n")  # a forked process may have a copy, so closing would not suffice
+        os.close(writer)
+
+    when_ended(pid, tell)
+    return reader
+
+
+def _wait(pid: int, report: Callable[[], object]) -> None:
+    with contextlib.suppress(ChildProcessError):  # already reaped
+        os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+    report()

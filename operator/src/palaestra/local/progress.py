@@ -4,12 +4,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from palaestra.local.probe import DIRECT
+from palaestra.plan.training import FILE, RunAddresses
 from palaestra_protocol.fields import MOST_BYTES, decoded
 from palaestra_protocol.pod.enums import FaultKind
-from palaestra_protocol.pod.status import TrainerStatus
+from palaestra_protocol.pod.status import SuccessInterval, TrainerStatus
 
 ANSWER_S = 2.0
 
@@ -24,6 +23,7 @@ class RunProgress:
         target: steps at which the run ends; 0 before the trainer's first response.
         steps_per_second: recently.
         success_rate: of the last evaluation, 0 to 1.
+        success_interval: the interval around `success_rate`.
         mean_return: of recent training episodes.
         faults: of all simulators, over all attempts.
     """
@@ -33,6 +33,7 @@ class RunProgress:
     target: int = 0
     steps_per_second: float | None = None
     success_rate: float | None = None
+    success_interval: SuccessInterval | None = None
     mean_return: float | None = None
     faults: int = 0
 
@@ -42,7 +43,7 @@ class ProgressReader:
 
     def __init__(self, directory: Path) -> None:
         """Record the file of an earlier run in the directory; another program may have its address by now."""
-        self._file = directory / "training.yaml"
+        self._file = directory / FILE
         self._stale = self._written()
         self._last = RunProgress()
 
@@ -55,6 +56,7 @@ class ProgressReader:
                 target=status.target,
                 steps_per_second=status.steps_per_second,
                 success_rate=status.success_rate,
+                success_interval=status.success_interval,
                 mean_return=status.mean_return,
                 faults=sum(status.faults.values()) - status.faults.get(FaultKind.SLOW, 0),
             )
@@ -64,8 +66,8 @@ class ProgressReader:
         written = self._written()
         if written is None or written == self._stale:
             return None
-        with suppress(OSError, ValueError, LookupError, TypeError, yaml.YAMLError):
-            address = yaml.safe_load(self._file.read_bytes())["statusAddress"]
+        with suppress(OSError, ValueError):
+            address = RunAddresses.read(self._file.read_bytes()).status
             with DIRECT.open(f"http://{address}/status", timeout=ANSWER_S) as answer:
                 return TrainerStatus.from_json(decoded(answer.read(MOST_BYTES)))
         return None  # the trainer has not started, is between two attempts, or has ended

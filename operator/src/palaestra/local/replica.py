@@ -3,21 +3,22 @@
 import asyncio
 import contextlib
 import json
+import shutil
 import uuid
-from collections.abc import Container
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from palaestra.local.container import BackOff
 from palaestra.local.errors import KILLED
+from palaestra.local.files import make_folder, storage, write
 from palaestra.local.interrupt import Interrupt
 from palaestra.local.outcome import RunOutcome
 from palaestra.local.output import Log, Show, say
 from palaestra.local.pod import Kubelet, RunningPod
 from palaestra.local.pod_spec import Pod, read_pod
 from palaestra.local.retry_policy import Tries, verdict
-from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
 from palaestra.plan.containers import BUILT_IN
 from palaestra_protocol.pod.enums import SILENT
@@ -32,13 +33,14 @@ ENDED_BY_OTHERS = f"ProgramEnded: {SILENT}"
 class Setting:
     """The folder of a replica, its output, and its deadline.
 
-    `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal on which the
-    trainer may draw, or None. `deadline_s` is for all pods together; None: no deadline.
+    `shown` are functions that show a line of a container's output, by container. `terminal` is the descriptor
+    of a terminal on which the trainer may draw, or None. `deadline_s` is for all pods together; None: no
+    deadline.
     """
 
     directory: Path
     show: Show | None = None
-    shown: Container[str] = ()
+    shown: Mapping[str, Show] = field(default_factory=dict)
     terminal: int | None = None
     backoff: BackOff = field(default_factory=BackOff)
     deadline_s: float | None = None
@@ -98,7 +100,7 @@ async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt)
 def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str, Log]:
     folder = setting.directory / "logs"
     logs = {
-        container.name: Log(container.name, folder, setting.show if container.name in setting.shown else None)
+        container.name: Log(container.name, folder, setting.shown.get(container.name))
         for container in pod.containers
     }
     for log in logs.values():
@@ -129,7 +131,7 @@ def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int)
     word, summary = _json(_termination(directory)), _json(directory / "summary.json")
     said = {**word, **summary}
     code = int(ExitCode.INTERRUPTED) if code is None else code
-    if code == ExitCode.DONE and not said and _trains_by_itself(planned):
+    if code == ExitCode.DONE and not said and trains_by_itself(planned):
         code, said["reason"] = FAILED, ENDED_BY_OTHERS
     checkpoint = word.get("last_checkpoint")
     return RunOutcome(
@@ -145,7 +147,8 @@ def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int)
     )
 
 
-def _trains_by_itself(planned: ReplicaPlan) -> bool:
+def trains_by_itself(planned: ReplicaPlan) -> bool:
+    """Return whether the trainer is the built-in loop, and not a program of the job."""
     (trainer,) = planned.job["spec"]["template"]["spec"]["containers"]
     return bool(trainer.get("command") == [BUILT_IN])
 
@@ -160,3 +163,25 @@ def _json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):  # missing, or incomplete because its writer was killed
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
+    """Create every volume at its mount path in the pod; an emptyDir is emptied for each pod.
+
+    Raises:
+        StorageFailed: a volume cannot be written.
+    """
+    for volume in volumes:
+        target = Path(pod.mounts[volume["name"]])
+        if "configMap" in volume:
+            _show(volume["configMap"], config_map, target)
+            continue
+        if "emptyDir" in volume and volume["name"] != "run":
+            with storage(target):
+                shutil.rmtree(target, ignore_errors=True)
+        make_folder(target)
+
+
+def _show(source: Mapping[str, Any], config_map: Mapping[str, Any], target: Path) -> None:
+    for item in source["items"]:
+        write(target / item["path"], config_map["data"][item["key"]].encode())

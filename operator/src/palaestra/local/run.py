@@ -8,21 +8,26 @@ at the same time.
 import asyncio
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from palaestra.api import TrainingJob
 from palaestra.local import preflight, run_directory
 from palaestra.local.errors import KILLED, RunRefused
 from palaestra.local.outcome import RunOutcome, summary
-from palaestra.local.output import say
+from palaestra.local.output import Show, say
 from palaestra.local.pod_spec import read_pod
 from palaestra.local.ports import HeldPorts
-from palaestra.local.replica import DEADLINE_EXCEEDED, Setting, meaning, run_replica
+from palaestra.local.progress import ProgressReader
+from palaestra.local.progress_line import show_progress
+from palaestra.local.readable_log import readable
+from palaestra.local.replica import DEADLINE_EXCEEDED, Setting, meaning, run_replica, trains_by_itself
+from palaestra.local.report import complete_report
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode
 
-SHOWN_LINES = 5  # of the trainer's log, if the trainer failed without a termination message
+SHOWN_LINES = 5  # the end of the log that is shown if the trainer failed without a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +113,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
         ports = chosen_ports(held, job, options)
         anew = options.fresh or run_directory.is_correction(path, record)
         if anew and (aside := run_directory.set_aside(path)):
-            say(f"{path}: the run that was there is now {aside}")
+            say(f"{path}: the earlier run was moved to {aside}")
         run_directory.refuse_another_job(path, record)
         before = RunOutcome.of(path)
         if before is not None and before.finished and not run_directory.is_prolonged(path, record):
@@ -116,7 +121,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
                 f"{job.metadata.name}-{replica}: finished already; "
                 "more spec.trainer.steps prolong it, --fresh starts a new run"
             )
-            _tell(before, path)
+            _tell(before, path, built_in=True)
             return before
         run_directory.prepare(path, record)
         planned = plan(job, layout(path.parent, options, ports), replicas=[replica]).replicas[replica]
@@ -126,35 +131,62 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: RunOptions) ->
 
 
 def _trained(planned: ReplicaPlan, path: Path, options: RunOptions, deadline_s: float | None) -> RunOutcome:
-    on_terminal = sys.stdout.isatty() and not options.verbose
+    built_in = trains_by_itself(planned)
+    draws = sys.stdout.isatty() and not options.verbose and not built_in
     setting = Setting(
         directory=path,
         show=say,
-        shown=_shown(planned, options, on_terminal=on_terminal),
-        terminal=sys.stdout.fileno() if on_terminal else None,
+        shown={} if draws else _shown(planned, verbose=options.verbose, built_in=built_in),
+        terminal=sys.stdout.fileno() if draws else None,
         deadline_s=deadline_s,
     )
-    outcome = asyncio.run(run_replica(planned, setting))
+    reader = ProgressReader(path) if built_in and not options.verbose else None
+    outcome = asyncio.run(_run(planned, setting, reader))
     outcome.keep(path)
-    _tell(outcome, path)
+    complete_report(path)
+    _tell(outcome, path, built_in=built_in)
     return outcome
 
 
-def _shown(planned: ReplicaPlan, options: RunOptions, *, on_terminal: bool) -> tuple[str, ...]:
-    """Return the containers whose lines are shown: all, or the trainer if it cannot draw."""
-    if options.verbose:
-        pod = planned.job["spec"]["template"]["spec"]
-        return tuple(container["name"] for container in (*pod["initContainers"], *pod["containers"]))
-    return () if on_terminal else (TRAINER,)
+async def _run(planned: ReplicaPlan, setting: Setting, reader: ProgressReader | None) -> RunOutcome:
+    """Run the replica, and show its progress in the meantime if there is a reader."""
+    if reader is None:
+        return await run_replica(planned, setting)
+    showing = asyncio.create_task(show_progress(reader, say))
+    try:
+        return await run_replica(planned, setting)
+    finally:
+        showing.cancel()
 
 
-def _tell(outcome: RunOutcome, path: Path) -> None:
-    if outcome.exit_code == ExitCode.INTERRUPTED:
+def _shown(planned: ReplicaPlan, *, verbose: bool, built_in: bool) -> dict[str, Show]:
+    """Return what shows the lines of containers: all containers, or the trainer only."""
+    if not verbose and built_in:
+        return {TRAINER: _say_readable}
+    pod = planned.job["spec"]["template"]["spec"]
+    names = [container["name"] for container in (*pod["initContainers"], *pod["containers"])]
+    return {name: partial(_say_of, name) for name in names if verbose or name == TRAINER}
+
+
+def _say_of(container: str, line: str) -> None:
+    say(f"[{container}] {line}")
+
+
+def _say_readable(line: str) -> None:
+    if (text := readable(line)) is not None:
+        say(text)
+
+
+def _tell(outcome: RunOutcome, path: Path, *, built_in: bool) -> None:
+    if outcome.exit_code in {ExitCode.INTERRUPTED, KILLED} and not built_in:
+        ended = "killed" if outcome.exit_code == KILLED else "interrupted"
+        say(f"{ended}; the same command starts its program again")
+    elif outcome.exit_code == ExitCode.INTERRUPTED:
         place = "before it trained" if outcome.steps is None else f"at step {outcome.steps}"
         after = "there" if outcome.saved in {None, outcome.steps} else f"step {outcome.saved}"
-        say(f"interrupted {place}; the same command goes on from {after}")
+        say(f"interrupted {place}; the same command continues from {after}")
     elif outcome.exit_code == KILLED:
-        say("killed; the same command goes on from the newest checkpoint")
+        say("killed; the same command continues from the newest checkpoint")
     elif outcome.reason == DEADLINE_EXCEEDED:
         say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds has passed; raise it to continue")
     elif not outcome.finished:

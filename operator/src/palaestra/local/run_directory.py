@@ -69,7 +69,8 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     """Lock a run directory for this process, and yield the descriptor of the lock.
 
     The kernel releases the lock when every process with this descriptor has closed it or ended. A process
-    that was started with the descriptor passes it as `taken`.
+    that was started with the descriptor passes it as `taken`; a record lock, which the trainer uses, could
+    not be passed on.
 
     Raises:
         RunRefused: another runner has it, or its file system has no locks.
@@ -96,8 +97,8 @@ def _take(directory: Path, path: Path) -> int:
         holder = os.read(descriptor, 32).decode(errors="replace").strip() or "unknown"
         os.close(descriptor)
         raise RunRefused(
-            f"{directory}: `palaestra run` is at work there (process {holder}); "
-            "wait for its end, or choose another folder with --dir"
+            f"{directory}: is in use by `palaestra run` (process {holder}); "
+            "wait until it ends, or choose another folder with --dir"
         ) from None
     except OSError as error:
         os.close(descriptor)

@@ -18,11 +18,11 @@ from palaestra.api import TrainingJob
 from palaestra.api.yaml_io import write
 from palaestra.job_input import Given, data_of, job_of
 from palaestra.local import run_directory
-from palaestra.local.child_end import end_descriptor
 from palaestra.local.child_main import ChildRequest
 from palaestra.local.errors import KILLED, RunRefused, StillRunning
 from palaestra.local.files import storage
 from palaestra.local.outcome import RunOutcome
+from palaestra.local.process import end_descriptor
 from palaestra.local.progress import ProgressReader, RunProgress
 from palaestra.local.run import RunOptions, check
 from palaestra.plan import identified

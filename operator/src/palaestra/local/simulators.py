@@ -15,7 +15,7 @@ PROGRAMS: Mapping[Driver, str] = {
     Driver.MUJOCO: "palaestra-mujoco",
     Driver.WEBOTS: "webots",
 }
-# The program is installed with the stub's, but its library is an extra.
+# palaestra-mujoco is installed together with the stub, but its library, MuJoCo, is an extra.
 _LIBRARIES = {"palaestra-mujoco": "mujoco"}
 _EXTRA = "install palaestra-sim[mujoco] (`make setup` does)"
 

@@ -15,7 +15,7 @@ from palaestra.observe.json_access import part, parts
 
 LACKS = "palaestra.dev/lacks"  # annotation of a cached copy
 LONGEST_TEXT = 256  # most characters of an inline world that is kept unchanged
-MOST_CHARACTERS = 32_768  # of a cached copy without its status; a usual job has 4,000
+MOST_CHARACTERS = 32_768  # a cached copy without its status may have so many; a usual job has 4,000
 
 # Fields that may be large: lists and maps of texts. No decision needs them once the objects exist.
 _LARGE_OF_SPEC = frozenset({"imagePullSecrets", "rosMaster"})

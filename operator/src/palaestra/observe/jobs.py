@@ -6,6 +6,7 @@ from palaestra.observe.json_access import condition, count, holds, part, parts, 
 from palaestra.observe.models import JobEnd, JobView, Raw, Replaced, Suspended
 from palaestra.plan.job import QUEUE_LABEL, SUSPEND_SET
 
+MOST_NAME = 128  # the API server's limit for a field manager's name
 # The fields of a Job's spec, besides `suspend`, that other clients can change.
 SETTINGS = ("parallelism", "backoffLimit", "activeDeadlineSeconds", "ttlSecondsAfterFinished")
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
@@ -91,3 +92,13 @@ def _volumes(raw: Raw) -> frozenset[str]:
         for kind, name in (("configMap", "name"), ("persistentVolumeClaim", "claimName"))
     )
     return frozenset(name for name in names if name)
+
+
+def suspends(raw: Raw) -> str:
+    """Return the field manager that last set a Job's `spec.suspend`; "" if the object does not name it."""
+    entries = [
+        (text(entry, "time"), text(entry, "manager", MOST_NAME))
+        for entry in parts(raw, "metadata", "managedFields")
+        if "f:suspend" in part(entry, "fieldsV1", "f:spec")
+    ]
+    return max(entries, default=("", ""))[1]

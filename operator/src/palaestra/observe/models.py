@@ -15,7 +15,7 @@ from palaestra.plan.pod import GRACE_S
 from palaestra.plan.replica import ROS_MASTER, SIMULATOR_PREFIX, TRAINER
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
-SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # the starts of the names of the plan's sidecars
+SIDECARS = (SIMULATOR_PREFIX, ROS_MASTER)  # the names of a plan's sidecars begin with these
 
 Raw = Mapping[str, Any]  # an object as untrusted JSON
 

@@ -7,9 +7,8 @@ from typing import Any
 
 from palaestra.api import TrainingJob
 from palaestra.api.text import one_line
-from palaestra.observe.jobs import job_view
+from palaestra.observe.jobs import MOST_NAME, job_view
 from palaestra.observe.json_access import MOST_TEXT, count, owners, part, text, time
-from palaestra.observe.managed_fields import MOST_NAME
 from palaestra.observe.models import (
     CreateFailure,
     ForeignJob,

@@ -8,7 +8,7 @@ from palaestra.observe.models import ContainerExit, ContainerKind, ContainerView
 from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import ExitCode
 
-MOST_MESSAGE = 4096  # of a termination message, Kubernetes' limit
+MOST_MESSAGE = 4096  # Kubernetes' limit for a termination message
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # the value for an unreadable time
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
@@ -73,7 +73,7 @@ def _disruption(raw: Raw) -> str:
     if not holds(raw, "DisruptionTarget"):
         return ""
     target = condition(raw, "DisruptionTarget")
-    return text(target, "message") or text(target, "reason") or "it was taken"
+    return text(target, "message") or text(target, "reason") or "it was disrupted"
 
 
 def _containers(raw: Raw) -> tuple[ContainerView, ...]:

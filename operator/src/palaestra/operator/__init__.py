@@ -3,9 +3,8 @@
 - `controller`: one reconcile: observe, plan, decide, act, one status write, events
 - `observer`: the complete observation of one TrainingJob
 - `caches`, `informer`: the watched objects
-- `foreign_jobs`, `kueue_workloads`, `pod_events`, `suspend_managers`: facts that no watch reports
-- `rate_limited_lookup`: the rate at which they are read
-- `bounded_cache`, `reconcile_state`, `rejected_creations`: facts of earlier reconciles, in memory
+- `unwatched_facts`: facts that no watch reports: foreign Jobs, refusals, events, Workloads, field managers
+- `bounded_cache`: their memory, and the rate at which they are requested
 - `world_verdicts`: verdicts on worlds; `fair_queue`: the next job whose worlds are checked
 - `world_check_process`, `world_check_main`: the process that checks large worlds
 - `crd_check`: the cluster's CustomResourceDefinition, compared with this release's
@@ -16,8 +15,8 @@
 - `executor`, `status_writer`, `fenced_client`: every write to the cluster; none while another operator leads
 - `unused_claims`: claims of deleted jobs that were never bound
 - `workers`: threads that take keys from the queue
-- `metric_definitions`: every metric by name, as data; `metrics`, `waiting_metric`: their values
-- `health`, `logs`, `options`, `run`: the process
+- `metric_definitions`: every metric by name, as data; `metrics`: their values
+- `health`, `options`, `run`: the process
 
 The decisions are in `palaestra.plan` and `palaestra.decide`, which are pure; `palaestra.cluster` connects to
 the API server.

@@ -4,18 +4,31 @@ One policy applies to all of them. Each reconcile replaces the values of the pre
 deleted or recreated TrainingJob are dropped, so the memory holds only facts about existing objects. If it is
 full, it accepts no new value until another one is dropped. Eviction of the oldest would be worse: with
 thousands of jobs in turn, each would evict another one, and no value would stay.
+
+A `RateLimitedLookup` also requests the facts, about incomplete objects: those that lack a pod, a volume, an
+admission or a cause. The first request about an object is sent after it was incomplete for some seconds, the
+next ones after growing pauses. All objects of one lookup share a few requests a second, so that thousands of
+them in a namespace do not delay others.
 """
 
 import threading
-from collections.abc import Hashable, Mapping
+import time
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from palaestra.objects import Key
 
 REMEMBERED = 4000  # objects of all jobs together; each has one message
+PATIENCE_S = 5.0  # before the first request about an object
+RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the previous one
+LONGEST_PAUSE_S = 300.0
+RATE = 4.0  # requests a second for all objects together; with one saved token, at most 5 in any second
 
 Item = TypeVar("Item", bound=Hashable)
 Value = TypeVar("Value")
+Fact = TypeVar("Fact")
+Ask = Callable[[str, Item], Fact | None]
 
 
 class BoundedCache(Generic[Item, Value]):
@@ -55,3 +68,99 @@ class BoundedCache(Generic[Item, Value]):
         with self._lock:
             _, values = self._values.pop(key, ("", {}))
             self._size -= len(values)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answers(Generic[Item, Fact]):
+    """The facts about incomplete objects.
+
+    Attributes:
+        facts: the last fact about each; an object without a fact is absent.
+        unasked: objects for which the memory has no room; the operator sends no request about them.
+        again_s: seconds until the next reconcile must send a request; None: no object is incomplete.
+    """
+
+    facts: Mapping[Item, Fact]
+    unasked: frozenset[Item] = frozenset()
+    again_s: float | None = None
+
+
+@dataclass(slots=True)
+class _Lack(Generic[Fact]):
+    """An incomplete object: the time of the next request, and the last fact."""
+
+    due: float
+    pause_s: float = RECHECK_S
+    queued: bool = False
+    fact: Fact | None = None
+
+
+class RateLimitedLookup(BoundedCache[Item, _Lack[Fact]]):
+    """The facts about incomplete objects, by TrainingJob and object.
+
+    Args:
+        ask: requests and returns the fact about an object of a namespace, or None.
+        clock: a monotonic clock, in seconds.
+    """
+
+    def __init__(self, ask: Ask[Item, Fact], clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._ask = ask
+        self._clock = clock
+        self._turns = _Turns(clock())
+
+    def about(self, key: Key, uid: str, lacking: Collection[Item]) -> Answers[Item, Fact]:
+        """Return the facts about `lacking`, the incomplete objects of a TrainingJob.
+
+        Raises:
+            ApiError: a request failed; the next one follows after a pause.
+        """
+        known = self.known(key, uid)
+        due = self._clock() + PATIENCE_S
+        kept = self.keep(key, uid, {item: known.get(item) or _Lack(due) for item in lacking})
+        for item, lack in kept.items():
+            if self._is_due(lack):
+                lack.fact = self._ask(key[0], item)
+        unasked = frozenset(set(lacking) - kept.keys())
+        waits_s = [max(lack.due - self._clock(), 0.0) for lack in kept.values()]
+        return Answers(
+            facts={item: lack.fact for item, lack in kept.items() if lack.fact is not None},
+            unasked=unasked,
+            again_s=min([*waits_s, *(LONGEST_PAUSE_S for _ in unasked)], default=None),
+        )
+
+    def _is_due(self, lack: _Lack[Fact]) -> bool:
+        """Return whether to send a request now; if so, start the pause after it."""
+        now = self._clock()
+        if now < lack.due:
+            return False
+        wait_s = self._turns.wait_s(now, queued=lack.queued)
+        lack.queued = wait_s > 0
+        lack.due = now + (wait_s or lack.pause_s)
+        if not lack.queued:
+            lack.pause_s = min(lack.pause_s * 2, LONGEST_PAUSE_S)
+        return not lack.queued
+
+
+class _Turns:
+    """Limits the rate: one token, and a queue of times for objects that must wait."""
+
+    def __init__(self, now: float) -> None:
+        self._lock = threading.Lock()
+        self._tokens, self._filled = 1.0, now
+        self._end = now  # when the last turn in the queue ends
+
+    def wait_s(self, now: float, *, queued: bool) -> float:
+        """Return the seconds until a turn; 0: the turn is now."""
+        with self._lock:
+            self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
+            self._filled = now
+            if not queued and now < self._end:
+                wait_s = self._end - now
+                self._end += 1 / RATE
+                return wait_s
+            if self._tokens < 1.0:
+                return (1.0 - self._tokens) / RATE
+            self._tokens = 0.0
+            self._end = max(self._end, now + 1 / RATE)
+            return 0.0

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 
+from palaestra.api.reasons import WAITING
 from palaestra.api.status import Phase
 from palaestra.cluster import Api, Resource
 from palaestra.cluster.resources import (
@@ -20,13 +21,15 @@ from palaestra.cluster.resources import (
 )
 from palaestra.objects import Key, Object
 from palaestra.observe import trimmed
+from palaestra.observe.json_access import count, parts, text
 from palaestra.operator.informer import Informer
 from palaestra.operator.poll_schedule import PollTarget
 from palaestra.operator.poll_targets import PollTargets
-from palaestra.operator.waiting_metric import waits
 from palaestra.plan.replica import JOB_LABEL
 
 Changed = Callable[[Key], None]
+
+_WAITING = frozenset(reason.value for reason in WAITING)
 
 CHILDREN = (JOBS, PODS, CLAIMS, CONFIG_MAPS.only_metadata(), NETWORK_POLICIES)
 
@@ -131,3 +134,17 @@ class Caches:
         elif resource is JOBS:
             self._trainers.job(child, exists=exists)
         self._changed((namespace, child["metadata"]["labels"][JOB_LABEL]))
+
+
+def waits(job: Object) -> tuple[str, ...]:
+    """Return the reason of each replica that waits, or that runs without a step so far, for a metric."""
+    return tuple(
+        text(replica, "reason")
+        for replica in parts(job, "status", "replicas")
+        if text(replica, "reason") in _WAITING and _before_training(replica)
+    )
+
+
+def _before_training(replica: Object) -> bool:
+    phase = text(replica, "phase")
+    return phase == Phase.PENDING or (phase == Phase.RUNNING and count(replica, "step") == 0)

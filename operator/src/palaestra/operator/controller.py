@@ -5,9 +5,9 @@ the operator can be killed between any two writes and restarted. `palaestra.deci
 actions and status; this module builds no objects.
 """
 
+import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import structlog
@@ -17,7 +17,6 @@ from palaestra.cluster import NamespaceTerminating
 from palaestra.decide import (
     Decision,
     JobRefused,
-    Prepared,
     ReconcileRecord,
     Times,
     accept,
@@ -34,11 +33,42 @@ from palaestra.observe.json_access import part
 from palaestra.operator.caches import Caches
 from palaestra.operator.executor import Executor
 from palaestra.operator.observer import JobObserver, Seen, earliest
-from palaestra.operator.reconcile_state import ReconcileRecords
 from palaestra.operator.status_writer import StatusWrite, StatusWriter
 from palaestra.plan import ClusterLayout
 
 log = structlog.get_logger(__name__)
+
+
+class ReconcileRecords:
+    """The record of each TrainingJob's last reconcile, in memory only; safe to use from several threads.
+
+    A TrainingJob that was deleted and created again is another job.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._known: dict[Key, tuple[str, ReconcileRecord]] = {}
+
+    def of(self, key: Key, uid: str) -> ReconcileRecord:
+        """Return the record of the job with this uid, or an empty record."""
+        with self._lock:
+            known_uid, record = self._known.get(key, (uid, ReconcileRecord()))
+        return record if known_uid == uid else ReconcileRecord()
+
+    def keep(self, key: Key, uid: str, record: ReconcileRecord) -> None:
+        """Keep the record of a reconcile."""
+        with self._lock:
+            self._known[key] = (uid, record)
+
+    def forget(self, key: Key) -> None:
+        """Forget a job that is gone."""
+        with self._lock:
+            self._known.pop(key, None)
+
+    def clear(self) -> None:
+        """Forget all records."""
+        with self._lock:
+            self._known.clear()
 
 
 def now(record: ReconcileRecord) -> Times:
@@ -81,7 +111,12 @@ class Controller:
         self._records.clear()
 
     def reconcile(self, key: Key) -> float | None:
-        """Reconcile one TrainingJob; return the seconds after which the decision may change by time alone.
+        """Reconcile one TrainingJob: observe, decide, act, report.
+
+        If the status has just accepted the job, it decides and acts once more, and so creates its objects.
+
+        Returns:
+            The seconds after which the decision may change by time alone; None: never.
 
         Raises:
             ApiError: a request failed, so retry later; completed actions stay. It is not raised for a
@@ -91,56 +126,25 @@ class Controller:
         """
         raw = self._caches.training_job(key)
         if raw is None or not managed_here(raw):
-            self._looking.forget(key)
-            self._reporting.forget(key)
-            self._records.forget(key)
-            self._terminating.discard(key)
+            self._forget(key)
             return None
         try:
-            return self._bring_closer(key, raw)
+            times = self._times(self._records.of(key, raw["metadata"]["uid"]))
+            try:
+                job, seen = self._observe(raw)
+            except JobRefused as refused:
+                decision = reject(raw, refused, times.now)
+                return earliest(decision.wake_after_s, self._carry_out(raw, decision, times).again_s)
+            prepared = prepare(job, seen.observed, self._layout)
+            decision = decide(job, seen.observed, prepared, times)
+            written = self._carry_out(raw, decision, times)
+            if written.stored is not None and _just_accepted(raw, written.stored):
+                decision = decide(accept(written.stored), seen.observed, prepared, times)
+                written = self._carry_out(trimmed(written.stored), decision, times, confirmed=True)
+            return earliest(decision.wake_after_s, seen.again_s, written.again_s)
         except NamespaceTerminating as error:
-            if key not in self._terminating:
-                self._terminating.add(key)
-                log.info("namespace terminates", job=key, error=str(error))
+            self._log_once(key, error)
             return None
-
-    def _bring_closer(self, key: Key, raw: Object) -> float | None:
-        """Observe, decide and act; decide and act once more if the status has just accepted the job."""
-        times = self._times(self._records.of(key, raw["metadata"]["uid"]))
-        look = self._look(raw, times)
-        written = self._carry_out(raw, look, times)
-        if written.stored is not None and _just_accepted(raw, written.stored):
-            look = self._decide_anew(written.stored, look, times)
-            written = self._carry_out(trimmed(written.stored), look, times)
-        return earliest(look.decision.wake_after_s, look.again_s, written.again_s)
-
-    def _look(self, raw: Object, times: Times) -> "_Look":
-        """Return the observation of a job, and the decision on it."""
-        try:
-            job, seen = self._observe(raw)
-        except JobRefused as refused:
-            return _Look(decision=reject(raw, refused, times.now))
-        seen = self._looking.with_verdicts(job, seen, worlds_to_check(job, seen.observed, self._layout))
-        prepared = prepare(job, seen.observed, self._layout)
-        decision = decide(job, seen.observed, prepared, times)
-        return _Look(decision=decision, seen=seen, prepared=prepared)
-
-    def _decide_anew(self, stored: Object, look: "_Look", times: Times) -> "_Look":
-        """Return the decision after the status has accepted the job; no object of the job exists yet."""
-        if look.seen is None or look.prepared is None:
-            raise AssertionError("unreachable: a refused job is not accepted")
-        decision = decide(accept(stored), look.seen.observed, look.prepared, times)
-        return replace(look, decision=decision, just_accepted=True)
-
-    def _carry_out(self, raw: Object, look: "_Look", times: Times) -> StatusWrite:
-        """Execute the actions, then write the status and the events."""
-        key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
-        self._records.keep(key, raw["metadata"]["uid"], decision.record)
-        denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
-        written = self._reporting.report(raw, decision, denied, times.clock_s)
-        if denied:
-            raise next(iter(denied.values()))
-        return written
 
     def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
         """Return a job and its observation; the whole job is read if it must be planned.
@@ -150,28 +154,38 @@ class Controller:
         """
         job = accept(raw)
         seen = self._looking.look(job)
-        if not wants_whole(job, seen.observed, self._layout, lacking(raw)):
-            return job, seen
-        job = accept(self._looking.whole(raw))
-        return job, self._looking.ask_for(job, seen)
+        if wants_whole(job, seen.observed, self._layout, lacking(raw)):
+            job = accept(self._looking.whole(raw))
+            seen = self._looking.ask_for(job, seen)
+        return job, self._looking.with_verdicts(job, seen, worlds_to_check(job, seen.observed, self._layout))
 
+    def _carry_out(
+        self, raw: Object, decision: Decision, times: Times, *, confirmed: bool = False
+    ) -> StatusWrite:
+        """Act and report: execute the actions, then write the status and the events.
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Look:
-    """The observation of a job and the decision; a refused job has only a decision.
+        `confirmed`: the status just written accepts the job, so its objects are created without a read.
+        """
+        key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
+        self._records.keep(key, raw["metadata"]["uid"], decision.record)
+        denied = self._acting.carry_out(raw, decision.actions, confirmed=confirmed)
+        written = self._reporting.report(raw, decision, denied, times.clock_s)
+        if denied:
+            raise next(iter(denied.values()))
+        return written
 
-    `just_accepted`: this reconcile has written the status that accepts the job.
-    """
+    def _log_once(self, key: Key, error: NamespaceTerminating) -> None:
+        """Log that the namespace of a job is being deleted."""
+        if key not in self._terminating:
+            self._terminating.add(key)
+            log.info("namespace terminates", job=key, error=str(error))
 
-    decision: Decision
-    seen: Seen | None = None
-    prepared: Prepared | None = None
-    just_accepted: bool = False
-
-    @property
-    def again_s(self) -> float | None:
-        """Return the seconds until a fact that no watch reports must be read again."""
-        return None if self.seen is None else self.seen.again_s
+    def _forget(self, key: Key) -> None:
+        """Forget a job that is gone or that another controller manages."""
+        self._looking.forget(key)
+        self._reporting.forget(key)
+        self._records.forget(key)
+        self._terminating.discard(key)
 
 
 def _just_accepted(before: Object, stored: Object) -> bool:

@@ -12,14 +12,13 @@ every account may read. If that fails, the operator still works.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import structlog
 
 from palaestra.api.crd import schema
 from palaestra.api.job import API_VERSION, KIND
-from palaestra.api.schema_diff import lacks
 from palaestra.api.status import ConditionType
 from palaestra.cluster import Api, ApiError
 from palaestra.observe.json_access import part, parts, text
@@ -28,6 +27,8 @@ READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it is applied
 MOST_SHOWN = 20
 _NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # a definition may lack them
+
+Schema = Mapping[str, Any]
 
 log = structlog.get_logger(__name__)
 
@@ -111,3 +112,30 @@ def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
     """Return the types of conditions that a served schema allows."""
     way = ("status", "properties", "conditions", "items", "properties", "type")
     return frozenset(part(served, "properties", *way).get("enum", ()))
+
+
+def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
+    """Yield "<path>: <fact>" for each field of `ours` that is missing or different in `served`.
+
+    Both are structural schemas. The fields below a missing field are not listed. Additional fields of
+    `served` belong to a newer release and are ignored.
+    """
+    kind, wanted = served.get("type"), ours.get("type")
+    if kind != wanted:
+        yield f"{path}: is {_of_type(kind)}, not {_of_type(wanted)}"
+        return
+    if unknown := [choice for choice in ours.get("enum", ()) if choice not in served.get("enum", (choice,))]:
+        yield f"{path}: lacks {', '.join(map(str, unknown))}"
+    for name, inner in ours.get("properties", {}).items():
+        below = f"{path}.{name}" if path else name
+        if name in served.get("properties", {}):
+            yield from lacks(served["properties"][name], inner, below)
+        else:
+            yield f"{below}: is missing"
+    for keyword, mark in (("items", "[]"), ("additionalProperties", "{}")):
+        if keyword in ours:
+            yield from lacks(served.get(keyword, {}), ours[keyword], f"{path}{mark}")
+
+
+def _of_type(kind: object) -> str:
+    return "of no type" if kind is None else f"of type {kind}"

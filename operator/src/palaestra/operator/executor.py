@@ -14,9 +14,8 @@ from palaestra.decide import Action, Create, Delete, Discard, Replace, SetSuspen
 from palaestra.objects import Key, Object
 from palaestra.observe.json_access import owners
 from palaestra.operator.fenced_client import FencedClient
-from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.preconditions import Outdated, confirm
-from palaestra.operator.rejected_creations import Denied, RejectedCreations
+from palaestra.operator.unwatched_facts import Denied, ForeignJobs, RejectedCreations
 
 log = structlog.get_logger(__name__)
 
@@ -133,7 +132,7 @@ class Executor:
         found = self._api.get(CONFIG_MAPS, namespace, name)
         wrong = _wrong_with(found, obj)
         if wrong:
-            words = f"ConfigMap {name} is there already, {wrong}; delete it"
+            words = f"ConfigMap {name} already exists {wrong}; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _patch(self, key: Key, action: Stop | Replace | SetSuspend) -> None:
@@ -160,5 +159,5 @@ def _wrong_with(found: Object, planned: Object) -> str:
     if found.get("data") != planned["data"]:
         return "with other content"
     if not owners(found) & owners(planned):
-        return "and is not this job's"
-    return "" if found.get("immutable") is True else "and is not immutable, so that anybody may change it"
+        return "and does not belong to this job"
+    return "" if found.get("immutable") is True else "and is not immutable, so others could change it"

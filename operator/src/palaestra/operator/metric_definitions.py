@@ -4,7 +4,8 @@ Labels are bounded: no label has the name of a job, because its series would out
 job export the metrics of its training.
 """
 
-from palaestra.api.reasons import ROWS, WAITING, Reason
+from palaestra.api.reason_texts import ROWS
+from palaestra.api.reasons import WAITING, Reason
 from palaestra.api.status import Phase, Restarts
 from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 
@@ -56,7 +57,7 @@ QUEUE_WAIT = histogram(
 )
 REQUESTS = counter(
     "palaestra_operator_requests_total",
-    "Requests to the API server; code 0: no answer.",
+    "Requests to the API server; code 0: no response.",
     VERB,
     Label(name="resource", bound="kind of object"),
     Label(name="code", bound="HTTP status that occurred"),

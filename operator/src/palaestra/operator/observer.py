@@ -36,12 +36,14 @@ from palaestra.observe import (
     whole,
 )
 from palaestra.operator.caches import Caches
-from palaestra.operator.foreign_jobs import ForeignJobs
-from palaestra.operator.kueue_workloads import KueueWorkloads
-from palaestra.operator.pod_events import PodEvents
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import RejectedCreations
-from palaestra.operator.suspend_managers import SuspendManagers
+from palaestra.operator.unwatched_facts import (
+    ForeignJobs,
+    KueueWorkloads,
+    PodEvents,
+    RejectedCreations,
+    SuspendManagers,
+)
 from palaestra.operator.world_verdicts import WorldChecker
 from palaestra.plan import GivenWorld
 
@@ -186,7 +188,7 @@ class JobObserver:
             return observed, None
         key = (job.metadata.namespace, job.metadata.name)
         if self._checking.waits(key) and not resuming(job, observed):
-            return replace(observed, worlds_wait=True), None  # the end of the check queues the job
+            return replace(observed, worlds_wait=True), None  # when the check ends, it queues the job again
         namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
         sources = {reference: self._source(namespace, reference) for reference in references(job)}
         kueue = queued and self._has_kueue()

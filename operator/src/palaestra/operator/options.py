@@ -10,7 +10,7 @@ from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import MOST_PORT
 
 DEFAULT_NAMESPACE = "palaestra-system"
-NAME = "palaestra-operator"  # of the Lease, and of the objects of an installation
+NAME = "palaestra-operator"  # the name of the Lease and of the objects of an installation
 METRICS_ADDRESS = Address("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
 
 
@@ -61,5 +61,5 @@ def address(text: str) -> Address:
     """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or int(port) > MOST_PORT:
-        raise PalaestraError(f"--metrics-address: {text!r} is no address; write it as 0.0.0.0:8080")
+        raise PalaestraError(f"--metrics-address: {text!r} is not an address; write it as 0.0.0.0:8080")
     return Address(host.removeprefix("[").removesuffix("]"), int(port))

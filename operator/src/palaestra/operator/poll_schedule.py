@@ -122,7 +122,8 @@ class PollSchedule:
             return False
         first = entry.standing is PollStatus.NEW
         entry.standing = PollStatus.PROMPT if now_s - entry.asked_s < self._prompt_s else PollStatus.SLOW
-        least = 0.2 if first else 0.8  # separates targets that were found together
+        # The first wait varies more, which separates targets that were found together.
+        least = 0.2 if first else 0.8
         self._at(entry, now_s + self._period_s * (least + (1.0 - least) * self._spread()))
         return True
 

@@ -22,10 +22,10 @@ from palaestra.operator.poll_schedule import PollSchedule, PollState, PollStatus
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
-DEADLINE_S = 3.0  # of one whole response
-PROMPT_SHARE = 1 / 3  # of the deadline; trainers answer in milliseconds
+DEADLINE_S = 3.0  # for one whole response
+PROMPT_SHARE = 1 / 3  # a prompt response takes less than this share of the deadline; most take milliseconds
 FOLLOW_S = 1.0  # between updates of the list of trainers
-MOST_BYTES = 65_536  # of one response, with room for the longest faults of 32 simulators
+MOST_BYTES = 65_536  # for one response, with room for the longest faults of 32 simulators
 MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 

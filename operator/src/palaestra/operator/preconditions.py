@@ -37,7 +37,7 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
     except NotFound:
         found = None
     if found != raw["metadata"]["resourceVersion"]:
-        raise Outdated(f"TrainingJob {name} is not as in the cache")
+        raise Outdated(f"TrainingJob {name} differs from the cache")
     created = (
         action for action in actions if isinstance(action, Create) and resource_of(action.object) == JOBS
     )
@@ -46,10 +46,10 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
     pods = api.list(PODS, namespace, labels=f"{JOB_LABEL}={name}") if begun or stops else []
     for pod in pods:
         if _occupies(pod, begun) or any(_is_news(pod, stop, raw) for stop in stops):
-            raise Outdated(f"pod {pod['metadata']['name']} is not as in the cache")
+            raise Outdated(f"pod {pod['metadata']['name']} differs from the cache")
     there = {pod["metadata"]["uid"] for pod in pods} if stops else set()
     if any(uid not in there for stop in stops for uid, _ in stop.basis.pods):
-        raise Outdated(f"a pod of TrainingJob {name} is gone and still in the cache")
+        raise Outdated(f"a pod of TrainingJob {name} was deleted but is still in the cache")
 
 
 def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:

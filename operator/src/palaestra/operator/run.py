@@ -4,11 +4,14 @@ Only this module knows all parts. Reflectors watch the cluster from the start, s
 at once. Workers start when the caches are complete and this operator leads.
 """
 
+import logging
 import signal
 import socket
+import sys
 import threading
 import uuid
 from collections.abc import Collection
+from typing import Any
 
 import structlog
 
@@ -20,21 +23,21 @@ from palaestra.operator.controller import Controller
 from palaestra.operator.crd_check import CrdCheck
 from palaestra.operator.executor import Executor
 from palaestra.operator.fenced_client import FencedClient
-from palaestra.operator.foreign_jobs import ForeignJobs
-from palaestra.operator.logs import configure_logs
 from palaestra.operator.metrics import Metrics
 from palaestra.operator.observer import JobObserver
 from palaestra.operator.options import NAME, OperatorOptions
 from palaestra.operator.poll_schedule import PollTarget
 from palaestra.operator.poller import Poller
-from palaestra.operator.rejected_creations import RejectedCreations
 from palaestra.operator.status_writer import StatusWriter
 from palaestra.operator.unused_claims import UnusedClaims
+from palaestra.operator.unwatched_facts import ForeignJobs, RejectedCreations
 from palaestra.operator.workers import Workers
 from palaestra.operator.world_check_process import WorldCheckProcess
 from palaestra.operator.world_verdicts import WorldChecker
 from palaestra.plan import ClusterLayout
 from palaestra.plan.layout import USER
+from palaestra_protocol.masking import masked
+from palaestra_protocol.signals import set_at_signals
 
 log = structlog.get_logger(__name__)
 
@@ -43,6 +46,7 @@ FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
 SYNC_S = 1.0
 SETTLES_S = 0.1  # after which related changes, such as all objects of one job, are in the caches
 FAILED = 1
+_JSON = structlog.processors.JSONRenderer(default=str)
 
 
 class Operator:
@@ -185,8 +189,7 @@ def run(options: OperatorOptions, metrics: Metrics | None = None) -> int:
         stopping.set()
 
     threading.excepthook = break_down
-    for each in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(each, lambda *_: stopping.set())
+    set_at_signals(stopping, (signal.SIGTERM, signal.SIGINT))
     operator = Operator(connect(options.kubeconfig, options.context), options, metrics or Metrics())
     operator.run(stopping)
     return FAILED if broken else 0
@@ -207,3 +210,25 @@ def _layout(options: OperatorOptions) -> ClusterLayout:
         resources=options.resources,
         user=USER if options.fixed_user else None,
     )
+
+
+def configure_logs() -> None:
+    """Set up the log: one JSON object a line on standard error, with its level and the time in UTC.
+
+    Messages are constant, and values are fields.
+    """
+    structlog.configure(
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            structlog.processors.dict_tracebacks,
+            _render,
+        ],
+        logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),
+    )
+
+
+def _render(logger: Any, name: str, fields: structlog.typing.EventDict) -> str:
+    """Return the line, in which the user information of addresses is masked."""
+    return masked(str(_JSON(logger, name, fields)))

@@ -15,7 +15,7 @@ from palaestra.decide import Decision, EmittedEvent, as_data, fitted, write_in_s
 from palaestra.objects import Key, Object
 from palaestra.operator.fenced_client import FencedClient, difference
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import Denied
+from palaestra.operator.unwatched_facts import Denied
 
 Written = Callable[[Object, Object], None]
 Accepted = Callable[[Any, dict[str, Any]], dict[str, Any]]
@@ -95,7 +95,7 @@ class StatusWriter:
         try:
             stored = self._writer.status(raw, patch)
         except NotFound as error:
-            raise Outdated(f"TrainingJob {key[1]} is gone and still in the cache") from error
+            raise Outdated(f"TrainingJob {key[1]} was deleted but is still in the cache") from error
         changed = stored["metadata"]["resourceVersion"] != version
         if changed:
             self._count(raw, status)

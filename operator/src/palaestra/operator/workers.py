@@ -30,7 +30,7 @@ class Workers:
     """Threads that work on one queue.
 
     Args:
-        queue: of keys.
+        queue: the queue of keys.
         reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
         gate: no reconcile starts while it is not set.
         seconds: the histogram of durations, by `result`.

@@ -21,7 +21,7 @@ from pathlib import Path
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world import check
 
-MOST_CHARACTERS = 4096  # of the message of a refusal; a status shows fewer
+MOST_CHARACTERS = 4096  # the longest message of a refusal; a status shows fewer characters
 TOO_MUCH_MEMORY = "memory"
 _NICENESS = 5  # the operator itself has priority
 _PR_SET_PDEATHSIG = 1  # Source: linux/prctl.h

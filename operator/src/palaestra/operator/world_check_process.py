@@ -17,8 +17,9 @@ import structlog
 
 from palaestra.plan import GivenWorld, WorldVerdict
 
-SECONDS = 20  # of processor time for a world; the costliest known world of 900 kB takes 2
-MEBIBYTES = 144  # of address space; the costliest known of 900 kB takes 135, and two fit into the container
+SECONDS = 20  # processor time for one world; the costliest known world of 900 kB takes 2 s
+# Address space; the costliest known world of 900 kB takes 135, and two fit into the container.
+MEBIBYTES = 144
 DEADLINE_S = 300.0  # for all worlds of a job; it passes because of a busy node, not because of a world
 _CRASHES: Final = frozenset(  # 1: an exception, whose traceback is in the operator's log
     (1, -signal.SIGABRT, -signal.SIGBUS, -signal.SIGFPE, -signal.SIGILL, -signal.SIGSEGV)
@@ -33,8 +34,8 @@ class WorldCheckProcess:
     """Runs the program that checks worlds, once for each call; calls may come from several threads.
 
     Args:
-        seconds: of processor time for a world.
-        mebibytes: of memory for a world.
+        seconds: the seconds of processor time for a world.
+        mebibytes: the mebibytes of memory for a world.
         deadline_s: for a whole call.
     """
 
@@ -110,7 +111,7 @@ class WorldCheckProcess:
 
     def _too_costly(self, world: GivenWorld, budget: str) -> WorldVerdict:
         log.warning("world too costly", field=world.field, bytes=len(world.source), budget=budget)
-        fact = f"its check takes more than the {budget} that a world has"
+        fact = f"its check needs more than {budget}, the limit for one world"
         return WorldVerdict(problem=f"{world.field}: {fact}; {_REMEDY}", too_costly=True)
 
 

@@ -15,7 +15,7 @@ from palaestra.plan import GivenWorld, WorldVerdict
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world import check
 
-MOST_BYTES_HERE = 16_384  # of a job's worlds that the worker itself checks, in less than 0.1 s
+MOST_BYTES_HERE = 16_384  # the worker itself checks worlds up to this total, in less than 0.1 s
 AT_ONCE = 2  # checks of all namespaces together
 REMEMBERED = 4000  # verdicts, each with a message of at most 4 kB if it is a refusal
 HANDED_S = 10.0  # for a job to hand over its worlds at its turn; after that, the next job has its turn

@@ -19,8 +19,15 @@ from palaestra.plan.layout import Allowed, ClusterLayout, ContainerPaths, Images
 from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
-from palaestra.plan.world_verdicts import GivenWorld, Verdicts, WorldVerdict
-from palaestra.plan.worlds import ConfigMaps, Files, given_worlds, source_files
+from palaestra.plan.worlds import (
+    ConfigMaps,
+    Files,
+    GivenWorld,
+    Verdicts,
+    WorldVerdict,
+    given_worlds,
+    source_files,
+)
 
 __all__ = [
     "Allowed",

@@ -17,7 +17,7 @@ from palaestra.plan.yaml_text import literal
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
-PERIOD_S = 10  # of a probe; one try of the ROS master's probe waits as long
+PERIOD_S = 10  # between two probes; one try of the ROS master's probe waits as long
 BUILT_IN = "palaestra-train"  # the program of a job without a command
 SECURITY = {
     "allowPrivilegeEscalation": False,
@@ -25,7 +25,7 @@ SECURITY = {
     "readOnlyRootFilesystem": True,
 }
 # One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
-# quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
+# quarter of one. The port is on loopback, which a kubelet's own TCP probe cannot reach.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
 
 
@@ -164,7 +164,7 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
     places = replica.places(container)
     variables = {
         "ROS_MASTER_URI": f"http://{LOOPBACK}:{replica.layout.ports.ros_master}",
-        "ROS_HOSTNAME": "localhost",
+        "ROS_HOSTNAME": replica.layout.ros_hostname,
         "ROS_HOME": f"{places.scratch}/ros",
         # Must exist already: ROS would give a new folder to the volume's owner, root.
         "ROS_LOG_DIR": places.scratch,

@@ -30,7 +30,8 @@ def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
         "metadata": metadata,
         "spec": {
             "backoffLimit": replica.job.spec.backoff_limit,
-            "podReplacementPolicy": "Failed",  # one writer: the old pod has ended before the next
+            # One writer at a time: the old pod has ended before the next one starts.
+            "podReplacementPolicy": "Failed",
             "podFailurePolicy": {"rules": _failure_rules()},
             "suspend": queue is not None or suspend,
             "template": template,

@@ -14,8 +14,8 @@ ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
 CONTROL_PORTS = range(7100, 7200)  # by the simulator's number in its pod; a pod has at most 32
 HEALTH_PORTS = range(7200, 7300)
-# Process 1 of a container ends at a signal only if it asks for it, which rosmaster does not: without
-# somebody before it, a pod would stay for its whole grace period.
+# A signal ends process 1 of a container only if the process has a handler, and rosmaster has none. So
+# another program is process 1; otherwise a pod would stay for its whole grace period.
 ROSMASTER = ("bash", "-c", "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!")
 OWN_ROS_MASTER = ("palaestra-ros-master", "--listen=127.0.0.1:{port}")
 USER = 65532  # uid, gid and fsGroup of everything in a pod, as in the images
@@ -115,6 +115,11 @@ class Layout(Protocol):
         ...
 
     @property
+    def ros_hostname(self) -> str:
+        """The name under which the ROS nodes of a pod reach each other."""
+        ...
+
+    @property
     def health_host(self) -> str:
         """The address at which health and metrics are served."""
         ...
@@ -174,6 +179,7 @@ class ClusterLayout:
     images: Images
     ports: Ports = Ports()
     ros_master: Sequence[str] = ROSMASTER
+    ros_hostname: str = "localhost"
     health_host: str = "0.0.0.0"
     longest_start_s: None = None
     operator_namespace: str = "palaestra-system"
@@ -214,8 +220,9 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     ros_master: Sequence[str] = OWN_ROS_MASTER
+    ros_hostname: str = "127.0.0.1"  # a bare chroot has no /etc/hosts, which has the name localhost
     health_host: str = "127.0.0.1"
-    longest_start_s: int = 600  # a person waits for it, and no image is pulled and no volume is mounted
+    longest_start_s: int = 600  # short: a person waits, and no image is pulled and no volume is mounted
     operator_namespace: None = None
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)

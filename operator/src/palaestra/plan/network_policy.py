@@ -8,7 +8,7 @@ always reaches its pods, for their probes. Egress is open unless the job closes 
 from typing import Any
 
 from palaestra.api import TrainingJob
-from palaestra.api.network import Egress
+from palaestra.api.job import Egress
 from palaestra.plan.layout import HEALTH_PORTS, Layout
 from palaestra.plan.replica import JOB_LABEL, UID_LABEL, owner, uid_of
 

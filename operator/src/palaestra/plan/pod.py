@@ -10,7 +10,8 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra.plan.resources import twice
 
 UNPRIVILEGED: Mapping[str, Any] = {"runAsNonRoot": True, "seccompProfile": {"type": "RuntimeDefault"}}
-GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot node's notice
+# For the last checkpoint and the shutdown of the simulators; not longer than the notice of a spot node.
+GRACE_S = 60
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"
 

@@ -1,7 +1,14 @@
-"""training.yaml: the job's settings for one replica, as its trainer reads them."""
+"""training.yaml: the job's settings for one replica, as its trainer reads them.
+
+The trainer's `palaestra_trainer.configuration` declares all fields. On a laptop the command line reads the
+addresses of a run, and nothing else, from the file; `RunAddresses` is next to the code that writes them.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Self
+
+import yaml
 
 from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
 from palaestra.plan.claim import initial_path
@@ -9,6 +16,7 @@ from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.worlds import world_path
 from palaestra.plan.yaml_text import as_yaml
+from palaestra_protocol.fields import MOST_COUNT, MOST_NAME, Fields, ProtocolError
 
 FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
@@ -79,6 +87,65 @@ def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str
     }
     described["startDeadlineSeconds"] = group.start_deadline_seconds
     return described
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorAddress:
+    """The address of one simulator's sidecar.
+
+    Attributes:
+        name: group and number, such as collect-0.
+        control: `host:port` of the sidecar.
+        standby: whether the sidecar runs a second simulator as a standby.
+    """
+
+    name: str
+    control: str
+    standby: bool
+
+    @classmethod
+    def read(cls, content: object, path: str) -> Self:
+        """Return the address in the part of a training.yaml at `path`.
+
+        Raises:
+            ProtocolError: it has no address.
+        """
+        fields = Fields(content, path)
+        return cls(
+            name=fields.text("name", MOST_NAME),
+            control=fields.text("control").removeprefix("http://"),
+            standby=fields.has("standby") and fields.flag("standby"),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunAddresses:
+    """The addresses of a replica's programs on this machine.
+
+    Attributes:
+        status: `host:port` of the trainer's /status.
+        simulators: one address for each, in the order of the file.
+    """
+
+    status: str
+    simulators: tuple[SimulatorAddress, ...]
+
+    @classmethod
+    def read(cls, text: bytes) -> Self:
+        """Return the addresses in a training.yaml.
+
+        Raises:
+            ProtocolError: the text is not YAML, or has no addresses.
+        """
+        try:
+            content = yaml.safe_load(text)
+        except (ValueError, yaml.YAMLError) as error:
+            raise ProtocolError(f"body: is not YAML ({type(error).__name__})") from error
+        fields = Fields(content)
+        return cls(
+            status=fields.text("statusAddress"),
+            simulators=fields.parts("simulators", SimulatorAddress.read, MOST_COUNT),
+        )
 
 
 def recycling(group: SimulatorGroup) -> Recycle:

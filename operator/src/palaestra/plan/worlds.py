@@ -1,25 +1,71 @@
 """The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
 
 Each source is checked once for all replicas, so that an error in it is found before objects are created. The
-plan checks it, or the operator checks it before the plan and passes the verdicts. Only the sidecar writes the
-ROS names of a simulator into a world. Sources of `file` are in the image, and only the sidecar reads them.
+plan checks it, or the operator checks it before the plan and passes the verdicts, by a digest of the world
+and of its field. Only the sidecar writes the ROS names of a simulator into a world. Sources of `file` are in
+the image, and only the sidecar reads them.
 """
 
+import hashlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from palaestra.api import Driver, SimulatorGroup, TrainingJob, WorldSource
-from palaestra.errors import PlanError
+from palaestra.errors import PlanError, WorldCheckTooCostly, WorldRefused, WorldUnchecked
 from palaestra.plan.replica import PlannedSimulator, Replica
-from palaestra.plan.world_verdicts import GivenWorld, Verdicts, require_fine
 from palaestra_sim.world import MJCF, WBT, builtin, check, suffix
 
-MOST_BYTES = 900_000  # of all worlds; an object has at most 1 MiB, and training.yaml is in it too
+MOST_BYTES = 900_000  # all worlds together; an object has at most 1 MiB, and training.yaml is in it too
 FOLDER = "worlds"
 
 _READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
 
+Verdicts = Mapping[str, "WorldVerdict"]  # keys: the digests of worlds
 ConfigMaps = Mapping[tuple[str, str], bytes]  # (name, key) -> content
 Files = Mapping[str, bytes]  # the content of a ConfigMap, by file name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldVerdict:
+    """The result of the check of one world.
+
+    Attributes:
+        problem: the message of the refusal; "": the world is valid.
+        too_costly: whether the check was ended because it exceeded its budget.
+    """
+
+    problem: str = ""
+    too_costly: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GivenWorld:
+    """A world that the author of a job wrote: its field in the spec, and its bytes."""
+
+    field: str
+    source: bytes
+
+    @property
+    def digest(self) -> str:
+        """Return the key of its verdict."""
+        return hashlib.sha256(b"\0".join((self.field.encode(), self.source))).hexdigest()
+
+
+def require_fine(worlds: Mapping[str, GivenWorld], verdicts: Verdicts) -> None:
+    """Check that every world has a verdict and is not refused; `worlds` are by digest.
+
+    Raises:
+        WorldCheckTooCostly: a check exceeded its budget.
+        WorldRefused: a world is wrong.
+        WorldUnchecked: a world has no verdict yet.
+    """
+    for digest in worlds:
+        verdict = verdicts.get(digest)
+        if verdict is not None and verdict.problem:
+            raise (WorldCheckTooCostly if verdict.too_costly else WorldRefused)(verdict.problem)
+    for digest, world in worlds.items():
+        if digest not in verdicts:
+            raise WorldUnchecked(world.field)
 
 
 def source_files(job: TrainingJob, config_maps: ConfigMaps, verdicts: Verdicts | None = None) -> Files:

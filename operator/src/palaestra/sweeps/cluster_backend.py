@@ -116,7 +116,7 @@ class ClusterBackend:
             found = self._client.get(trial.name)
             if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
                 raise NotOfThisSweep(
-                    f"job {trial.name}: exists in namespace {self._client.namespace}, not of this sweep; "
+                    f"job {trial.name}: exists in namespace {self._client.namespace} outside of this sweep; "
                     "give the sweep another name"
                 )
         self._client.apply(trial.job)
@@ -141,13 +141,13 @@ class ClusterBackend:
                 looks += 1
                 if looks == QUIET_LOOKS:
                     self._report(
-                        f"the API server has not answered for a while ({error}); "
-                        "the trials run on without this command, which asks again"
+                        f"the API server has not responded for a while ({error}); "
+                        "the trials continue, and this command retries"
                     )
             time.sleep(self._look_s)
         self._answered = True
         if looks >= QUIET_LOOKS:
-            self._report("the API server answers again")
+            self._report("the API server responds again")
         return answer
 
     def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:

@@ -16,7 +16,7 @@ from palaestra.job_input import changed
 from palaestra.sweeps.model import LABEL, Distribution, Sweep
 from palaestra.sweeps.trial import Trial
 
-_BITS = 53  # of a float's precision
+_BITS = 53  # a float has this precision
 
 
 def trials(sweep: Sweep) -> tuple[Trial, ...]:

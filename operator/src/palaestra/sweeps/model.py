@@ -102,7 +102,7 @@ class SweepSpec(ApiModel):
     """Number of trials, with `random` only. It may be raised later."""
 
     seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of what is drawn."""
+    """Seed of the random draws."""
 
     seeds: Annotated[int, Field(ge=1, le=100)] | None = None
     """Runs of each trial, with different seeds; absent: `spec.replicas` of the job."""

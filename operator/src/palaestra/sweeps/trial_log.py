@@ -45,7 +45,7 @@ def begin(folder: Path, sweep: Sweep) -> None:
         if changes := [field for field in _fields(before, record) if field not in mutable]:
             named = ", ".join(f"spec.{field}" for field in changes)
             raise RunRefused(
-                f"{named}: not as when the sweep in {folder} was begun; "
+                f"{named}: differs from that of the sweep in {folder}; "
                 "change it back, give the sweep another name, or choose another folder with --dir"
             )
     write(path, yaml.safe_dump(record, sort_keys=False).encode())

@@ -28,7 +28,7 @@ OF_FILES: Mapping[str, str] = {
 _SHARED = ("default", "atari")  # entries that apply to other environments
 CHOOSES_ALGORITHM = "model_class"  # a key of her.yml, which is older than HER as a replay buffer
 _LONGEST_LIST = 12
-_OF_AN_ENTRY = "n_timesteps"  # every entry has it
+_OF_AN_ENTRY = "n_timesteps"  # every entry has this key
 
 
 class ZooError(PalaestraError, ValueError):
@@ -67,7 +67,9 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
     """
     if _OF_AN_ENTRY in data:
         if env is None:
-            raise ZooError(f"{name}: has the words of one environment and no id; give it as --env ID")
+            raise ZooError(
+                f"{name}: has the hyperparameters of one environment and no id; give it as --env ID"
+            )
         return env, data, env
     ids = [each for each in data if each not in _SHARED]
     if env is None:
@@ -81,7 +83,7 @@ def entry_of(data: Mapping[str, Any], name: str, env: str | None) -> tuple[str, 
         raise ZooError(f"--env: {env} is not an environment in {name}; {remedy}")
     entry = data[chosen]
     if not isinstance(entry, dict):
-        raise ZooError(f"{name}: the entry {chosen} is not a mapping; write lines of 'word: value' below it")
+        raise ZooError(f"{name}: the entry {chosen} is not a mapping; write lines of 'name: value' below it")
     return env, entry, chosen
 
 

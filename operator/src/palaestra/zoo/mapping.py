@@ -33,7 +33,7 @@ _NORMALIZE = {
     "clip_obs": "clipObservations",
     "clip_reward": "clipRewards",
 }
-_LENGTH = "max_episode_length"  # of her.yml
+_LENGTH = "max_episode_length"  # a hyperparameter in her.yml
 # Callbacks that a run replaces, and the remedy for each.
 _CALLBACKS: Mapping[str, str] = {
     "CheckpointCallback": "a run saves checkpoints; set trainer.checkpoint.everySteps",
@@ -59,7 +59,7 @@ def put(draft: Draft, word: str, value: Any) -> None:
     if word in _PLACES:
         _PLACES[word](draft, value)
     elif word == _LENGTH:
-        draft.note(word, "left out; replay buffers of today need no length of episodes")
+        draft.note(word, "left out; current replay buffers need no episode length")
     elif word in ELSEWHERE:
         draft.note(word, f"left out; {ELSEWHERE[word].removesuffix('; leave it out')}")
     elif word in _SCHEDULED and isinstance(value, str):
@@ -137,7 +137,7 @@ def _buffer_class(kind: str) -> Callable[[Draft, Any], None]:
 
 
 def _buffer_arguments(kind: str) -> Callable[[Draft, Any], None]:
-    """Return the converter for a buffer's options; a run sets those of Stable-Baselines3's classes."""
+    """Return the converter for a buffer's options; a run itself sets those of Stable-Baselines3's classes."""
 
     def place(draft: Draft, value: Any) -> None:
         chosen = draft.entry.get(f"{kind}_buffer_class")

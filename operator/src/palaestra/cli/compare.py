@@ -1,0 +1,56 @@
+"""`palaestra compare`: the policies of two runs on the same fresh episodes."""
+
+import argparse
+from pathlib import Path
+
+from palaestra.cli.subcommands import Commands, command
+from palaestra.local.trainer_program import run_program
+from palaestra_protocol.numbers import whole
+
+PROGRAM = "palaestra-compare"
+COMPARE = """\
+Plays the policies of the run directories A and B on the same episodes, in the simulator that evaluates A's,
+until it is known which one succeeds more often, or that they differ by no more than --margin. No run uses the
+seeds of these episodes. Prints a line for each 20 episodes and a sentence at the end. The bounds are right
+after any number of episodes: at most one of 20 comparisons is wrong, even if you end it when you like, or
+repeat it with more --episodes.
+"""
+EXIT_CODES = """\
+exit codes:
+  0    one policy is better, or they differ by no more than the margin
+  1    any other error; the last lines of the log give the reason
+  2    a run directory is wrong, the policies have different tasks, or palaestra-trainer is not installed
+  3    undecided after all episodes
+  80   a simulator had more faults than its restart budget allows
+  130  ended by Ctrl-C
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = command(commands, "compare", _compare, COMPARE, EXIT_CODES)
+    parser.add_argument("a", metavar="A", type=Path, help="run directory, such as runs/<job>/<replica>")
+    parser.add_argument("b", metavar="B", type=Path, help="another one")
+    parser.add_argument("--episodes", metavar="N", type=whole(1), help="at most; default: 1000")
+    parser.add_argument(
+        "--margin",
+        metavar="SHARE",
+        help="success rates that differ by no more than this count as equal; default: 0.05",
+    )
+    parser.add_argument(
+        "--in", metavar="NAME", dest="driver", help="stub, mujoco or webots; default: the simulator of A"
+    )
+    parser.add_argument("--seeds", metavar="NAME", help="other episodes; default: compare")
+    parser.add_argument("--json", action="store_true", help="print one JSON object at the end")
+
+
+def _compare(options: argparse.Namespace) -> int:
+    given = {
+        "--episodes": options.episodes,
+        "--margin": options.margin,
+        "--in": options.driver,
+        "--seeds": options.seeds,
+    }
+    chosen = [f"{name}={value}" for name, value in given.items() if value is not None]
+    json = ["--json"] if options.json else []
+    return run_program([PROGRAM, str(options.a), str(options.b), *chosen, *json])

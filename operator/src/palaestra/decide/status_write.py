@@ -1,0 +1,206 @@
+"""The status as it is written: as data, at which time, and cut to the size that its object may have.
+
+A write is due at once for new states and first values, else every 30 seconds. The amounts in Kueue's message,
+which the job lacks, count as progress: other jobs change them often.
+
+etcd refuses an object of more than 1.5 MiB, and the operator would retry the write forever. Each field of a
+status has its own limit, but the status of a hundred replicas with 32 simulators each exceeds that size, and
+the author's spec adds to it. So the least important details are removed first. They are only for people. No
+decision and no event depends on them; otherwise each reconcile would emit the event again.
+"""
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase, Status
+from palaestra.observe.cache_trim import SIZE, SMALL
+from palaestra.observe.json_access import part, text
+
+PROGRESS_EVERY_S = 30
+_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
+_OF_JOB = frozenset({"lastCheckpointTime", "leftOut", "nodes", "step", "successRate"})
+_FIRST = frozenset(  # once present, always present
+    {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
+)
+_OF_REPLICA = frozenset(
+    {"step", "target", "successRate", "successInterval", "meanReturn", "stepsPerSecond", "simulators",
+     "lastCheckpoint", "node",
+     "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
+)  # fmt: skip
+_AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
+
+MOST_BYTES = 1_400_000  # of the whole object as sent; etcd accepts 1,572,864, including managedFields
+SHORT = 100  # bytes of a shortened message as sent
+
+Data = dict[str, Any]
+Cut = Callable[[Data], Data]
+
+_HEALTHY = frozenset({Phase.RUNNING.value, Phase.SUCCEEDED.value})
+_OF_KILL = ("container", "times", "last")
+
+
+def as_data(status: Status) -> dict[str, Any]:
+    """Return the status as the API server stores it: camelCase, without absent fields and empty lists.
+
+    `kubectl describe` prints a heading for each empty list, and readers treat an absent list as empty.
+    """
+    data: dict[str, Any] = _without_empty(status.model_dump(mode="json", by_alias=True, exclude_none=True))
+    return data
+
+
+def _without_empty(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        kept = {name: _without_empty(value) for name, value in data.items()}
+        return {name: value for name, value in kept.items() if value != []}
+    return [_without_empty(item) for item in data] if isinstance(data, list) else data
+
+
+def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
+    """Return the seconds after which to write a status; 0: now; None: never.
+
+    Args:
+        old: from the API server.
+        new: from `as_data`.
+        since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
+            has not written it.
+    """
+    # An API server with an older CRD adds the empty lists again.
+    before = _without_empty(_without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS))
+    after = _without(new, _WITH_OTHERS)
+    if before == after:
+        return None
+    if since_s is None or _without_progress(before) != _without_progress(after):
+        return 0.0
+    return max(PROGRESS_EVERY_S - since_s, 0.0)
+
+
+def _without(status: Mapping[str, Any], names: frozenset[str]) -> dict[str, Any]:
+    return {name: value for name, value in status.items() if name not in names}
+
+
+def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
+    rest = _without(status, _OF_JOB)
+    for name, kept in (("replicas", _rest), ("conditions", _without_amounts)):
+        if isinstance(items := rest.get(name), list):
+            rest[name] = [kept(item) for item in items]
+    return rest
+
+
+def _without_amounts(reported: Any) -> Any:
+    """Return a condition or replica; if it waits in a queue, the amounts in its message are removed."""
+    if not isinstance(reported, Mapping) or reported.get("reason") != Reason.QUEUED:
+        return reported
+    return {**reported, "message": _AMOUNT.sub("", str(reported.get("message")))}
+
+
+def _rest(replica: Any) -> Any:
+    if not isinstance(replica, Mapping):
+        return replica
+    kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
+    kept |= dict.fromkeys(_FIRST & replica.keys())  # only the first value is urgent
+    restarts = kept.get("restarts")
+    if isinstance(restarts, Mapping):  # restarts of simulators are as frequent as faults
+        kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}
+    return kept
+
+
+def fitted(job: Mapping[str, Any], status: Data) -> Data:
+    """Return a status from `as_data` without the details that do not fit into its object.
+
+    The same status gives the same result, and a second call changes nothing. If the spec leaves less than
+    450,000 bytes for the status, the result may still be too large.
+    """
+    room = MOST_BYTES - _taken(job)
+    for cut in CUTS:
+        if _size(status) <= room:
+            break
+        status = cut(status)
+    return status
+
+
+def _size(data: Any) -> int:
+    return len(json.dumps(data))  # in ASCII, like requests
+
+
+def _taken(job: Mapping[str, Any]) -> int:
+    """Return the bytes of a job without its status; for a small job, the upper limit of small jobs."""
+    noted = text(part(job, "metadata", "annotations"), SIZE)
+    return int(noted) if noted.isdecimal() else SMALL
+
+
+def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
+    """Return a cut of all replicas, or only of the healthy or the unhealthy ones."""
+
+    def cuts(replica: Data) -> bool:
+        return healthy is None or (replica.get("phase") in _HEALTHY) is healthy
+
+    def all_of(status: Data) -> Data:
+        return {
+            **status,
+            "replicas": [
+                cut(replica) if cuts(replica) else replica for replica in status.get("replicas", ())
+            ],
+        }
+
+    return all_of
+
+
+def _simulators(replica: Data) -> Data:
+    return _without(replica, frozenset({"simulators"}))
+
+
+def _faults(replica: Data) -> Data:
+    return _in_attempt(replica, lambda attempt: _without(attempt, frozenset({"faults"})))
+
+
+def _log(replica: Data) -> Data:
+    return _in_attempt(replica, lambda attempt: _without(attempt, frozenset({"log"})))
+
+
+def _messages(replica: Data) -> Data:
+    return _in_attempt(_shortened(replica), _shortened)
+
+
+def _memory_kills(replica: Data) -> Data:
+    """Return a replica with only the count and the time of each kill, which identify a kill."""
+    kills = [{name: kill[name] for name in _OF_KILL} for kill in replica.get("memoryKills", ())]
+    return {**replica, "memoryKills": kills}
+
+
+def _left_out(status: Data) -> Data:
+    return _without(status, frozenset({"leftOut"}))
+
+
+def _conditions(status: Data) -> Data:
+    return {**status, "conditions": [_shortened(condition) for condition in status.get("conditions", ())]}
+
+
+# Applied in this order until the status fits.
+CUTS: tuple[Cut, ...] = (
+    _of_replicas(_simulators, healthy=True),
+    _of_replicas(_faults, healthy=True),
+    _of_replicas(_log, healthy=True),
+    _of_replicas(_simulators, healthy=False),
+    _of_replicas(_faults, healthy=False),
+    _of_replicas(_log, healthy=False),
+    _left_out,
+    _of_replicas(_messages),
+    _conditions,
+    _of_replicas(_memory_kills),
+)
+
+
+def _in_attempt(replica: Data, cut: Cut) -> Data:
+    attempt = replica.get("lastAttempt")
+    return replica if attempt is None else {**replica, "lastAttempt": cut(attempt)}
+
+
+def _shortened(data: Data) -> Data:
+    message = data.get("message")
+    if message is None or _size(message) <= SHORT:
+        return data
+    most = next(n for n in range(SHORT, -1, -1) if _size(message[:n]) <= SHORT - len("..."))
+    return {**data, "message": f"{message[:most]}..."}

@@ -1,0 +1,75 @@
+"""`palaestra try --local`: a few episodes of a job's environment on this machine; nothing is learned.
+
+The job is planned and checked as by `palaestra run`, into a temporary folder, and the trainer's program
+`palaestra-try` plays there in the first collecting simulator, which it starts as `palaestra-eval` does.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from palaestra.api import Driver, TrainingJob
+from palaestra.local import preflight
+from palaestra.local.errors import RunRefused
+from palaestra.local.pod_spec import read_pod
+from palaestra.local.replica import mount
+from palaestra.local.run_directory import job_directory, uid_of
+from palaestra.local.trainer_program import run_program
+from palaestra.plan import Images, LocalLayout, identified, plan
+from palaestra_protocol.pod.enums import Role
+
+PROGRAM = "palaestra-try"
+_OF_A_RUNNING_MASTER = ("ROS_MASTER_URI", "ROS_HOSTNAME")  # the program starts a master if none responds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TryOptions:
+    """The options of the command line; `version` is that of this release."""
+
+    agent: str
+    episodes: int
+    json: bool
+    version: str
+
+
+def try_here(job: TrainingJob, options: TryOptions) -> int:
+    """Play the episodes and return the exit code of the program that plays.
+
+    Raises:
+        LocalError: it cannot be played here; the message has one line for each reason.
+        PlanError: it cannot be run on one machine.
+        WorldError: one of its worlds is wrong.
+    """
+    _refuse_own_program(job)
+    with tempfile.TemporaryDirectory(prefix="palaestra-try-") as folder:
+        runs = Path(folder)
+        preflight.check(preflight.PreflightRequest(job=job, runs=runs))
+        directory = job_directory(runs, job.metadata.name)
+        env = _prepare(identified(job, uid_of(directory)), directory, options)
+        words = ["--agent", options.agent, "--episodes", str(options.episodes)]
+        command = [PROGRAM, str(directory / "0"), *words, *(["--json"] if options.json else [])]
+        return run_program(command, env, reads_keys=options.agent == "keyboard")
+
+
+def _prepare(job: TrainingJob, directory: Path, options: TryOptions) -> dict[str, str]:
+    """Write the files of the first replica as a run would; return the variables of its trainer."""
+    layout = LocalLayout(images=Images.of_release(options.version), job_directory=str(directory))
+    planned = plan(job, layout, replicas=[0]).replicas[0]
+    template = planned.job["spec"]["template"]
+    pod = read_pod(template, uid="")
+    mount(pod, template["spec"]["volumes"], planned.config_map)
+    simulator = next(each for each in pod.init if each.name.startswith("sim-"))
+    variables = {**simulator.env, **pod.main.env}
+    return {name: value for name, value in variables.items() if name not in _OF_A_RUNNING_MASTER}
+
+
+def _refuse_own_program(job: TrainingJob) -> None:
+    collecting = [(at, group) for at, group in enumerate(job.spec.simulators) if group.role is Role.COLLECT]
+    place, group = collecting[0]
+    if group.driver is Driver.COMMAND:
+        raise RunRefused(
+            f"spec.simulators[{place}].driver: command cannot be tried here; "
+            "set stub, mujoco or webots, or train a few steps with `palaestra run`"
+        )
