@@ -11,7 +11,7 @@ SIM := stub
 JOB := manifests/examples/move-to-target$(addprefix -,$(SIM:stub=)).yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
-# Bytecode is kept, whatever the surroundings say: else every process compiles PyTorch and all else anew, for seconds.
+# Bytecode is kept, whatever the environment says; otherwise every process compiles PyTorch and all else again, for seconds.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help setup test-packages run test check e2e images cluster cluster-down format bench soak golden lock
@@ -20,6 +20,14 @@ help: ## list the verbs
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
 
 setup: .venv/ready ## install what is needed into .venv; needs no root and no package of ROS
+
+# An index other than that of the last time replaces PyTorch.
+export TORCH_INDEX
+ifneq ($(TORCH_INDEX),)
+ifneq ($(TORCH_INDEX),$(shell cat .venv/torch-index 2>/dev/null))
+.PHONY: .venv/ready
+endif
+endif
 
 .venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh $(WEBOTS_ROS)
 	@tools/setup.sh
@@ -81,10 +89,10 @@ bench: setup test-packages ## measure what the project promises; prints JSON
 soak: setup test-packages ## prove that nothing ends a training run which nobody attends to; prints JSON, takes hours
 	@$(BIN)/python -m tests.soak
 
-golden: setup ## record the plans of the examples and other generated files anew
+golden: setup ## record the plans of the examples and other generated files again
 	@$(BIN)/python -m tests.golden
 
 lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
-	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra mujoco --extra export --extra install --extra sweeps $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra mujoco --extra export --extra film --extra install --extra sweeps --extra view $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
 	@$(COMPILE) --group notebook --constraint requirements.lock -o images/notebook/requirements.lock
 	@$(COMPILE) --group checkov -o tests/chart/checkov.lock

@@ -5,7 +5,7 @@ from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 
-with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if there is none
+with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if none runs
     robot = Robotino(webots)
     robot.connect()
     SimulatedScene(webots, robot).reset(seed=1, start=Pose(-1.5, 0.0, 0.0), target=(1.0, 0.0))

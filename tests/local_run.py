@@ -24,7 +24,7 @@ from tests.json_lines import whole_lines
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
-PATIENCE_S = 240.0  # of runs that take seconds on an idle machine; below pytest's deadline
+PATIENCE_S = 240.0  # long for runs that take seconds on an idle machine; below pytest's deadline
 REAPER = "reaper.py"  # its command line contains that of the simulator
 GONE_S = 10.0  # for the kernel to end killed processes
 LOOK_EVERY_S = 0.05  # a poll reads the run and all processes of the machine, which costs processor time

@@ -22,7 +22,7 @@ TEXTS = {
     "demo/Numbers": "\n".join(f"{type_} {type_}_" for type_ in NUMBERS),
     "demo/Arrays": "\n".join(f"{it} {it}_\n{it}[] many_{it}\n{it}[3] three_{it}" for it in NUMBERS),
     "demo/Everything": """\
-        # Constants are no fields, but part of the md5.
+        # Constants are not fields, but part of the md5.
 int32 FIRST=1 # the first
 string GREETING=hello # world
 float64 HALF =  0.5

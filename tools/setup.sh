@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Install what Palaestra needs into .venv, on a machine with Python 3.11 or newer; needs no root.
+# With TORCH_INDEX, PyTorch comes from that package index, such as the one with builds for the processor alone.
 # Safe to repeat; a failed run leaves no .venv/ready behind, so the next one starts over.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -25,10 +26,32 @@ if [[ ! -x .venv/bin/uv ]]; then
     exit 1
   fi
 fi
-echo "setup: installing the locked packages (PyTorch with CUDA is 3 GB; the first time takes minutes)"
 export VIRTUAL_ENV="$PWD/.venv" UV_LINK_MODE="${UV_LINK_MODE:-hardlink}"
-.venv/bin/uv pip install --quiet --require-hashes -r requirements.lock
-.venv/bin/uv pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image
+uv=.venv/bin/uv
+
+# Print the lock without PyTorch, and without the packages that only its build for CUDA needs.
+without_torch() { awk '/^[^ #]/ { dropped = /^(torch|triton|nvidia-[a-z0-9-]+)==/ } !dropped' requirements.lock; }
+
+# The choice is kept, so that a later `make setup` without it does not bring the large build back.
+index=${TORCH_INDEX:-$(cat .venv/torch-index 2>/dev/null || true)}
+if [[ -z $index ]]; then
+  echo "setup: installing the locked packages (PyTorch with CUDA is 3 GB to download, 5 GB on the disk;" \
+    "docs/start/laptop.md has a smaller one for a machine without a GPU)"
+  $uv pip install --quiet --require-hashes -r requirements.lock
+else
+  torch=$(grep -oE '^torch==[0-9.]+' requirements.lock)
+  echo "setup: installing the locked packages, and $torch from $index (a build for the processor alone is 0.2 GB)"
+  without_torch >.venv/without-torch.lock
+  # The lock names every dependency; a resolver would miss PyTorch in it.
+  $uv pip install --quiet --require-hashes --no-deps -r .venv/without-torch.lock
+  mapfile -t cuda < <($uv pip freeze | grep -oE '^(triton|nvidia-[a-z0-9-]+)==' | tr -d '=')
+  if ((${#cuda[@]})); then
+    $uv pip uninstall --quiet "${cuda[@]}" torch
+  fi
+  $uv pip install --quiet --no-deps --index-url "$index" "$torch"
+  echo "$index" >.venv/torch-index
+fi
+$uv pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image
 # For programs with rospy and ROS's own tools, where ROS is installed.
 if .venv/bin/python -c "import genmsg, genpy" 2>/dev/null; then
   .venv/bin/palaestra-webots-ros --importable .venv/share

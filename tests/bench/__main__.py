@@ -22,11 +22,13 @@ from tests.bench import (
     runs,
     simulators,
     stepping,
+    watched,
 )
 
 PARTS = {
     "stepping": stepping.measure,
     "simulators": simulators.measure,
+    "watched": watched.measure,
     "parallel": parallel.measure,
     "recovery": runs.measure_recovery,
     "shutdown": runs.measure_shutdown,
@@ -51,7 +53,7 @@ def main():
     asked = parser.parse_args()
     chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
-        parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
+        parser.error(f"{unknown[0]} is not a part; choose from {', '.join(PARTS)}")
     for name in chosen:
         started = time.monotonic()
         found = PARTS[name](asked.scale)

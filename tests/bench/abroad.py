@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.bench.learning import EPISODES, shortened, success_rate, train
 from tests.bench.sizes import scaled
-from tests.soak.jobs import example
+from tests.jobs import example
 
 HOMES = {"mujoco": "move-to-target-mujoco", "stub": "move-to-target"}
 CYLINDER_STEPS = 300_000

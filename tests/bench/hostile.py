@@ -22,9 +22,9 @@ from tests.integration.operator.installed import operator, wait_for
 ROOT = Path(__file__).parents[2]
 HOSTILE, OTHERS = 32, 5
 TENANTS = ("hostile-1", "hostile-2")  # as many as there are checks at a time
-MOST_BYTES = 899_900  # of a job's worlds together; more are refused
-MOST_BYTES_OF_ONE = 200_000  # of one inline world
-LARGE_BYTES = 150_000  # of a world that is also checked in a separate process
+MOST_BYTES = 899_900  # a job's worlds together; the operator refuses more
+MOST_BYTES_OF_ONE = 200_000  # one inline world
+LARGE_BYTES = 150_000  # a world of this size is also checked in a separate process
 PERIOD_S = 0.1
 DEADLINE_S = 600
 HEADER = b"#VRML_SIM R2023b utf8\n"

@@ -13,8 +13,8 @@ from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.simulators.entry_point import make
 from tests.bench.arena import running
 from tests.bench.sizes import scaled
+from tests.jobs import example
 from tests.local_run import PALAESTRA
-from tests.soak.jobs import example
 
 SEEDS = (1, 2, 3, 4, 5)
 SPARSE_SEEDS = (1, 2, 3)

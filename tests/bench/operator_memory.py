@@ -23,7 +23,7 @@ from tests.integration.operator.installed import asked, operator, wait_for
 ROOT = Path(__file__).parents[2]
 NAMESPACE = "crowd"
 LARGE, PLANNED, FINISHED = 400, 1_000, 10_000
-GROUPS, CHARACTERS = 5, 180_000  # of inline worlds: 900,000, the most that an API server accepts
+GROUPS, CHARACTERS = 5, 180_000  # inline worlds: 900,000 characters, the most that an API server accepts
 SETTLED_S, SETTLES_S = 5, 1200
 MIB = 1 << 20
 THEN = "2026-01-01T00:00:00Z"

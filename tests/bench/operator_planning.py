@@ -7,9 +7,10 @@ from palaestra.api import validate
 from palaestra.plan import ClusterLayout, Images, identified, plan
 from palaestra_sim.world import builtin, check
 from tests.bench.sizes import scaled
+from tests.jobs import make_job
 
 REPLICAS = 30
-SIMULATORS = 17  # of a replica: 16 collect, and one evaluates
+SIMULATORS = 17  # in one replica: 16 collect, and one evaluates
 WORLD_BYTES = 45_000
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 POST = """DEF POST_{0} Solid {{
@@ -65,12 +66,7 @@ def request(text, replicas):
         {"name": name, "role": role, "count": count, "world": {"inline": text}}
         for name, role, count in groups
     ]
-    return {
-        "apiVersion": "palaestra.dev/v1alpha1",
-        "kind": "TrainingJob",
-        "metadata": {"name": "large"},
-        "spec": {"replicas": replicas, "simulators": simulators},
-    }
+    return make_job("large", replicas=replicas, simulators=simulators)
 
 
 def cpu_s(work, rounds=3):

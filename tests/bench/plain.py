@@ -23,8 +23,8 @@ from palaestra_trainer.algorithms.hyperparameters import arguments
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import fake_arena
 from tests.bench.sizes import scaled
+from tests.jobs import example
 from tests.local_run import PALAESTRA
-from tests.soak.jobs import example
 
 JOB = "move-to-target"
 CONFIRMING = 100  # evaluation.confirmEpisodes, which the example does not set
@@ -50,6 +50,7 @@ def job(scale):
     made = example(JOB)
     trainer = made["spec"]["trainer"]
     evaluation = trainer["evaluation"]
+    del evaluation["stopAtSuccessRate"]  # both programs train all steps
     trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
     evaluation["episodes"] = scaled(evaluation["episodes"], scale)
     evaluation["confirmEpisodes"] = scaled(CONFIRMING, scale)

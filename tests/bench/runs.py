@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 from tests.bench.sizes import scaled
+from tests.jobs import example
 from tests.local_run import REAPER, is_running, running
-from tests.soak.jobs import example
 
 WARM_STEPS = 1500
 PATIENCE_S = 180

@@ -12,7 +12,7 @@ RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
 SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}
 LABELS = {"example.com/team": "robots"}
 
-# Another value than the default for each value.
+# For each value of the chart, a setting other than its default.
 OTHERS: dict[str, Any] = {
     "images.registry": "registry.example.com:5000/robots",
     "images.pullPolicy": "Never",
@@ -75,7 +75,7 @@ OTHERS: dict[str, Any] = {
     "jupyter.existingClaim": "notes",
     "jupyter.resources": RESOURCES,
 }
-# Other values that the schema requires together with a value.
+# For a value of the chart, the other values that the schema requires with it.
 BESIDE: dict[str, dict[str, Any]] = {
     "operator.leaderElection": {"operator.replicas": 1},
     "tensorboard.enabled": {"tensorboard.existingClaim": "runs"},

@@ -71,7 +71,7 @@ def _uses(entry: Object) -> Iterator[Use]:
     resource = "/".join(filter(None, (target["resource"], target.get("subresource"))))
     verbs = [entry["verb"]]
     if entry["verb"] == "patch" and entry.get("responseStatus", {}).get("code") == CREATED:
-        verbs.append("create")  # to apply a new object, a server checks both
+        verbs.append("create")  # an API server checks both verbs if a new object is applied
     for verb in verbs:
         right = Right(target.get("apiGroup", ""), resource, verb)
         yield Use(namespace, account, right, allowed, notes.get("authorization.k8s.io/reason", ""))

@@ -63,7 +63,7 @@ install_palaestra() {
   "$HERE/load.sh" "${rest[@]}"
   kubectl get namespace palaestra-system >/dev/null 2>&1 || installed=yes
   kubectl apply -f "$INSTALLATION" >/dev/null
-  # An image that was loaded anew has the name of the one that runs.
+  # An image that was loaded again has the name of the one that runs.
   [[ $installed ]] || kubectl -n palaestra-system rollout restart deployment/palaestra-operator >/dev/null
   kubectl -n palaestra-system rollout status deployment/palaestra-operator --timeout 120s >/dev/null ||
     die "the operator does not become ready: kubectl -n palaestra-system describe pods"

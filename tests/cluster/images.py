@@ -93,7 +93,8 @@ def _place(path: Path, tree: Path) -> PurePosixPath:
 
 def _libraries(path: Path, tree: Path) -> set[str]:
     command = ["chroot", str(tree), "ldd", f"/{_place(path, tree)}"]
-    listing = subprocess.run(command, check=False, capture_output=True, text=True).stdout  # 1: static
+    # ldd exits with 1 for a static program.
+    listing = subprocess.run(command, check=False, capture_output=True, text=True).stdout
     return set(re.findall(r"(/\S+)", listing)) - {f"/{_place(path, tree)}:"}
 
 

@@ -12,7 +12,7 @@ from tests.pages import anchors, chapters, links
 
 DOCS = ROOT / "docs"
 ENTRY = DOCS / "README.md"
-RECORDS = set(DOCS.glob("decisions/0*.md"))  # they have a form of their own
+RECORDS = set(DOCS.glob("decisions/0*.md"))  # decision records have a form of their own
 FIRST = re.compile(
     r"# [^\n]+\n\n(This page is for [^\n]+\. (?:At its end you (?:have|can|know) |Look up )[^\n]+\.)\n"
 )
@@ -67,6 +67,22 @@ def test_every_page_is_reached_from_the_entry():
         front = {page for page in front if DOCS in page.parents}
 
     assert set(DOCS.glob("**/*.md")) - reached == set()
+
+
+LLMS = ROOT / "llms.txt"
+
+
+def test_the_list_for_language_models_has_every_page_and_leads_nowhere_else():
+    """A program that reads only this list finds everything, in the form of https://llmstxt.org."""
+    text = LLMS.read_text()
+    listed = {target for _, target in re.findall(r"^- \[(.+?)\]\((.+?)\): .+\.$", text, re.MULTILINE)}
+
+    assert re.match(r"# Palaestra\n\n(> .+\n)+\n", text)
+    assert [heading for heading, _ in chapters(text)][1:5] == list(DOORS)
+    assert len(listed) == text.count("\n- ")
+    assert [target for target in listed if missing(LLMS, target)] == []
+    pages = {str(page.relative_to(ROOT)) for page in set(DOCS.glob("**/*.md")) - RECORDS - {ENTRY}}
+    assert pages - listed == set()
 
 
 @pytest.mark.parametrize("door", DOORS)

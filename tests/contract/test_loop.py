@@ -18,7 +18,7 @@ def test_the_loop_is_read_in_one_screen():
 
 
 def test_the_operator_makes_no_object():
-    """It applies decisions; if it called a function of the plan, objects would be made in two places."""
+    """The operator applies decisions; if it called functions of the plan, two places would make objects."""
     taken = {
         (node.module, each.name)
         for source in SOURCES
@@ -44,3 +44,8 @@ def test_a_look_observes_once():
         ("controller.py", "self._looking.look"),
         ("observer.py", "observe"),
     ]
+
+
+def test_the_loop_writes_the_status_in_one_place():
+    """A second write would need its own rules about conflicts and about events that follow it."""
+    assert inspect.getsource(Controller).count("self._reporting.report(") == 1

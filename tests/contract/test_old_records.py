@@ -1,7 +1,7 @@
 """The programs of today read what 0.1.0 wrote.
 
-The records are in tests/fixtures/0.1.0. A field that a later release adds is absent unless it is set. So what
-is written for a job that uses nothing newer has the fields of 0.1.0, and no others.
+The records are in tests/fixtures/0.1.0. A field that a later release adds is absent unless it is set. So the
+record of a job that uses nothing newer has the fields of 0.1.0, and no others.
 """
 
 import json
@@ -81,7 +81,7 @@ def test_a_status_that_uses_nothing_new_has_no_new_field(path):
     written = as_data(accept(recorded))
 
     known = set().union(*(fields(json.loads(each.read_text())["status"]) for each in JOBS))
-    assert fields(written["status"]) <= known  # each leaves its own empty lists out
+    assert fields(written["status"]) <= known  # each release leaves out lists that are empty
     assert fields(written["spec"]) == fields(recorded["spec"])
 
 
@@ -123,7 +123,7 @@ def test_an_answer_of_status_is_read_and_has_the_same_fields():
 
 
 def test_a_last_word_is_read_and_has_the_same_fields():
-    """It is all that is left of a pod."""
+    """A termination message is all that is left of a pod."""
     recorded = (OLD / "interrupted" / "termination.json").read_text()
 
     read = Termination.from_message(recorded)
@@ -137,7 +137,7 @@ def test_a_last_word_is_read_and_has_the_same_fields():
     [(TrainerStatus, "trainer-status.json"), (Termination, "interrupted/termination.json")],
 )
 def test_what_a_newer_trainer_reports_besides_is_ignored(kind, record):
-    """It may run in a job that names its own image."""
+    """A newer trainer may run in a job that names its own image."""
     known = json.loads((OLD / record).read_text())
     checkpointed = (known["last_checkpoint"] or {}) | {"of_tomorrow": 1}
 
@@ -169,7 +169,7 @@ def test_a_finished_run_is_known_to_be_finished():
 
 
 def test_a_checkpoint_of_two_collectors_is_whole_and_of_the_same_run():
-    """A newer trainer goes on from it."""
+    """A newer trainer continues from it."""
     directory = RunDirectory(OLD / "interrupted")
 
     found = checkpoint.newest(directory.checkpoints)

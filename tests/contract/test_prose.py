@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra.api.reasons import ROWS
+from palaestra.api.reason_texts import ROWS
 from tests.contract.prose import files, findings
 
 ROOT = Path(__file__).parents[2]

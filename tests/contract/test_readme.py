@@ -15,6 +15,13 @@ NOTEBOOK = (ROOT / "docs/start/notebook.md").read_text()
 FIGURES = "".join((ROOT / f"docs/explain/{name}.md").read_text() for name in ("reliability", "tasks"))
 
 
+# As `palaestra.local.progress_line` writes it.
+PROGRESS = re.compile(
+    r"step [\d,]+ of [\d,]+ · \d+ % \(\d+ to \d+\) of \d+ episodes · \d+ steps/s · "
+    r"\d+ faults? · \d+ (s|min) left"
+)
+
+
 def block(language):
     """Return the first block of a language."""
     return blocks(README, language)[0].removesuffix("\n")
@@ -37,33 +44,35 @@ def test_the_job_shown_is_the_minimal_example():
 
 
 def test_the_script_for_a_notebook_is_the_facade_example():
-    """It has its own test."""
+    """That example has its own test."""
     [script] = blocks(NOTEBOOK, "python with-a-simulator")
 
     assert (ROOT / "examples/facade.py").read_text().endswith(script)
 
 
 def test_the_lines_shown_are_of_words_that_the_programs_print():
-    """They are from a real run; an event that was renamed would be of another release."""
+    """They are from a real run, so no line has an event that was renamed since."""
     folders = (ROOT / "trainer/src", ROOT / "operator/src")
     sources = "".join(path.read_text() for folder in folders for path in folder.rglob("*.py"))
     lines = block("text").splitlines()
 
-    events = [re.match(r"\[\w+ *\] (.+?) \w+=", line)[1] for line in lines if line.startswith("[")]
-    titles = [re.match(r"  (\w[\w ]+?)  ", line)[1] for line in lines if line.startswith("  ")]
+    progress = [line for line in lines if line.startswith("step ")]
+    events = [found[1] for line in lines if (found := re.match(r"warning: (.+?): ", line))]
+    titles = [found[1] for line in lines if (found := re.match(r"  (\w[\w ]+?)  ", line))]
 
-    assert len(events) == len(titles) == 3
+    assert [line for line in progress if not PROGRESS.fullmatch(line)] == []
+    assert (len(progress), len(events), len(titles)) == (2, 1, 3)
     assert [words for words in (*events, *titles) if f'"{words}"' not in sources] == []
 
 
 def test_every_figure_comes_with_the_command_that_measures_it():
-    """And stands on the page that has the measurement."""
+    """The figure is also on the page that has the measurement."""
     bullets = re.findall(r"^- \*\*It .+`python -m (tests\.\w+ \w+)`$", README, re.MULTILINE)
 
     assert [command for command in bullets if f"`python -m {command}`" not in FIGURES] == []
     assert len(bullets) == 3
     assert [figure for figure in ("0.64 s", "0.07 s", "all 30") if figure not in FIGURES] == []
-    assert "| `truncated` | 99 | 99 | 99 | 99 | 99 |" in FIGURES
+    assert "| 99 | 96 | 96 | 98 | 98 |" in FIGURES
 
 
 def test_the_citation_names_the_paper_as_the_readme_does():

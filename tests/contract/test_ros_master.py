@@ -16,7 +16,8 @@ from palaestra_trainer.ros_master.api import MasterApi
 from palaestra_trainer.ros_master.serving import MasterServer
 from tests.waiting import eventually
 
-logging.getLogger("rosmaster").setLevel(logging.CRITICAL)  # it logs a traceback for each wrong argument
+# rosmaster logs a traceback for each wrong argument.
+logging.getLogger("rosmaster").setLevel(logging.CRITICAL)
 URI = "http://localhost:11311/"
 CALLERS = st.sampled_from(["/a", "/b", "/ns/c", "/"])
 URIS = st.sampled_from([f"http://host:{port}/" for port in (1, 2, 3)] + ["ftp://host", "", 7])
@@ -121,7 +122,7 @@ def rosmaster(tmp_path_factory):
         [sys.executable, "-c", program],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,  # a traceback for each node that is not there
+        stderr=subprocess.DEVNULL,  # rosmaster logs a traceback for each node that does not respond
         text=True,
         env={**os.environ, "ROS_LOG_DIR": str(tmp_path_factory.mktemp("log"))},
     )
@@ -231,7 +232,7 @@ print(rospy.is_shutdown(), flush=True)
 
 
 def test_rospy_works_with_our_master_and_ends_when_a_node_takes_its_name(tmp_path):
-    """Topics, parameters, and `shutdown` from the master, as with rosmaster."""
+    """The test uses topics, parameters, and `shutdown` from the master, as with rosmaster."""
     with MasterServer(name="localhost") as master:
         environment = {
             "ROS_MASTER_URI": master.uri,

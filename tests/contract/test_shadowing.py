@@ -10,7 +10,13 @@ from pathlib import Path
 import pytest
 
 PACKAGES = ("palaestra", "palaestra-sim", "palaestra-trainer")
-WITH_CODE_OF_USERS = {"palaestra-train", "palaestra-eval", "palaestra-export"}
+WITH_CODE_OF_USERS = {
+    "palaestra-train",
+    "palaestra-eval",
+    "palaestra-export",
+    "palaestra-compare",
+    "palaestra-try",
+}
 JOB = Path(__file__).parents[2] / "manifests/examples/tiny.yaml"
 TRAP = "raise RuntimeError(f'{__file__} was imported')\n"
 NEEDED = (
@@ -24,7 +30,8 @@ NEEDED = (
     "mujoco",
     "PIL",
 )
-# Python itself does not start with these, before any program of Palaestra: it decodes text and compiles.
+# If one of these is shadowed, Python itself does not start, because it needs them to decode text and to
+# compile. So no program of Palaestra can refuse them.
 UNAVOIDABLE = {"encodings", "__future__"}
 
 

@@ -40,7 +40,8 @@ CONTROLLERS = (
 )
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
-RARELY = {"GOGC": "400"}  # collect garbage: a plane lives for minutes, and a tenth of its work would be that
+# Garbage collection would be a tenth of the work, and a plane lives only for minutes.
+RARELY = {"GOGC": "400"}
 AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
     "kind": "Policy",

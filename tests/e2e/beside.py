@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from functools import partial
 from inspect import signature
+from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 import pytest
 
 from tests.e2e.cluster import Cluster
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import tiny_job
 from tests.e2e.namespace import Namespace, unique
 
 T = TypeVar("T")
@@ -72,7 +73,9 @@ class Stories:
                 assert isinstance(item, pytest.Function)
                 namespace = Namespace(self._cluster, unique(item.name))
                 self._namespaces[item.nodeid] = namespace
-                self._begun[item.nodeid] = Beside(partial(self._call, item, namespace))
+                # Here, because two threads that ask pytest first get two roots, and an error.
+                folder = self._folders.mktemp(BESIDE)
+                self._begun[item.nodeid] = Beside(partial(self._call, item, namespace, folder))
 
     def take(self, item: pytest.Item) -> Namespace | None:
         """Return the namespace of a test that has begun, which the caller must delete, or None."""
@@ -85,12 +88,12 @@ class Stories:
             story.result()
         return story is not None
 
-    def _call(self, item: pytest.Function, namespace: Namespace) -> None:
+    def _call(self, item: pytest.Function, namespace: Namespace, folder: Path) -> None:
         with self._room:
             known: dict[str, Any] = {
                 "namespace": namespace,
-                "job": make_job,
-                "tmp_path": self._folders.mktemp(BESIDE, numbered=True),
+                "job": tiny_job,
+                "tmp_path": folder,
                 **getattr(getattr(item, "callspec", None), "params", {}),
             }
             item.obj(**{name: known[name] for name in signature(item.obj).parameters})

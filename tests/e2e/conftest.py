@@ -17,7 +17,7 @@ from tests.e2e.askers import Asker
 from tests.e2e.beside import BESIDE, Stories
 from tests.e2e.cluster import Cluster, Object
 from tests.e2e.evictions import Evictions
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import tiny_job
 from tests.e2e.long_run import LongRun
 from tests.e2e.namespace import Namespace, unique
 
@@ -36,7 +36,7 @@ LATE = {  # marks, in the order of their groups
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the marks that determine the order of tests."""
-    config.addinivalue_line("markers", f"{BESIDE}: mostly waits, so it goes on beside others; see beside.py")
+    config.addinivalue_line("markers", f"{BESIDE}: mostly waits, so it runs next to others; see beside.py")
     for mark, why in LATE.items():
         config.addinivalue_line("markers", f"{mark}: {why}")
 
@@ -125,7 +125,7 @@ def always_interrupted(cluster: Cluster) -> Iterator[Namespace]:
     """A namespace with the job `always`, whose trainer always exits with 75 at the same step."""
     made = Namespace(cluster, unique("always"))
     word = '{"step": 7, "reason": "Interrupted: always"}'
-    made.apply(make_job("always", script=f"echo '{word}' >/dev/termination-log; exit 75", backoffLimit=0))
+    made.apply(tiny_job("always", script=f"echo '{word}' >/dev/termination-log; exit 75", backoffLimit=0))
     yield made
     made.delete()
 
@@ -175,4 +175,4 @@ def monitor(cluster: Cluster) -> Iterator[Asker]:
 @pytest.fixture
 def job() -> Callable[..., Object]:
     """Return the builder of small TrainingJobs; a test sets the fields that matter."""
-    return make_job
+    return tiny_job

@@ -7,7 +7,7 @@ import copy
 from typing import Any, NamedTuple
 
 from tests.e2e.cluster import Object
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import tiny_job
 from tests.e2e.namespace import SYSTEM
 
 CORE, BATCH = "api/v1/namespaces/{namespace}", "apis/batch/v1/namespaces/{namespace}"
@@ -63,7 +63,7 @@ REQUESTS = (
         "Uses another's quota.",
         "POST",
         "apis/palaestra.dev/v1alpha1/namespaces/default/trainingjobs",
-        make_job("own"),
+        tiny_job("own"),
     ),
     Request("a secret by name", "Holds another's password.", "GET", f"{CORE}/secrets/words", None),
     Request(
@@ -449,7 +449,7 @@ METADATA = tuple(
 
 def authors(name: str, *fields: tuple[str, Any]) -> Object:
     """Return a TrainingJob with fields set by path; it is suspended, because nothing has to run."""
-    job = make_job(name, script="exit 0", suspend=True)
+    job = tiny_job(name, script="exit 0", suspend=True)
     for path, value in fields:
         *above, last = path.split(".")
         inside: Any = job

@@ -4,7 +4,7 @@ import copy
 from typing import Any
 
 from tests.e2e.cluster import Object
-from tests.e2e.namespace import example
+from tests.jobs import example
 
 WAIT = "trap exit TERM; sleep 3600 & wait"
 LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
@@ -24,7 +24,7 @@ def make_claim(name: str, **metadata: Any) -> Object:
     return {"metadata": {"name": name, **metadata}, "spec": spec}
 
 
-def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
+def tiny_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
     """Return manifests/examples/tiny.yaml with another `name` and these fields of its spec.
 
     `script` is bash that replaces the training, with one simulator only. `simulator` has fields of the first
@@ -58,4 +58,4 @@ def make_slow_job(name: str, *, steps: int, every_steps: int, **spec: Any) -> Ob
         "evaluation": {"everySteps": 0},
         "resources": SMALL,
     }
-    return make_job(name, trainer=trainer, simulators=[SLOW], **spec)
+    return tiny_job(name, trainer=trainer, simulators=[SLOW], **spec)

@@ -6,10 +6,11 @@ from datetime import UTC, datetime
 from typing import Self
 
 from tests.e2e.cluster import CommandFailed, Object
-from tests.e2e.jobs import SMALL, make_job
-from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, example, named, trains
+from tests.e2e.jobs import SMALL, tiny_job
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, named, trains
+from tests.jobs import example
 
-NAME, STEPS = "move-to-target", 50_000
+NAME, STEPS = "move-to-target", 30_000
 # Its steps take time but no processor, so that it runs until the last kill on the fastest machine.
 PAIR, PAIR_STEPS = "pair", 3_000
 TENTH_OF_A_SECOND = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=100"}]
@@ -20,7 +21,7 @@ SEED = 20
 # renewal; in the other it has only just started. Together they are shorter than the pair's training.
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
-EVALUATED_EVERY = 12_500  # with more evaluations, these take a third of the training's time
+EVALUATED_EVERY = 10_000  # with more evaluations, these take a third of the training's time
 # The requests are so small that other pods fit next to it and come first if processors are short.
 SIMULATOR = {"requests": {"cpu": "1m", "memory": "160Mi"}}
 TRAINER = {"requests": {"cpu": "1m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
@@ -96,7 +97,9 @@ def _full() -> Object:
     for group in job["spec"]["simulators"]:
         group["resources"] = SIMULATOR
     job["spec"]["trainer"]["resources"] = TRAINER
-    job["spec"]["trainer"]["evaluation"]["everySteps"] = EVALUATED_EVERY
+    evaluation = job["spec"]["trainer"]["evaluation"]
+    evaluation["everySteps"] = EVALUATED_EVERY
+    del evaluation["stopAtSuccessRate"]  # the operator is killed until the last step
     return job
 
 
@@ -111,7 +114,7 @@ def _pair() -> Object:
         "checkpoint": {"everySteps": PAIR_STEPS},
         "resources": SMALL,
     }
-    return make_job(PAIR, replicas=REPLICAS, simulators=simulators, trainer=trainer)
+    return tiny_job(PAIR, replicas=REPLICAS, simulators=simulators, trainer=trainer)
 
 
 def make_killable(namespace: Namespace) -> None:

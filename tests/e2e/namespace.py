@@ -16,7 +16,6 @@ T = TypeVar("T")
 
 OPERATOR = "palaestra-operator"
 SYSTEM = "palaestra-system"
-EXAMPLES = Path(__file__).parents[2] / "manifests/examples"
 RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
 LOOK_EVERY_S = 0.5
 # These are for waits of 10 s and for a tiny training, on a busy machine whose operator is killed repeatedly.
@@ -229,12 +228,6 @@ def statuses(content: Object) -> list[Object]:
     """Return the statuses of all containers of a pod, in order; other objects have none."""
     status = content.get("status", {})
     return [*status.get("initContainerStatuses", []), *status.get("containerStatuses", [])]
-
-
-def example(name: str) -> Object:
-    """Return a TrainingJob of manifests/examples."""
-    job: Object = yaml.safe_load((EXAMPLES / f"{name}.yaml").read_text())
-    return job
 
 
 def _if_so(replica: Object, reason: str) -> Object:

@@ -63,7 +63,7 @@ def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, jo
 
 @pytest.mark.beside
 def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
-    """It is retried, but not with a limit of 0."""
+    """The run is retried, but not if the limit is 0."""
     namespace.apply(job("stalls", script="exit 82", backoffLimit=0))
 
     assert namespace.wait_for_end("stalls", LONG_S) == "Failed"

@@ -14,8 +14,8 @@ import yaml
 from tests.e2e.cluster import Object, Refused, path
 from tests.e2e.escalations import HELD, METADATA, REFUSED, REQUESTS, UNKNOWN, authors
 from tests.e2e.jobs import make_claim
-from tests.e2e.namespace import EXAMPLES
 from tests.e2e.tour import somebody_s
+from tests.jobs import EXAMPLES
 
 ROLE, _, BINDING = yaml.safe_load_all((EXAMPLES / "platform" / "roles.yaml").read_text())
 NAME = ROLE["metadata"]["name"]

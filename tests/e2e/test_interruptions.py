@@ -83,7 +83,7 @@ def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
 
 
 def test_a_run_whose_claim_is_deleted_waits_for_a_person(namespace):
-    """It trained from step 0 again, and nothing said so; a new value of the annotation gives the run up."""
+    """Otherwise it would silently train from step 0 again; a new value of the annotation gives the run up."""
     namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS))
     _, lost_at = namespace.wait_for_step("amid", AMID)
     namespace.patch("amid", suspend=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 from tests.e2e.cluster import Object
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import tiny_job
 from tests.e2e.kueue import (
     QUEUE,
     VERSION,
@@ -79,14 +79,14 @@ def robots(cluster, tmp_path_factory):
 @pytest.fixture(scope="module")
 def story(robots):
     """`everyday` trains, `patient` waits, `urgent` preempts `everyday`, and all of them end."""
-    robots.apply(make_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
+    robots.apply(tiny_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
     leave_room_for_one(robots, "everyday")
-    robots.apply(make_job("patient", trainer=ENDS, scheduling=scheduling()))
+    robots.apply(tiny_job("patient", trainer=ENDS, scheduling=scheduling()))
     short = wait_for_message(robots, "patient", SHORT)
     waited = robots.wait_for_reason("patient", "Queued")
     _, at = robots.wait_for_step("everyday", AMID)
 
-    robots.apply(make_job("urgent", trainer=ENDS, scheduling=scheduling("urgent")))
+    robots.apply(tiny_job("urgent", trainer=ENDS, scheduling=scheduling("urgent")))
     robots.wait(lambda: "lastAttempt" in robots.replica("everyday"))
     preempted = robots.wait_for_reason("everyday", "Queued")
     why = words(workload(robots, "everyday"), "Preempted")
@@ -111,9 +111,9 @@ def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
 
     assert story.preempted["phase"] == "Suspended"
     assert story.preempted["reason"] == last["reason"] == "Queued"
-    assert "which took it back" in last["message"]
+    assert "which evicted it" in last["message"]
     assert "Preempted to accommodate a workload" in story.why
-    assert any("which took it back" in each for each in robots.events("everyday", "Queued"))
+    assert any("which evicted it" in each for each in robots.events("everyday", "Queued"))
 
 
 def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
@@ -141,7 +141,7 @@ def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
     """The page has the messages and the remedies."""
     asked, queue, told = NEVER[name]
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
-    robots.apply(make_job(name, trainer=trainer, scheduling={"queueName": queue}))
+    robots.apply(tiny_job(name, trainer=trainer, scheduling={"queueName": queue}))
 
     assert f"waits in queue {queue} for Kueue: " in wait_for_message(robots, name, told)
     assert told in wait_for_words(robots, name, "QuotaReserved", told)
@@ -153,7 +153,7 @@ def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
     default = {"apiVersion": VERSION, "kind": "LocalQueue", "spec": {"clusterQueue": QUEUE}}
     robots.create("localqueues", {**default, "metadata": {"name": "default"}})
     change_queue(robots, stopPolicy="Hold")
-    robots.apply(make_job("anyone", script="exit 0"))
+    robots.apply(tiny_job("anyone", script="exit 0"))
     assert "waits in queue default" in robots.wait_for_reason("anyone", "Queued")["message"]
 
     change_queue(robots, stopPolicy="None")

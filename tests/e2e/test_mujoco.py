@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from tests.e2e.jobs import WAIT
-from tests.e2e.namespace import LONG_S, example
+from tests.e2e.namespace import LONG_S
 from tests.e2e.test_tools import typed
+from tests.jobs import example
 
 pytestmark = pytest.mark.timeout(900)
 

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from tests.e2e.askers import LISTEN, Asker, plain_pod
-from tests.e2e.jobs import WAIT, make_job
+from tests.e2e.jobs import WAIT, tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SHORT_S, SYSTEM, NeverHeld, named, trains
 
 pytestmark = pytest.mark.timeout(1200)
@@ -26,7 +26,7 @@ DENY_ALL = {"metadata": {"name": "deny"}, "spec": {"podSelector": {}, "policyTyp
 @pytest.fixture(scope="module")
 def pod(shared):
     """A pod in training, in a namespace with a NetworkPolicy."""
-    shared.apply(make_job("guarded", script=ANSWERS))
+    shared.apply(tiny_job("guarded", script=ANSWERS))
     return shared.get("pods", shared.wait_for_pod("guarded", LONG_S))
 
 
@@ -79,7 +79,7 @@ def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor
 def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, tmp_path):
     """The tool cyclonus evaluates the policy.
 
-    It was written to test networks, and is independent of Palaestra.
+    This tool was written to test networks, and is independent of Palaestra.
     """
     labels = shared.cluster.get("deployments", SYSTEM, OPERATOR)["spec"]["template"]["metadata"]["labels"]
     admitted = [peer(SYSTEM, labels), peer("monitoring", {}), peer("monitoring", {"any": "thing"})]

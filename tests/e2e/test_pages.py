@@ -15,7 +15,7 @@ import yaml
 from tests.chart.definitions import kinds_of_prometheus
 from tests.chart.helm import ROOT
 from tests.e2e.allowances import allow
-from tests.e2e.jobs import WAIT, make_job
+from tests.e2e.jobs import WAIT, tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
 from tests.e2e.served import (
     NOTEBOOKS,
@@ -113,7 +113,7 @@ class Stays:
 
     def __init__(self, namespace):
         self._namespace = namespace
-        namespace.apply(make_job("stays", script=WAIT))
+        namespace.apply(tiny_job("stays", script=WAIT))
         namespace.wait_for_pod("stays", LONG_S)
         namespace.wait(lambda: namespace.status("stays").get("phase") == "Running")
         self._before = self._seen()
@@ -163,7 +163,7 @@ def assert_a_run_is_shown_by_the_name_of_its_job(lab):
     """A job with the page's `storage` trains, and TensorBoard shows its run by the documented name."""
     specs = [yaml.safe_load(block).get("spec", {}) for block in blocks(INSTALL, "yaml")]
     [storage] = [spec["storage"] for spec in specs if "storage" in spec]
-    uid = lab.apply(make_job("shown", storage=storage))["metadata"]["uid"]
+    uid = lab.apply(tiny_job("shown", storage=storage))["metadata"]["uid"]
     assert lab.wait_for_end("shown", LONG_S) == "Succeeded"
 
     name, where = f"shown-{uid[:8]}/0", ("--namespace", LAB, f"deploy/{TENSORBOARD}")
@@ -183,7 +183,7 @@ def at_home(namespace, folder):
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
 def test_every_command_of_the_first_job_works(namespace, tmp_path):
-    """They lead from an empty namespace to a policy on this machine and a deleted job."""
+    """The commands lead from an empty namespace to a policy on this machine and a deleted job."""
     [session] = blocks(FIRST, "sh")
 
     printed = at_home(namespace, tmp_path).type_in(session, SESSION_S)
@@ -197,7 +197,7 @@ def test_every_command_of_the_first_job_works(namespace, tmp_path):
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
 def test_the_script_of_the_page_about_python_trains(namespace, tmp_path):
-    """It does the same from Python, with the job of the examples."""
+    """The script does the same from Python, with the job of the examples."""
     [script] = blocks(PYTHON, "python with-a-cluster")
     (tmp_path / "train.py").write_text(script)
 

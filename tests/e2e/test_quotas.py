@@ -6,13 +6,13 @@ import pytest
 
 from tests.e2e.allowances import LIMITED, MISSING, URGENT
 from tests.e2e.cluster import Object
-from tests.e2e.jobs import LITTLE, make_job
+from tests.e2e.jobs import LITTLE, tiny_job
 from tests.e2e.namespace import LONG_S, Namespace, named
 
 pytestmark = [pytest.mark.after_the_kills, pytest.mark.timeout(1200)]
 
 OF_LIMITED = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [LIMITED]}]}
-PLACE = "palaestra.dev/place"  # a resource of which there is one
+PLACE = "palaestra.dev/place"  # an extended resource; the node has one
 IN_PLACE = {"resources": {"requests": {**LITTLE["requests"], PLACE: "1"}, "limits": {PLACE: "1"}}}
 WAITS_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen;"
@@ -103,7 +103,7 @@ def places(make_namespace, classes):  # noqa: ARG001 - is there
     made = {name: make_namespace(f"refuses-{name}") for name in REFUSALS}
     for name, place in made.items():
         REFUSALS[name].begin(place)
-        place.apply(make_job("waits", script="exit 0", scheduling=REFUSALS[name].scheduling))
+        place.apply(tiny_job("waits", script="exit 0", scheduling=REFUSALS[name].scheduling))
     return made
 
 

@@ -36,7 +36,7 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
     namespace.apply(job("tiny"))
 
     assert namespace.wait_for_end("tiny") == "Succeeded"
-    namespace.wait(lambda: namespace.events("tiny", "Succeeded"))  # it follows the status
+    namespace.wait(lambda: namespace.events("tiny", "Succeeded"))  # the event follows the status
 
     status = namespace.status("tiny")
     replica = status["replicas"][0]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 
 pytestmark = pytest.mark.timeout(1200)
@@ -45,7 +45,7 @@ def readers(namespace):
 @pytest.mark.beside
 def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
     """The trainer is not disturbed."""
-    namespace.apply(make_job("goes-on", script=LEAVES_A_RUN + STAYS))
+    namespace.apply(tiny_job("goes-on", script=LEAVES_A_RUN + STAYS))
     namespace.wait(lambda: "left it" in typed(namespace, "logs", "goes-on")[1], LONG_S)
 
     code, told = typed(namespace, "fetch", "goes-on", f"--dir={tmp_path}")
@@ -60,7 +60,7 @@ def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
 @pytest.mark.beside
 def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
     """The pod for it meets *restricted* and is deleted afterwards."""
-    namespace.apply(make_job("ended", script=LEAVES_A_RUN))
+    namespace.apply(tiny_job("ended", script=LEAVES_A_RUN))
     assert namespace.wait_for_end("ended", LONG_S) == "Succeeded"
 
     code, told = typed(namespace, "fetch", "ended", f"--dir={tmp_path}")

@@ -6,7 +6,7 @@ It lists a person's actions, not the permissions, so that it finds a permission 
 from palaestra.plan.job import QUEUE_LABEL
 from palaestra_sim.world import builtin
 from tests.e2e.cluster import Object
-from tests.e2e.jobs import LITTLE, WAIT, make_claim, make_job
+from tests.e2e.jobs import LITTLE, WAIT, make_claim, tiny_job
 from tests.e2e.namespace import LONG_S, OPERATOR, Namespace, named
 
 FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
@@ -28,7 +28,7 @@ def tour(place: Namespace, operators: str) -> None:
     suspend(place, flag=False)  # the second operator finds the events of the first
     suspend(place, flag=True)
     place.create("resourcequotas", SPENT)
-    place.apply(make_job("refused", script="exit 0"))
+    place.apply(tiny_job("refused", script="exit 0"))
     place.wait(lambda: "PodsRefused" in place.reasons("refused"), LONG_S)
 
 
@@ -38,10 +38,10 @@ def refer(place: Namespace) -> None:
     world = {"arena.wbt": builtin("arena").decode()}
     place.create("configmaps", {"metadata": {"name": "worlds", "labels": FOR_JOBS}, "data": world})
     place.create("jobs", somebody_s("taken-0"))
-    place.apply(make_job("claimed", script="exit 0", suspend=True, storage={"existingClaim": "shared"}))
-    place.apply(make_job("mapped", script="exit 0", suspend=True, simulator={"world": WORLD}))
-    place.apply(make_job("taken", script="exit 0"))
-    place.apply(make_job("paused", script=WAIT, suspend=True))
+    place.apply(tiny_job("claimed", script="exit 0", suspend=True, storage={"existingClaim": "shared"}))
+    place.apply(tiny_job("mapped", script="exit 0", suspend=True, simulator={"world": WORLD}))
+    place.apply(tiny_job("taken", script="exit 0"))
+    place.apply(tiny_job("paused", script=WAIT, suspend=True))
     for name in ("claimed", "mapped", "paused"):
         place.wait(lambda name=name: place.select("jobs", name), LONG_S)
     place.wait(lambda: "NameTaken" in place.reasons("taken"), LONG_S)
@@ -55,13 +55,13 @@ def wait_in_queue(place: Namespace) -> None:
 
 def give_up(place: Namespace) -> None:
     """Let a job fail at once, and be deleted."""
-    place.apply(make_job("brief", trainer={"algorithm": {"name": "SAC"}}, ttlSecondsAfterFinished=1))
+    place.apply(tiny_job("brief", trainer={"algorithm": {"name": "SAC"}}, ttlSecondsAfterFinished=1))
     place.wait(lambda: place.get("trainingjobs", "brief") is None, LONG_S)
 
 
 def stop_suspended(place: Namespace) -> None:
     """Let the deadline of a job pass while one of its Jobs is suspended, which is then deleted."""
-    place.apply(make_job("over", script=WAIT, replicas=2, activeDeadlineSeconds=15))
+    place.apply(tiny_job("over", script=WAIT, replicas=2, activeDeadlineSeconds=15))
     place.wait(lambda: len(place.pods("over")) == 2, LONG_S)
     place.cluster.patch("jobs", place.name, "over-0", {"spec": {"suspend": True}})
     place.wait(lambda: place.get("jobs", "over-0") is None, LONG_S)
@@ -69,7 +69,7 @@ def stop_suspended(place: Namespace) -> None:
 
 def delete_unbound(place: Namespace) -> None:
     """Delete a job whose claim was never bound, which deletes the claim."""
-    place.apply(make_job("unbound", script=WAIT, suspend=True))
+    place.apply(tiny_job("unbound", script=WAIT, suspend=True))
     [claim] = place.wait(lambda: place.select("persistentvolumeclaims", "unbound"), LONG_S)
     place.cluster.delete("trainingjobs", place.name, "unbound")
     place.wait(lambda: place.get("persistentvolumeclaims", named(claim)) is None, LONG_S)

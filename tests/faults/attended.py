@@ -48,7 +48,7 @@ class AttendedOperator:
         self._ending.set()
         self._started[-1].kill()
         self._thread.join()
-        self._started[-1].kill()  # in case it was just being restarted
+        self._started[-1].kill()  # a restart may have started it meanwhile
 
     def _start(self) -> None:
         log = self._folder / f"operator-{len(self._started)}.log"

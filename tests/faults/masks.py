@@ -15,8 +15,9 @@ SHAPES = (
     (re.compile(r"\b[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\b"), "<uid>"),
     (re.compile(r"\b\d{4}-\d\d-\d\dT[\d:.]+Z"), "<time>"),
     (re.compile(r"\bplace-\d+-\d+\b"), "<namespace>"),
-    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer's, whichever was free
-    (re.compile(r"(?<=[-_])([0-9a-f]{10}|[0-9a-f]{8}|[0-9a-f]{6})\b"), "<digest>"),  # of a uid or a namespace
+    (re.compile(r"\b127(\.\d+){3}\b"), "<address>"),  # a trainer listens at the first address that is free
+    # In the name of an object, from a uid or a namespace.
+    (re.compile(r"(?<=[-_])([0-9a-f]{10}|[0-9a-f]{8}|[0-9a-f]{6})\b"), "<digest>"),
     (re.compile(r"(-\d+)-[a-z0-9]{5}\b"), r"\1-<pod>"),  # the Job controller adds it to a Job's name
 )
 NUMBER = re.compile(r"\d+(\.\d+)?")

@@ -42,7 +42,7 @@ class Kind(StrEnum):
     """The watch ends in the middle of an event."""
 
     FREEZE = "freeze the watch"
-    """The watch is silent for some seconds, and its cache is stale; then it goes on."""
+    """The watch is silent for some seconds, and its cache is stale; then it continues."""
 
     DELAY = "delay"
     """The request reaches the API server some seconds later."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
 WRITE, EVENT, GET, LIST, WATCH, CHANGE, LEASE = "write", "event", "get", "list", "watch", "change", "lease"
-ANSWER = "answer"  # that of a trainer; all others go to the API server
+ANSWER = "answer"  # a trainer sends it; the API server sends all other responses
 METHODS = {"GET": "get", "POST": "create", "PUT": "update", "PATCH": "patch", "DELETE": "delete"}
 APPLY = "application/apply-patch"
 GROUP_PARTS = {"api": 2, "apis": 3}  # /api/v1, /apis/batch/v1

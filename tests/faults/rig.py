@@ -21,7 +21,7 @@ from tests.faults.workloads import WORKLOADS, Stage
 from tests.integration.operator.installed import USER
 from tests.waiting import TooLate
 
-CALL_S = 60.0  # of the rig's own requests, on a busy machine
+CALL_S = 60.0  # for one request of the rig on a busy machine
 QUIET_S = 3.0
 SETTLES_S = 90.0  # a failed action is retried after a minute at most
 PACE_S = 0.3

@@ -1,4 +1,4 @@
-"""Record the generated files anew: `python -m tests.golden`.
+"""Record the generated files again: `python -m tests.golden`.
 
 - `tests/golden/`: the plans of the examples and of the cases, see `plans.py`
 - `manifests/crd.yaml`, docs/reference/trainingjob.md: made from the API's models
@@ -8,6 +8,7 @@
 - `docs/reference/simulators.md`: the devices of the stub
 - `docs/reference/ros-interface.md`: the services and topics of a robot
 - `docs/explain/judging.md`: the checks on a replica, in their order
+- `llms.txt`: the pages that docs/README.md links to
 - `charts/palaestra/README.md`: made from its values.yaml
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
 - `manifests/install.yaml`: the chart with its default values, where Helm is built
@@ -29,6 +30,7 @@ from tools.devices import page as devices
 from tools.hyperparameters import page as hyperparameters
 from tools.interface import page as interface
 from tools.judging import page as judging
+from tools.llms import page as llms
 from tools.metrics import page as metrics
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +47,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
     yield ROOT / interface.PAGE, interface.page((ROOT / interface.PAGE).read_text())
     yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())
+    yield ROOT / llms.PAGE, llms.page(ROOT)
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text
     yield readme.PATH, readme.text()
@@ -55,7 +58,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
 def main() -> int:
     """Write every file; recorded plans of examples and cases that are gone are removed."""
     current = set()
-    for path, text in recorded():  # one by one: the installation is rendered from what stands before it
+    for path, text in recorded():  # in this order: the installation is rendered from the files before it
         path.write_text(text)
         current.add(path)
     for stale in plans.on_disk() - current:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from difflib import SequenceMatcher
 from typing import NamedTuple
 
-CONTEXT = 1  # lines around a change; its place is in the head of the hunk
+CONTEXT = 1  # lines around a change; the head of a hunk names the place of the change
 
 Change = tuple[str, int, int, int, int]  # as difflib's: a tag, then the lines before and now
 
@@ -29,7 +29,8 @@ class Line(NamedTuple):
 def difference(before: str, now: str) -> Iterator[str]:
     """Yield the hunks of the diff from one plan to another, each with the place of its first change."""
     old, new = lines_of(before), lines_of(now)
-    changes = SequenceMatcher(None, old, new, autojunk=False)  # a line that a plan has often counts too
+    # autojunk would ignore lines that a plan has often.
+    changes = SequenceMatcher(None, old, new, autojunk=False)
     for hunk in changes.get_grouped_opcodes(CONTEXT):
         yield "".join(f"{line}\n" for line in (f"@@ {_place(hunk, old, new)} @@", *_signed(hunk, old, new)))
 

@@ -35,7 +35,7 @@ CASES = HERE / "cases"
 JOB = ".job.yaml"
 SMALLEST = "minimal"
 LAYOUTS = ("cluster", "local")
-IMAGES = Images.of_release("0.0.0")  # of no release, so that a release changes no plan
+IMAGES = Images.of_release("0.0.0")  # not the version of any release, so that a release changes no plan
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 
 Compared = tuple[str, str]  # the plan of the smallest job, and the plan that is compared with it
@@ -162,7 +162,7 @@ def with_worlds_named(objects: Iterable[Object]) -> list[Object]:
 
 
 def named(key: str, text: str) -> str:
-    """Return name, length and checksum of a world, any other text as it is."""
+    """Return the name, length and checksum of a text that is a world, and any other text unchanged."""
     if key == FILE:
         return text
     name = next((name for name in Builtin if builtin(name) == text.encode()), "the job's own world")

@@ -1,4 +1,4 @@
-"""Every recorded plan and every generated file is current; `make golden` records them anew."""
+"""Every recorded plan and every generated file is current; `make golden` records them again."""
 
 import runpy
 from difflib import unified_diff
@@ -9,7 +9,7 @@ from tests.golden import plans
 from tests.tables import for_each
 
 ROOT = plans.HERE.parents[1]
-MOST_LINES = 40  # of a message; git shows all of them after `make golden`
+MOST_LINES = 40  # a message shows so many; git shows all of them after `make golden`
 
 
 @cache
@@ -19,7 +19,7 @@ def recorded():
 
 
 def change_of(path):
-    """Return the lines by which a file differs from what belongs into it; none: it is current."""
+    """Return the difference between a file and its generated content, in lines; empty if it is current."""
     before, now = path.read_text() if path.exists() else "", recorded()[path]
     return list(unified_diff(before.splitlines(), now.splitlines(), "recorded", "now", lineterm=""))
 

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.jobs import example
 from tests.local_run import ROOT, LocalRun
 from tests.monitoring import targets
 from tests.monitoring.draw import Answers, draw, line
 from tests.monitoring.prometheus import Prometheus, scraping
 from tests.monitoring.questions import CHART, filled, panels, values_of
-from tests.soak.jobs import example
 
 IMAGES = ROOT / "docs/images"
 NAMESPACE = "robots"

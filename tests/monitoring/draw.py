@@ -55,7 +55,7 @@ class Line:
     labels: Mapping[str, str]
 
 
-Answers = Mapping[int, Sequence[Line]]  # by the panel's number
+Answers = Mapping[int, Sequence[Line]]  # keys: the numbers of panels
 
 
 def line(series: Mapping[str, Any], legend: str, began: float) -> Line:
@@ -131,7 +131,7 @@ def _top(lines: Sequence[Line], defaults: Mapping[str, Any]) -> float | None:
 
 
 def _stack(axes: Axes, series: Sequence[Line]) -> None:
-    lines = [each for each in series if each.values.any()]  # a share of nothing needs no name
+    lines = [each for each in series if each.values.any()]  # a line of zeros needs no entry in the legend
     minutes = np.unique(np.concatenate([each.minutes for each in lines] or [np.array([])]))
     values = [np.interp(minutes, each.minutes, each.values) for each in lines]
     axes.stackplot(minutes, *values, labels=[each.name for each in lines], alpha=0.75)

@@ -41,7 +41,7 @@ def main():
         return 0 if prove(f"faults --seed {asked.seed}", 1.0, lambda _: faults.repeat(asked.seed)) else 1
     chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
-        parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
+        parser.error(f"{unknown[0]} is not a part; choose from {', '.join(PARTS)}")
     held = [prove(name, asked.scale, PARTS[name]) for name in chosen]
     return 0 if all(held) else 1
 

@@ -8,8 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.jobs import example
 from tests.local_run import running
-from tests.soak.jobs import example
 
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 EPISODES = 100

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 from tests.local_run import LocalRun
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 STEPS = 1000
 CHECKPOINT_STEPS = 200
@@ -63,7 +63,7 @@ def measure(scale):
 
 def job():
     """Return a job that keeps several checkpoints."""
-    return make_job(
+    return tiny_job(
         algorithm=LITTLE_DQN,
         steps=1_000_000,
         evaluation={"everySteps": 0},

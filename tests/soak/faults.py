@@ -24,7 +24,7 @@ from tests.waiting import eventually
 KINDS = ROOT / "manifests" / "crd.yaml"
 AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # a run waits most of its time
 FEWEST = 200
-SEED = 1  # of the random sample below full scale
+SEED = 1  # for the random sample below full scale
 
 
 def measure(scale):

@@ -2,9 +2,7 @@
 
 import copy
 
-import yaml
-
-from tests.local_run import EXAMPLES
+from tests.jobs import example
 
 # This is the largest limit that a job can have. // A proof is about the cost of a fault, not about the
 # budget.
@@ -30,12 +28,7 @@ LITTLE_PPO = {
 }
 
 
-def example(name):
-    """Return a TrainingJob of manifests/examples."""
-    return yaml.safe_load((EXAMPLES / f"{name}.yaml").read_text())
-
-
-def make_job(*, collect=None, evaluate=None, faults="", seed=1, **trainer):
+def tiny_job(*, collect=None, evaluate=None, faults="", seed=1, **trainer):
     """Return manifests/examples/tiny.yaml with other fields.
 
     Args:

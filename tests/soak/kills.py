@@ -6,7 +6,7 @@ import signal
 import time
 
 from tests.local_run import is_running, running, send
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 TIMES = 50
 SEED = 5
@@ -43,7 +43,7 @@ def measure(scale):
 
 def job():
     """Return an endless job that often evaluates and saves."""
-    return make_job(
+    return tiny_job(
         algorithm=LITTLE_DQN,
         steps=1_000_000,
         evaluation={"everySteps": 500, "episodes": 2, "confirmEpisodes": 2},

@@ -3,7 +3,7 @@
 import re
 
 from tests.local_run import ROOT, running
-from tests.soak.jobs import ANY_NUMBER, LITTLE_DQN, LITTLE_PPO, make_job
+from tests.soak.jobs import ANY_NUMBER, LITTLE_DQN, LITTLE_PPO, tiny_job
 
 PAGE = ROOT / "docs/explain/reliability.md"
 ROW = re.compile(
@@ -12,7 +12,8 @@ ROW = re.compile(
 ALGORITHMS = (LITTLE_DQN, LITTLE_PPO)
 FAULT_KINDS = {"dead", "hung", "wrong_data"}
 EXIT_CODES = {"Succeeded": 0, "SimulatorBudgetSpent": 80}
-# A multiple of PPO's rollout. Episodes so short that there are more than 25 resets between two restarts.
+# The steps are a multiple of PPO's rollout. The episodes are so short that there are more than 25 resets
+# between two restarts.
 STEPS = 96
 EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}
 A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that fails after every restart
@@ -67,7 +68,7 @@ def is_as_told(found, ending, reported):
 def job(fault, algorithm, ending):
     """Return the job whose collecting and evaluating simulators have the same fault."""
     care = {"recycle": {"afterResets": 0}, "restart": ANY_NUMBER if ending == "Succeeded" else A_FEW}
-    return make_job(
+    return tiny_job(
         faults=fault,
         collect=care,
         evaluate=care,

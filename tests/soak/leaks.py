@@ -6,14 +6,15 @@ from collections import Counter
 from pathlib import Path
 
 from tests.local_run import LOOK_EVERY_S, below, running
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 RESTARTS = 500
 COLLECTORS = 2
 # A reset is two steps, so each life ends in the first episode.
 DIES = "crash:step=6"
 WATCHED = ("palaestra-train", "palaestra-sidecar")
-# A sidecar has up to three more of a kind while its simulator lives; of a leak it would have hundreds.
+# While its simulator lives, a sidecar holds up to three more of each kind of resource; with a leak it would
+# hold hundreds more.
 SWAY = 4
 LONGEST_S = 3600.0
 
@@ -36,7 +37,7 @@ def measure(scale):
 
 def job():
     """Return an endless job whose simulators die again and again."""
-    return make_job(
+    return tiny_job(
         collect={"count": COLLECTORS, "recycle": {"afterResets": 0}},
         faults=DIES,
         algorithm=LITTLE_DQN,
@@ -84,7 +85,8 @@ def holdings(run):
     found = {}
     for program in WATCHED:
         pids = set(run.pids(program))
-        forked = {pid for each in pids for pid, _ in below(each)}  # for a moment they have its name
+        # After a fork, a child has the name of its parent for a moment.
+        forked = {pid for each in pids for pid, _ in below(each)}
         for number, pid in enumerate(sorted(pids - forked)):
             found[f"{program} {number}"] = held_by(pid)
     return found

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from palaestra_trainer.ros.service import DEADLINE_S
 from tests.local_run import running
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 TIMES = 10
 WARM_STEPS = 100
@@ -77,7 +77,7 @@ def noticing(run):
 def training(*, standby=False):
     """Yield an endless run that collects with one simulator, after its first steps."""
     collect = {"recycle": {"afterResets": 0}} | ({"standby": True} if standby else {})
-    job = make_job(
+    job = tiny_job(
         collect=collect,
         algorithm=LITTLE_DQN,
         steps=1_000_000,

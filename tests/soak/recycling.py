@@ -7,7 +7,7 @@ of 40 steps, steps of 3 ms.
 import time
 
 from tests.local_run import running
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 EPISODES = 2500
 STEPS_AN_EPISODE = 40
@@ -47,7 +47,7 @@ def measure(scale):
 
 def play(episodes, collect, faults=""):
     """Return the duration and the summary of a complete `palaestra run`."""
-    job = make_job(
+    job = tiny_job(
         collect={"options": [f"--step-sleep-ms={STEP_MS}"]} | collect,
         faults=faults,
         environment=TASK,

@@ -16,7 +16,7 @@ from pathlib import Path
 import torch
 
 from tests.local_run import LocalRun, running, send
-from tests.soak.jobs import make_job
+from tests.soak.jobs import tiny_job
 
 SEED = 11
 POINTS = 3
@@ -98,7 +98,7 @@ def interrupt(run, step, way):
 def job(name, collectors):
     """Return a job that evaluates and saves a few times."""
     continuous = {"options": {"max_steps": 50, "actions": "continuous" if name in CONTINUOUS else "discrete"}}
-    return make_job(
+    return tiny_job(
         collect={"count": collectors},
         environment={"id": "MoveToTargetEnv-v0"} | continuous,
         algorithm={"name": name, "hyperparameters": ALGORITHMS[name]},

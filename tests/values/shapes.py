@@ -19,7 +19,7 @@ Points = tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ..
 # An L: 2 m along x and 2 m along y, 0.5 m thick and 1 m high.
 _OUTLINE = [(0.0, 0.0), (2.0, 0.0), (2.0, 0.5), (0.5, 0.5), (0.5, 2.0), (0.0, 2.0)]
 _CORNERS = [(x, y, z) for z in (-0.5, 0.5) for x, y in _OUTLINE]
-_ROOF = [(0, 1, 2, 3), (0, 3, 4, 5)]  # of the outline
+_ROOF = [(0, 1, 2, 3), (0, 3, 4, 5)]  # two convex faces that together fill the outline
 _SIDES = [(side, (side + 1) % 6, (side + 1) % 6 + 6, side + 6) for side in range(6)]
 _FACES = [*(face[::-1] for face in _ROOF), *(tuple(at + 6 for at in face) for face in _ROOF), *_SIDES]
 _TRIANGLES = [
@@ -30,6 +30,9 @@ _TRIANGLES = [
 _POINTS = ", ".join("{:g} {:g} {:g}".format(*corner) for corner in _CORNERS)
 _INDICES = ", ".join(f"{' '.join(map(str, face))} -1" for face in _FACES)
 ELL = f"IndexedFaceSet {{ coord Coordinate {{ point [ {_POINTS} ] }} coordIndex [ {_INDICES} ] }}"
+# Webots turns the cross-section by half a turn where the spine points along z. A clockwise one faces out.
+_SECTION = ", ".join(f"{-x:g} {-y:g}" for x, y in [*reversed(_OUTLINE), _OUTLINE[-1]])
+EXTRUSION = f"Extrusion {{ crossSection [ {_SECTION} ] spine [ 0 0 -0.5, 0 0 0.5 ] }}"
 SHEET = """IndexedFaceSet { coord Coordinate { point [ 0 -1 -1, 0 1 -1, 0 1 1, 0 -1 1 ] }
   coordIndex [ 0 1 2 3 -1 ] }"""
 _SHEET = [[(0, -1, -1), (0, 1, -1), (0, 1, 1)], [(0, -1, -1), (0, 1, 1), (0, -1, 1)]]  # it faces +x
@@ -55,7 +58,7 @@ class Shape:
         bounding: whether a boundingObject may have it.
         seen: the formula of the visible shape, if it is another one.
         volume_m3: None if it encloses none.
-        name: of the row, if its type has several.
+        name: distinguishes shapes of the same type in the names of tests.
     """
 
     type: str
@@ -157,6 +160,20 @@ SHAPES = (
             ((3.0, 2.5, 0.0), (1.0, 2.2, 0.0)),
         ),
         volume_m3=2.0 * 0.5 + 1.5 * 0.5,
+    ),
+    Shape(
+        "IndexedFaceSet",
+        EXTRUSION,
+        partial(rays.triangles, corners=_TRIANGLES),
+        (
+            ((3.0, 0.2, 0.1), (0.0, 0.2, 0.1)),
+            ((3.0, 1.2, 0.1), (0.0, 1.2, 0.1)),
+            ((1.2, 1.2, 2.0), (1.2, 1.2, 0.0)),
+            ((1.4, 1.6, 0.2), (1.0, 0.2, 0.0)),
+            ((0.2, 1.0, 2.0), (0.3, 1.2, 0.0)),
+        ),
+        volume_m3=2.0 * 0.5 + 1.5 * 0.5,
+        name="Extrusion",
     ),
     Shape(
         "IndexedFaceSet",

@@ -17,8 +17,8 @@ from tests.values.worlds import Setting
 
 GRAVITY = 3.7  # m/s2, of this world
 REFERENCE = np.array([100.0, -20.0, 7.0])  # WorldInfo.gpsReference, in the axes of the file
-MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # of each sensor in its robot
-POSES = (  # of the robot, in the axes of the ground
+MOUNT = frame((0.1, -0.25, 0.3), (0.6, 0.0, 0.8), 0.9)  # from each sensor to its robot
+POSES = (  # poses of the robot, in the axes of the ground
     frame((1.2, -0.7, 0.4), (0.3, -0.5, 0.8), 1.1),
     frame((-2.0, 3.0, 1.5), (1.0, 0.0, 0.0), 2.2),
     frame((0.1, 0.2, -3.0), (-0.6, 0.64, 0.48), -2.7),

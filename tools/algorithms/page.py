@@ -1,7 +1,7 @@
 """Which algorithm works with which observations and actions, in docs/reference/algorithms.md.
 
-The reasons are those that a person reads who tries it. tests/unit/trainer/algorithms/test_algorithms_grid.py
-trains in every cell that works.
+The reasons are the messages that a person gets who tries a refused combination.
+tests/unit/trainer/algorithms/test_algorithms_grid.py trains in every cell that works.
 """
 
 from palaestra.api.generated_sections import between_marks
@@ -17,7 +17,7 @@ WORKS = "works"
 
 
 def page(text: str) -> str:
-    """Return docs/reference/algorithms.md, of which `text` is what it was, with the table made anew.
+    """Return docs/reference/algorithms.md with a new table; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.
@@ -26,7 +26,7 @@ def page(text: str) -> str:
 
 
 def refusal(name: str, seen: str, acted: str) -> str:
-    """Return why an algorithm is refused in a task with these spaces; "" if it works."""
+    """Return the reason for which an algorithm is refused in a task with these spaces; "" if it works."""
     try:
         policy_of_spaces(Algorithm(name=name), ALGORITHMS[name], OBSERVATIONS[seen], ACTIONS[acted])
     except ConfigurationError as error:

@@ -38,7 +38,7 @@ class Variable:
     says: str
 
     def build(self) -> QueryVariable:
-        """Return it as Grafana has it: several may be chosen, and all are at first."""
+        """Return the choice in Grafana's model: several values may be chosen, and at first all are."""
         return (
             QueryVariable(self.name)
             .label(self.name.capitalize())
@@ -68,7 +68,7 @@ class Board:
 
     Attributes:
         name: its file, its title, and its address in Grafana: /d/palaestra-<name>.
-        says: what it answers, and for whom.
+        says: the questions that it answers, and its readers.
         since: the time that it shows at first, as Grafana has it: now-1h.
     """
 
@@ -79,7 +79,7 @@ class Board:
     sections: tuple[Section, ...]
 
     def build(self) -> DashboardModel:
-        """Return it as Grafana's model."""
+        """Return the dashboard in Grafana's model."""
         made = (
             Dashboard(f"Palaestra / {self.name.capitalize()}")
             .uid(f"palaestra-{self.name}")

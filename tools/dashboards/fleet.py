@@ -6,7 +6,7 @@ from tools.dashboards.board import Board, Section, Variable
 from tools.dashboards.metrics import grown, of_jobs, of_namespace, quantile, rate, total
 from tools.dashboards.panels import Look, Panel, Query
 
-_LONG = "30m"  # evaluations and checkpoints even out
+_LONG = "30m"  # over so long a time, evaluations and checkpoints even out
 _OF_RUNS = 'training_job!=""'
 
 
@@ -32,7 +32,7 @@ def board() -> Board:
 def _phases() -> Panel:
     return Panel(
         question="In which phases are the jobs?",
-        says="TrainingJobs that exist now; those that ended stay until their time to live is over.",
+        says="TrainingJobs that exist now; a job that has ended stays until its time to live is over.",
         unit=units.Short,
         look=Look.SHARES,
         least=0,
@@ -44,7 +44,10 @@ def _namespaces() -> Panel:
     running = of_jobs("palaestra_jobs", 'phase="Running"')
     return Panel(
         question="Whose jobs run?",
-        says="Running jobs by namespace. One has them all while others wait: set quotas or a queue.",
+        says=(
+            "Running jobs by namespace. If one namespace has them all while others wait, set quotas or a "
+            "queue."
+        ),
         unit=units.Short,
         look=Look.SHARES,
         least=0,
@@ -57,8 +60,8 @@ def _pending() -> Panel:
     return Panel(
         question="Whose jobs wait?",
         says=(
-            "Pending and suspended jobs by namespace. Pending for long: `kubectl describe tj` says what is "
-            "missing: room in the cluster, a quota, a volume, an image."
+            "Pending and suspended jobs by namespace. If a job is pending for long, `kubectl describe "
+            "tj` shows what is missing: room in the cluster, a quota, a volume, an image."
         ),
         unit=units.Short,
         look=Look.SHARES,
@@ -72,8 +75,8 @@ def _ends() -> Panel:
     return Panel(
         question="How did replicas end?",
         says=(
-            "Over the time shown, in all namespaces, by reason. Each reason has its remedy in the "
-            "operations page; `kubectl get tj -A` shows which jobs they were."
+            "Ends over the time shown, in all namespaces, by reason. The operations page has the "
+            "remedy for each reason; `kubectl get tj -A` shows which jobs they were."
         ),
         unit=units.Short,
         look=Look.FIGURES,
@@ -86,8 +89,9 @@ def _restarts() -> Panel:
     return Panel(
         question="Why did replicas begin again?",
         says=(
-            "Over the time shown, in all namespaces. disruption: nodes were drained or preempted; "
-            "suspension: a queue took turns; trainer, simulator: see the job's events."
+            "Restarts over the time shown, in all namespaces. disruption: nodes were drained or "
+            "preempted; suspension: a queue let other jobs run; trainer, simulator: see the job's "
+            "events."
         ),
         unit=units.Short,
         look=Look.FIGURES,
@@ -100,8 +104,9 @@ def _waits() -> Panel:
     return Panel(
         question="How long until a job runs?",
         says=(
-            "From its creation until its first pod starts, queueing included: median and the slowest of ten "
-            "over the time shown. Minutes without a queue: images are pulled, or the cluster is full."
+            "Time from a job's creation until its first pod starts, queueing included: the median and "
+            "the slowest of ten, over the time shown. If it takes minutes without a queue, images "
+            "are being pulled or the cluster is full."
         ),
         unit=units.Seconds,
         look=Look.FIGURES,
@@ -115,7 +120,7 @@ def _waits() -> Panel:
 def _steps() -> Panel:
     return Panel(
         question="How many steps does the fleet make in a second?",
-        says="Valid steps of all runs, by namespace. It falls while as many jobs run: see Simulators.",
+        says="Valid steps of all runs, by namespace. If it falls while as many jobs run, see Simulators.",
         unit=units.OpsPerSecond,
         least=0,
         width=6,
@@ -128,7 +133,10 @@ def _steps() -> Panel:
 def _cores() -> Panel:
     return Panel(
         question="How many cores do they use?",
-        says="Trainers, sidecars and simulators, by namespace. Far below what they request: request less.",
+        says=(
+            "Trainers, sidecars and simulators, by namespace. If they use far less than they request, "
+            "request less."
+        ),
         unit=units.Short,
         least=0,
         width=6,
@@ -142,8 +150,9 @@ def _cost() -> Panel:
     return Panel(
         question="What do a million steps cost in core-hours?",
         says=(
-            "Over the last half hour, evaluations included. A job far above its like: its simulators are "
-            "slow or break (Simulators), or it spends its time learning (Training)."
+            "Over the last half hour, evaluations included. If a job costs far more than similar "
+            "jobs, its simulators are slow or break (Simulators), or it spends its time learning "
+            "(Training)."
         ),
         unit=units.Short,
         least=0,
@@ -161,8 +170,9 @@ def _useful() -> Panel:
     return Panel(
         question="Which share of the time is training?",
         says=(
-            "Stepping, transport and learning, by namespace; the rest is evaluating, saving, starting, "
-            "recovering and recycling. It falls: see where the time of its runs goes (Training)."
+            "Stepping, transport and learning, by namespace; the rest is evaluating, saving, "
+            "starting, recovering and recycling. If it falls, see where the time of its runs goes "
+            "(Training)."
         ),
         unit=units.PercentUnit,
         least=0,
@@ -173,7 +183,7 @@ def _useful() -> Panel:
 
 
 def _cores_by(labels: str, over: str) -> str:
-    """Return the cores that runs use; a simulator's processes are no children of anything we scrape."""
+    """Return the cores that runs use; no process that we scrape is the parent of a simulator's processes."""
     ours = total(labels, rate(of_namespace("process_cpu_seconds_total", _OF_RUNS), over))
     theirs = total(labels, rate(of_namespace("palaestra_simulator_cpu_seconds_total"), over))
     return f"{ours} + {theirs}"

@@ -8,7 +8,7 @@ from typing import Final
 from tools.dashboards.board import Variable
 
 RATE: Final = "$__rate_interval"
-RUN: Final = "{{training_job}}/{{replica}}"  # the legend of a line a run
+RUN: Final = "{{training_job}}/{{replica}}"  # the legend where each run has one line
 _CHOSEN: Final = ('namespace=~"$namespace"', 'training_job=~"$job"', 'replica=~"$replica"')
 
 RUN_CHOICES: Final = (
@@ -69,6 +69,6 @@ def total(by: str, expr: str) -> str:
 
 
 def quantile(q: float, by: str, buckets: str, over: str = RATE) -> str:
-    """Return a quantile of what a histogram has seen lately."""
+    """Return a quantile of the recent values of a histogram."""
     labels = f"{by}, le" if by else "le"
     return f"histogram_quantile({q:g}, {total(labels, rate(buckets, over))})"

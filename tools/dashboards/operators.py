@@ -19,7 +19,7 @@ def board() -> Board:
             Variable(name="operator", metric=_IS_OPERATOR, label="namespace", says="Where operators run"),
         ),
         sections=(
-            Section("Is somebody there?", (_leader(), _releases(), _uptime())),
+            Section("Does an operator run?", (_leader(), _releases(), _uptime())),
             Section("Does it keep up?", (_depth(), _waits(), _looks(), _seconds(), _failed())),
             Section("What does it ask of the API server?", (_answers(), _refused(), _requests(), _latency())),
             Section("What does it need?", (_memory(), _cores())),
@@ -28,12 +28,12 @@ def board() -> Board:
 
 
 def _of(metric: str, *matchers: str) -> str:
-    """Return a metric of the chosen operators; `namespace` is that of jobs on the other dashboards."""
+    """Return a metric of the chosen operators; on other dashboards, `namespace` is that of jobs."""
     return selected(metric, 'namespace=~"$operator"', *matchers)
 
 
 def _of_process(expr: str) -> str:
-    """Return what every process tells, of operators only."""
+    """Return a metric that every process exports, for operators only."""
     return f"{expr} and on (namespace, pod) {_of(_IS_OPERATOR)}"
 
 
@@ -41,8 +41,8 @@ def _leader() -> Panel:
     return Panel(
         question="Who leads?",
         says=(
-            "1 for the pod that leads; the others wait. Nobody for minutes is an alert: read the operators' "
-            "logs, and look at the Lease palaestra-operator."
+            "1 for the pod that leads; the others wait. An alert fires if no pod leads for minutes: "
+            "then read the operators' logs, and look at the Lease palaestra-operator."
         ),
         unit=units.Short,
         least=0,
@@ -54,7 +54,10 @@ def _leader() -> Panel:
 def _releases() -> Panel:
     return Panel(
         question="Which releases run?",
-        says="Pods by release. Two for longer than an upgrade: it is stuck; describe the Deployment.",
+        says=(
+            "Pods by release. If there are two releases for longer than an upgrade takes, the upgrade is "
+            "stuck: describe the Deployment."
+        ),
         unit=units.Short,
         look=Look.FIGURES,
         queries=(Query(total("version", _of(_IS_OPERATOR)), "{{version}}"),),
@@ -64,7 +67,10 @@ def _releases() -> Panel:
 def _uptime() -> Panel:
     return Panel(
         question="For how long have they run?",
-        says="Back to zero again and again: it crashes; read `kubectl logs --previous` of the pod.",
+        says=(
+            "If it returns to zero again and again, the operator crashes: read `kubectl logs --previous` "
+            "of the pod."
+        ),
         unit=units.Seconds,
         least=0,
         queries=(Query(f"time() - ({_of_process(_of('process_start_time_seconds'))})", "{{pod}}"),),
@@ -74,7 +80,7 @@ def _uptime() -> Panel:
 def _depth() -> Panel:
     return Panel(
         question="How many TrainingJobs wait for a worker?",
-        says="It returns to zero. Growing: the API server is slow, or raise the operator's workers.",
+        says="It returns to zero. If it grows, the API server is slow, or the operator needs more workers.",
         unit=units.Short,
         least=0,
         queries=(Query(_of("palaestra_operator_queue_depth"), "{{pod}}"),),
@@ -85,7 +91,10 @@ def _waits() -> Panel:
     waits = _of("palaestra_operator_queue_wait_seconds_bucket")
     return Panel(
         question="How long do they wait?",
-        says="Median and the slowest of a hundred. Above a second: see how many wait, how long a look is.",
+        says=(
+            "The median and the slowest of a hundred. If it is above a second, see how many jobs wait, "
+            "and how long a look takes."
+        ),
         unit=units.Seconds,
         least=0,
         queries=(
@@ -100,8 +109,8 @@ def _looks() -> Panel:
     return Panel(
         question="How do its looks at a job end?",
         says=(
-            "Looks a second. conflict is harmless: somebody else wrote meanwhile. error is not: the log says "
-            "`not reconciled` or `refused`, and why."
+            "Looks a second. conflict is harmless: another client wrote meanwhile. error is not "
+            "harmless: the log has `not reconciled` or `refused`, with the cause."
         ),
         unit=units.OpsPerSecond,
         least=0,
@@ -113,7 +122,10 @@ def _seconds() -> Panel:
     looks = _of("palaestra_operator_reconcile_duration_seconds_bucket")
     return Panel(
         question="How long is one look?",
-        says="Median and the slowest of a hundred; nearly all of it is waiting for the API server.",
+        says=(
+            "The median and the slowest of a hundred; nearly all of the time is spent waiting for the API "
+            "server."
+        ),
         unit=units.Seconds,
         least=0,
         width=12,
@@ -142,8 +154,8 @@ def _answers() -> Panel:
     return Panel(
         question="What does the API server answer?",
         says=(
-            "Answers a second by code. 0: no answer. 403: a right is missing, install the chart anew. 409: "
-            "harmless. 429: it is throttled."
+            "Responses a second by code. 0: no response. 403: a right is missing; install the chart "
+            "again. 409: harmless. 429: the operator is throttled."
         ),
         unit=units.RequestsPerSecond,
         least=0,
@@ -157,7 +169,10 @@ def _refused() -> Panel:
     refused = _of(requests, 'code=~"0|4..|5.."', 'code!~"404|409"')
     return Panel(
         question="Which share of its requests fails?",
-        says="Without those that are part of its work (404, 409). Above zero: see the codes, then its log.",
+        says=(
+            "Failures that are part of its work (404, 409) are not counted. If it is above zero, see the "
+            "codes, then the operator's log."
+        ),
         unit=units.PercentUnit,
         least=0,
         width=6,
@@ -170,8 +185,8 @@ def _requests() -> Panel:
     return Panel(
         question="What does it ask for?",
         says=(
-            "Requests a second by verb and resource. While no job changes it is its Lease and nothing else; "
-            "if not, something changes the jobs all the time."
+            "Requests a second by verb and resource. While no job changes, the operator only renews "
+            "its Lease; if there are more requests, something changes the jobs all the time."
         ),
         unit=units.RequestsPerSecond,
         least=0,
@@ -184,7 +199,10 @@ def _latency() -> Panel:
     requests = _of("palaestra_operator_request_duration_seconds_bucket")
     return Panel(
         question="How long does an answer take?",
-        says="The slowest of a hundred, by verb, watches aside. Above a second: the API server is loaded.",
+        says=(
+            "The slowest of a hundred, by verb, without watches. If it is above a second, the API server "
+            "is loaded."
+        ),
         unit=units.Seconds,
         least=0,
         width=6,
@@ -196,8 +214,9 @@ def _memory() -> Panel:
     return Panel(
         question="Does its memory grow?",
         says=(
-            "It grows with the number of jobs: 49 MiB without any, 18 MiB for each 1,000 planned, 2.4 MiB "
-            "for each 1,000 finished. It grows without them: please report it."
+            "It grows with the number of jobs: 49 MiB without any, 18 MiB for each 1,000 planned, 2.4 "
+            "MiB for each 1,000 finished. If it grows while the number of jobs does not, please "
+            "report it."
         ),
         unit=units.BytesIEC,
         least=0,
@@ -210,7 +229,10 @@ def _cores() -> Panel:
     cpu = rate(_of("process_cpu_seconds_total"))
     return Panel(
         question="How many cores does it use?",
-        says="At the limit of its resources it is throttled, and jobs wait: raise it.",
+        says=(
+            "If it is at the limit of its resources, the operator is throttled and jobs wait: raise the "
+            "limit."
+        ),
         unit=units.Short,
         least=0,
         width=12,

@@ -52,7 +52,7 @@ Built = Timeseries | Stat | Heatmap
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """What Prometheus is asked, and what a series of the answer is called; `{{x}}` is the label x."""
+    """A query to Prometheus, and the name of each series of its result; `{{x}}` is the label x."""
 
     expr: str
     legend: str
@@ -67,7 +67,7 @@ class Panel:
         says: how to read the answer, and what to do.
         unit: of all values, one of `grafana_foundation_sdk.models.units`.
         least, most: the ends of the axis; None: as the values are.
-        alarm: the value from which on the answer is drawn red.
+        alarm: values from this one on are drawn red.
         width: in columns; a row has 24.
     """
 
@@ -82,7 +82,7 @@ class Panel:
     width: int = 8
 
     def build(self) -> Built:
-        """Return it as Grafana's SDK has it."""
+        """Return the panel in the model of Grafana's SDK."""
         built = _LOOKS[self.look](self)
         built.title(self.question).description(self.says)
         built.datasource(SOURCE).unit(self.unit).span(self.width).height(HEIGHT)

@@ -18,7 +18,7 @@ def board() -> Board:
         since="now-1h",
         variables=RUN_CHOICES,
         sections=(
-            Section("Are they there?", (_available(), _states(), _up())),
+            Section("Do the simulators run?", (_available(), _states(), _up())),
             Section("Do they break?", (_faults(), _restarts(), _budget(), _exits(), _starts())),
             Section(
                 "Are they fast enough?", (_factor(), _latency(), _spread(), _slow(), _simulated(), _resets())
@@ -32,8 +32,8 @@ def _available() -> Panel:
     return Panel(
         question="With how many does it train?",
         says=(
-            "As the trainer sees them. starting: being mended or on their way. given_up: broke more often "
-            "than restart.limit; the run goes on with the rest while minSimulators are left."
+            "The trainer's view. starting: they start or restart. given_up: they failed more often "
+            "than restart.limit; the run continues with the rest while minSimulators are left."
         ),
         unit=units.Short,
         look=Look.SHARES,
@@ -46,8 +46,9 @@ def _states() -> Panel:
     return Panel(
         question="In which states are their processes?",
         says=(
-            "As the sidecars see them. Long in starting: the world is large, or the CPU limit small. In "
-            "failed: it did not come up; read the log of the container sim-<group>-<i>."
+            "The sidecars' view. If one is in starting for long, its world is large or its CPU limit "
+            "is small. If one is in failed, it did not start: read the log of the container "
+            "sim-<group>-<i>."
         ),
         unit=units.Short,
         look=Look.SHARES,
@@ -59,7 +60,7 @@ def _states() -> Panel:
 def _up() -> Panel:
     return Panel(
         question="Does each have a process?",
-        says="1 for each simulator, b for its standby. 0: it is being restarted, or waits for the trainer.",
+        says="1 for each simulator; b is its standby. 0: it is being restarted, or waits for the trainer.",
         unit=units.Short,
         least=0,
         most=1,
@@ -72,8 +73,9 @@ def _faults() -> Panel:
     return Panel(
         question="Which faults do they have?",
         says=(
-            "Faults in a minute. dead: its process ended; hung: no answer in time; wrong_data: not finite, "
-            "or of a wrong size. One simulator only: its world or its node; all of them: the image."
+            "Faults in a minute. dead: its process ended; hung: no response in time; wrong_data: not "
+            "finite, or of a wrong size. If only one simulator has them, the cause is its world or "
+            "its node; if all have them, it is the image."
         ),
         unit=units.Short,
         least=0,
@@ -86,8 +88,8 @@ def _restarts() -> Panel:
     return Panel(
         question="Why are they restarted?",
         says=(
-            "Restarts since the trainer began. recycled is by choice: resets, age or memory reached a limit "
-            "of the job's `recycle`. All else followed a fault."
+            "Restarts since the trainer began. recycled restarts are planned: resets, age or memory "
+            "reached a limit of the job's `recycle`. All others followed a fault."
         ),
         unit=units.Short,
         least=0,
@@ -99,8 +101,9 @@ def _budget() -> Panel:
     return Panel(
         question="How much of the restart budget is spent?",
         says=(
-            "Restarts after faults within restart.withinSeconds, by restart.limit. At 1 the next fault gives "
-            "the simulator up, and may end the run. Above 0.7 it is an alert: find the cause of the faults."
+            "Restarts after faults within restart.withinSeconds, divided by restart.limit. At 1, the "
+            "next fault gives the simulator up, and may end the run. Above 0.7 an alert fires: find "
+            "the cause of the faults."
         ),
         unit=units.PercentUnit,
         least=0,
@@ -115,8 +118,8 @@ def _exits() -> Panel:
     return Panel(
         question="How do their processes end?",
         says=(
-            "Ends that nobody asked for, since the sidecar began. signal: killed, for its memory perhaps; "
-            "code: it gave up by itself, its log says why."
+            "Unrequested exits since the sidecar began. signal: the process was killed, perhaps for "
+            "its memory; code: it exited by itself, and its log has the reason."
         ),
         unit=units.Short,
         least=0,
@@ -128,7 +131,10 @@ def _exits() -> Panel:
 def _starts() -> Panel:
     return Panel(
         question="How often were they started?",
-        says="Since the sidecar began; 1 is the start itself. It rises with every restart, wanted or not.",
+        says=(
+            "Starts since the sidecar began; the first start counts as 1. It rises with every restart, "
+            "requested or not."
+        ),
         unit=units.Short,
         least=0,
         width=12,
@@ -142,8 +148,9 @@ def _factor() -> Panel:
     return Panel(
         question="How much faster than real time are they?",
         says=(
-            "Simulated seconds for each second of stepping. Below 1 for long is an alert: give "
-            "it more CPU, a simpler world or a longer basicTimeStep. It is empty while it is not stepped."
+            "Simulated seconds for each second of stepping. If it is below 1 for long, an alert "
+            "fires: give the simulator more CPU, a simpler world or a longer basicTimeStep. There is "
+            "no value while the simulator is not stepped."
         ),
         unit=units.Short,
         least=0,
@@ -156,8 +163,8 @@ def _latency() -> Panel:
     return Panel(
         question="How long does one step take?",
         says=(
-            "One environment step of one simulator, median and the slowest of a hundred. One simulator above "
-            "the others makes them all wait: restart it, or look at its node."
+            "One environment step of one simulator: the median and the slowest of a hundred. If one "
+            "simulator is above the others, all wait for it: restart it, or look at its node."
         ),
         unit=units.Seconds,
         least=0,
@@ -172,7 +179,9 @@ def _spread() -> Panel:
     steps = of_run("palaestra_simulator_step_duration_seconds_bucket")
     return Panel(
         question="How are the steps' times spread?",
-        says="How many steps took how long. A second band far above the first: something stalls at times.",
+        says=(
+            "How many steps took how long. If there is a second band far above the first, some steps stall."
+        ),
         unit=units.Seconds,
         look=Look.SPREAD,
         queries=(Query(total("le", grown(steps)), "{{le}}"),),
@@ -184,8 +193,9 @@ def _slow() -> Panel:
     return Panel(
         question="How many steps are slow?",
         says=(
-            "Steps in a minute that took ten times as long as its others, and more than 50 ms. They break "
-            "nothing. At regular intervals: something else runs on the node, or it writes to a slow disk."
+            "Steps in a minute that took ten times as long as the simulator's other steps, and more "
+            "than 50 ms. They break nothing. If they come at regular intervals, another program runs "
+            "on the node, or the simulator writes to a slow disk."
         ),
         unit=units.Short,
         least=0,
@@ -198,8 +208,9 @@ def _simulated() -> Panel:
     return Panel(
         question="How much is simulated in a second?",
         says=(
-            "Simulated seconds a second of all simulators together, learning and saving included: what the "
-            "run gets for its cores. Compare it before and after a change of the job."
+            "Simulated seconds a second of all simulators together, with the time for learning and "
+            "saving: the benefit that the run gets from its cores. Compare it before and after a "
+            "change of the job."
         ),
         unit=units.Short,
         least=0,
@@ -211,8 +222,8 @@ def _resets() -> Panel:
     return Panel(
         question="How many episodes begin?",
         says=(
-            "Resets a second, training and evaluation. A simulator with none takes no part: see its state. "
-            "Many more than before: episodes end early."
+            "Resets a second, in training and evaluation. A simulator without any takes no part: see "
+            "its state. If there are many more than before, episodes end early."
         ),
         unit=units.OpsPerSecond,
         least=0,
@@ -224,8 +235,9 @@ def _memory() -> Panel:
     return Panel(
         question="Does its memory grow?",
         says=(
-            "Memory of all processes of a simulator. It rises with every reset: it leaks; set `recycle` "
-            "(aboveMemory, afterResets), which restarts it between episodes at no cost."
+            "Memory of all processes of a simulator. If it rises with every reset, the simulator "
+            "leaks: set `recycle` (aboveMemory, afterResets), which restarts it between episodes at "
+            "no cost."
         ),
         unit=units.BytesIEC,
         least=0,
@@ -237,7 +249,10 @@ def _memory() -> Panel:
 def _cores() -> Panel:
     return Panel(
         question="How many cores does it use?",
-        says="CPU of all processes of a simulator. At the limit of its resources it is throttled: raise it.",
+        says=(
+            "CPU of all processes of a simulator. If it is at the limit of its resources, the simulator "
+            "is throttled: raise the limit."
+        ),
         unit=units.Short,
         least=0,
         width=12,

@@ -29,10 +29,10 @@ def _success() -> Panel:
     return Panel(
         question="How often does it reach its goal?",
         says=(
-            "Evaluation: the policy without exploration, on seeds of its own, between the bounds of the 95 % "
-            "interval; at the end its confirmation. Training: the last 100 episodes, with exploration. "
-            "Both flat at zero after a tenth of the steps: read the returns; "
-            "if these are flat too, the reward gives nothing to follow."
+            "Evaluation: the policy without exploration, on seeds of its own, between the bounds of "
+            "the 95 % interval; at the end its confirmation. Training: the last 100 episodes, with "
+            "exploration. If both are still zero after a tenth of the steps, read the returns; if "
+            "these do not rise either, the reward gives the policy nothing to learn from."
         ),
         unit=units.PercentUnit,
         least=0,
@@ -49,8 +49,9 @@ def _returns() -> Panel:
     return Panel(
         question="What do episodes return?",
         says=(
-            "Quantiles of the last 100 training episodes: 0.5 is the median. All rise: it learns. The best "
-            "rise and the worst do not: some starts are never solved; see how the returns are spread."
+            "Quantiles of the last 100 training episodes; 0.5 is the median. If all rise, the policy "
+            "learns. If the best rise and the worst do not, some starts are never solved: see how the "
+            "returns are spread."
         ),
         unit=units.Short,
         queries=(Query(of_run("palaestra_trainer_episode_return_quantile"), f"{RUN} q{{{{rank}}}}"),),
@@ -61,8 +62,8 @@ def _spread() -> Panel:
     return Panel(
         question="How are the returns spread?",
         says=(
-            "How many training episodes of all chosen runs ended with which return. Two bands that stay: "
-            "the policy solves one kind of start and not the other."
+            "How many training episodes of all chosen runs ended with which return. If two bands "
+            "stay, the policy solves one kind of start and not the other."
         ),
         unit=units.Short,
         look=Look.SPREAD,
@@ -75,8 +76,8 @@ def _lengths() -> Panel:
     return Panel(
         question="How long are episodes?",
         says=(
-            "Steps of the training episodes. They get shorter when the goal is reached earlier. All at the "
-            "limit of the environment: it is never reached."
+            "Steps of the training episodes. They get shorter when the goal is reached earlier. If "
+            "all episodes have as many steps as the environment allows, the goal is never reached."
         ),
         unit=units.Short,
         least=0,
@@ -91,8 +92,9 @@ def _evaluated() -> Panel:
     return Panel(
         question="What do evaluations return?",
         says=(
-            "Mean return of the last evaluation; the best one so far is what model.zip has. It falls while "
-            "training's rises: the policy leans on exploration, or forgets; lower the learning rate."
+            "Mean return of the last evaluation; model.zip has the policy with the best one so far. "
+            "If it falls while that of training rises, the policy relies on exploration, or forgets: "
+            "lower the learning rate."
         ),
         unit=units.Short,
         width=16,
@@ -104,8 +106,9 @@ def _exploration() -> Panel:
     return Panel(
         question="Does it still explore?",
         says=(
-            "Share of random actions (exploration_rate), entropy coefficient or standard deviation of the "
-            "actions, by algorithm. At its floor with no success: raise exploration_fraction or ent_coef."
+            "Share of random actions (exploration_rate), entropy coefficient or standard deviation of "
+            "the actions, by algorithm. If it is at its minimum without any success, raise "
+            "exploration_fraction or ent_coef."
         ),
         unit=units.Short,
         least=0,
@@ -117,8 +120,8 @@ def _loss() -> Panel:
     return Panel(
         question="Does the loss stay within bounds?",
         says=(
-            "Losses of the last update. A loss need not fall, but one that grows by orders of magnitude ends "
-            "as Diverged: lower the learning rate, or scale the reward."
+            "Losses of the last update. A loss need not fall, but a loss that grows by orders of "
+            "magnitude ends as Diverged: lower the learning rate, or scale the reward."
         ),
         unit=units.Short,
         queries=(Query(of_run("palaestra_trainer_loss"), f"{RUN} {{{{loss}}}}"),),
@@ -128,7 +131,7 @@ def _loss() -> Panel:
 def _learning_rate() -> Panel:
     return Panel(
         question="How large are its updates?",
-        says="The learning rate. It falls only if the job's hyperparameters say so (lin_...).",
+        says="The learning rate. It falls only if a hyperparameter of the job is a schedule (lin_...).",
         unit=units.ScientificNotation,
         least=0,
         queries=(Query(of_run("palaestra_trainer_learning_rate"), RUN),),
@@ -139,7 +142,10 @@ def _progress() -> Panel:
     done, target = of_run("palaestra_trainer_steps_total"), of_run("palaestra_trainer_target_steps")
     return Panel(
         question="How far is it?",
-        says="Valid environment steps as a share of trainer.steps. Flat: see how long ago its last step was.",
+        says=(
+            "Valid environment steps as a share of trainer.steps. If the line is flat, see how long ago "
+            "the last step was."
+        ),
         unit=units.PercentUnit,
         look=Look.FIGURES,
         queries=(Query(f"{done} / {target}", RUN),),
@@ -150,8 +156,9 @@ def _speed() -> Panel:
     return Panel(
         question="How many steps does it make in a second?",
         says=(
-            "Valid steps over the last 30 s. Regular dips are evaluations and checkpoints. It halves and "
-            "stays so: look for the cause where its time goes, then at Simulators."
+            "Valid steps over the last 30 s. Regular dips are evaluations and checkpoints. If it "
+            "halves and stays there, look for the cause in the panel about its time, then at "
+            "Simulators."
         ),
         unit=units.OpsPerSecond,
         least=0,
@@ -165,9 +172,10 @@ def _time() -> Panel:
     return Panel(
         question="Where does its time go?",
         says=(
-            "Each second of the trainer has one cause. Mostly stepping: the simulators are the limit, add "
-            "some. Mostly learning: give it more CPU. Recovering: it waits for restarts after faults, see "
-            "Simulators. Recycling: for those of `recycle`. Against both, give the group a standby."
+            "Each second of the trainer has one cause. If it is mostly stepping, the simulators are "
+            "the limit: add some. If it is mostly learning, give the trainer more CPU. Recovering is "
+            "waiting for restarts after faults: see Simulators. Recycling is waiting for the restarts "
+            "of `recycle`. A standby shortens both."
         ),
         unit=units.PercentUnit,
         look=Look.SHARES,
@@ -181,8 +189,9 @@ def _idle() -> Panel:
     return Panel(
         question="When was its last step?",
         says=(
-            "Seconds since the last step that was learned from or evaluated, beside stallDeadlineSeconds, "
-            "at which the trainer ends itself and is tried again. Rising: see the simulators' states."
+            "Seconds since the last step that was learned from or evaluated, next to "
+            "stallDeadlineSeconds, at which the trainer exits and is retried. If it rises, see the "
+            "simulators' states."
         ),
         unit=units.Seconds,
         width=12,
@@ -198,9 +207,9 @@ def _lost() -> Panel:
     return Panel(
         question="What was played in vain?",
         says=(
-            "Since the run began: steps of episodes that a fault cut or that were played again after an "
-            "interruption, and simulation steps that late messages cost. Many lost: see the faults under "
-            "Simulators; none there: save more often (checkpoint.everySteps)."
+            "Since the run began: steps of episodes that a fault cut or that were played again after "
+            "an interruption, and simulation steps that late messages cost. If many are lost, see the "
+            "faults under Simulators; without faults, save more often (checkpoint.everySteps)."
         ),
         unit=units.Short,
         width=12,
@@ -219,8 +228,9 @@ def _behind() -> Panel:
     return Panel(
         question="How many checkpoints is it behind?",
         says=(
-            "Steps since the newest checkpoint, in intervals: what would be trained again if it ended now. "
-            "Above 1 for long: read the trainer's log; the disk may be full. Above 3 it is an alert."
+            "Steps since the newest checkpoint, in intervals: these would be trained again if the run "
+            "ended now. If it is above 1 for long, read the trainer's log; the disk may be full. "
+            "Above 3 an alert fires."
         ),
         unit=units.Short,
         least=0,
@@ -232,7 +242,10 @@ def _behind() -> Panel:
 def _age() -> Panel:
     return Panel(
         question="How old is the newest checkpoint?",
-        says="Its age: what would be lost in time. See how many checkpoints it is behind for what to do.",
+        says=(
+            "The age of the checkpoint is the time that would be lost. If it is too old, read the panel "
+            "'How many checkpoints is it behind?'."
+        ),
         unit=units.Seconds,
         least=0,
         queries=(Query(f"time() - {of_run('palaestra_trainer_checkpoint_timestamp_seconds')}", RUN),),
@@ -244,8 +257,8 @@ def _saving() -> Panel:
     return Panel(
         question="How long does saving take?",
         says=(
-            "Slowest of ten checkpoints lately; training waits meanwhile. More than a few seconds: the "
-            "volume is slow; choose another storage class, or save less often."
+            "The slowest of ten recent checkpoints; training waits meanwhile. If it takes more than a "
+            "few seconds, the volume is slow: choose another storage class, or save less often."
         ),
         unit=units.Seconds,
         least=0,
@@ -257,8 +270,8 @@ def _size() -> Panel:
     return Panel(
         question="Do checkpoints fit on the volume?",
         says=(
-            "Size of the newest one. checkpoint.keep of them and one more must fit into storage.size: make "
-            "it larger, keep fewer, or give the algorithm a smaller buffer_size."
+            "Size of the newest checkpoint. checkpoint.keep of them and one more must fit into "
+            "storage.size: make it larger, keep fewer, or give the algorithm a smaller buffer_size."
         ),
         unit=units.BytesIEC,
         width=12,
@@ -270,7 +283,10 @@ def _size() -> Panel:
 def _unwritten() -> Panel:
     return Panel(
         question="Was a checkpoint not written?",
-        says="For want of space, since the run began. The run ends with StorageFull: free some, or resize.",
+        says=(
+            "Checkpoints that failed for lack of space, since the run began. The run ends with "
+            "StorageFull: free some space, or resize the volume."
+        ),
         unit=units.Short,
         width=12,
         least=0,

@@ -15,7 +15,7 @@ BEGIN = "<!-- generated: devices of the stub -->"
 
 
 def page(text: str) -> str:
-    """Return docs/reference/simulators.md, now `text`, with the table made anew.
+    """Return docs/reference/simulators.md with a new table; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,6 +1,7 @@
 """The defaults of each algorithm, in docs/reference/trainingjob.md.
 
-Here and not where the rest of that page is made, since the operator does not import the trainer.
+This module is apart from the one that makes the rest of that page, because the operator does not import the
+trainer.
 """
 
 import json
@@ -15,7 +16,7 @@ BEGIN = "<!-- generated: default hyperparameters -->"
 
 
 def page(text: str) -> str:
-    """Return docs/reference/trainingjob.md, of which `text` is what it was, with the table made anew.
+    """Return docs/reference/trainingjob.md with a new table; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.

@@ -1,4 +1,4 @@
-"""`make images`: build what has changed, and say where archives and bills of materials are."""
+"""`make images`: build changed images, and print the paths of archives and bills of materials."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ from tools.images.errors import ImagesError
 from tools.images.recipes import recipes
 
 ROOT = Path(__file__).parents[2]
-LOCK_DEADLINE_S = 3600  # of another call, which may be building everything
+LOCK_DEADLINE_S = 3600  # another call may hold the lock while it builds everything
 INTERRUPTED = 130
 EPILOG = "Archives are kept in $PALAESTRA_CACHE/images (default: ~/.cache/palaestra), the last three of each."
 
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     known = recipes(options.torch)
     if unknown := [name for name in options.names if name not in known]:
-        parser.error(f"{unknown[0]} is no image; choose from {', '.join(known)}")
+        parser.error(f"{unknown[0]} is not an image; choose from {', '.join(known)}")
     folder = cache.folder() / "images"
     try:
         with cache.locked(cache.folder() / "locks" / "images", LOCK_DEADLINE_S):

@@ -1,7 +1,7 @@
 """Bills of materials, in the format CycloneDX that scanners read: one for each image and each wheel of ours.
 
-The bill of an image lists what is in its archive. A wheel contains nothing of others, so its bill lists what
-the wheel was tested with: its share of the lock, with hashes.
+The bill of an image lists what is in its archive. A wheel contains no package of others, so its bill lists
+the packages that it was tested with: its part of the lock, with hashes.
 """
 
 import json
@@ -31,7 +31,7 @@ WHEELS = {
 
 
 def of_image(built: Built) -> Path:
-    """Write the bill of an image beside its archive, unless it is there, and return its path.
+    """Write the bill of an image next to its archive, unless it is there, and return its path.
 
     Bills whose archives are gone are removed.
 

@@ -1,4 +1,4 @@
-"""From a recipe to an archive: what goes in, whether that is there already, and building it if not."""
+"""Make an archive from a recipe, unless an archive with the same content exists already."""
 
 import platform
 import shutil
@@ -21,7 +21,7 @@ _GIT_DEADLINE_S = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Built:
-    """An image that is there: its full name and its archive."""
+    """An image that exists: its full name and its archive."""
 
     reference: str
     archive: Path
@@ -29,7 +29,7 @@ class Built:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """An image that is asked for, with everything that decides what it is but the day it is built on."""
+    """A requested image, with everything that determines its content except the day of the build."""
 
     recipe: Recipe
     version: str
@@ -40,7 +40,7 @@ class Wanted:
     machine: str
 
     def key(self) -> str:
-        """Return what stands for all of it in the archive's name."""
+        """Return the digest of all of this, which is part of the archive's name."""
         return digest(
             (
                 self.reference,
@@ -57,7 +57,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workshop:
-    """Where images are built: the checkout, what builds, and the folder of the archives."""
+    """The place where images are built: the checkout, the engine, and the folder of the archives."""
 
     root: Path
     engine: Engine
@@ -65,7 +65,7 @@ class Workshop:
     machine: str = platform.machine()
 
     def build(self, recipe: Recipe, tag: str | None = None) -> Built:
-        """Return an image, built if there is none of this content; `tag` is the version by default.
+        """Return an image, built if no image has this content; `tag` is the version by default.
 
         Raises:
             ImagesError: it cannot be built.
@@ -95,7 +95,7 @@ class Workshop:
 
     def _make(self, wanted: Wanted, archive: Path) -> None:
         name = wanted.recipe.name
-        for torn in self.folder.glob(f"{name}-*.part"):  # by a build that was killed
+        for torn in self.folder.glob(f"{name}-*.part"):  # a killed build left it behind
             torn.unlink()
         filled, wheels = self.folder / "contexts" / name, self.folder / "wheels"
         context.fill(filled, self.root, wanted.recipe, wanted.inside, wheels=wheels, machine=self.machine)
@@ -130,7 +130,7 @@ class Workshop:
 
 
 def say(text: str) -> None:
-    """Tell the person at the terminal; standard output is for what other programs read."""
+    """Print a line to standard error for a person; other programs read standard output."""
     sys.stderr.write(f"images: {text}\n")
 
 

@@ -1,4 +1,4 @@
-"""The project's cache, outside of the checkout: where it lies, whose turn it is, what is removed."""
+"""The project's cache, outside of the checkout: its folder, its locks, and the removal of old files."""
 
 import fcntl
 import os
@@ -23,9 +23,9 @@ def folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 @contextmanager
 def locked(file: Path, deadline_s: int) -> Iterator[None]:
-    """Hold a lock, so that two calls never make the same; the system lets go of it, however we end.
+    """Hold a lock, so that two calls never make the same file; the system releases it when this process ends.
 
-    For the main thread, as the wait for the other call is ended by SIGALRM.
+    Only the main thread may call it, because SIGALRM ends the wait for the other call.
 
     Raises:
         ImagesError: another call has held it for `deadline_s`, or the file system has no locks.
@@ -45,7 +45,7 @@ def locked(file: Path, deadline_s: int) -> Iterator[None]:
 
 
 def use(path: Path) -> None:
-    """Note that a file or folder is in use. It stays as old as its content is, by which others know it."""
+    """Note that a file or folder is in use. Its modification time stays, because others compare it."""
     os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))
 
 

@@ -1,6 +1,6 @@
 """The folder that an image is built from: what goes into the image, and nothing else.
 
-Wheels are fetched and made here, where the index, its proxy and its certificates are known to pip; the
+Wheels are fetched and made here, where pip has the index, its proxy and its certificates; the
 build itself asks no index. They stay in the cache, so that only a changed lock fetches again.
 """
 
@@ -27,7 +27,7 @@ _OLDEST_GLIBC, _NEWEST_GLIBC = 5, 41  # 2.41 is Debian trixie's
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Locked:
-    """Packages of others, as a requirements file with hashes, and the digest of that."""
+    """Packages of others, as a requirements file with hashes, and the digest of that file."""
 
     text: str
     digest: str
@@ -35,7 +35,7 @@ class Locked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contents:
-    """What goes into one image: its share of the lock, the lock that it has besides, and a digest of ours."""
+    """The content of one image: its part of the lock, its additional lock, and a digest of our packages."""
 
     requirements: Locked
     extra: Locked | None
@@ -43,7 +43,7 @@ class Contents:
 
 
 def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
-    """Return what goes into an image for a `machine` (x86_64).
+    """Return the content of an image for a `machine` (x86_64).
 
     Raises:
         ImagesError: the lock is not as `make lock` writes it.
@@ -90,7 +90,7 @@ def _pins(file: Path) -> Sequence[lock.Pin]:
 
 
 def _extra(file: Path, share: str, machine: str) -> Locked:
-    """Return a whole lock, without what is in the other's share already."""
+    """Return a whole lock, without the packages that are already in the part of the other lock."""
     pins = _pins(file)
     there = [pin.name for pin in lock.parse(share)]
     return _locked(lock.share(pins, [pin.name for pin in pins], machine, there), machine)

@@ -1,4 +1,4 @@
-"""What builds an image: Docker where its engine answers and has the base image, else buildah.
+"""The engine that builds an image: Docker if its engine answers and has the base image, otherwise buildah.
 
 Both build the same Dockerfiles, and leave a docker archive, which `kind load image-archive` takes.
 """
@@ -25,7 +25,7 @@ _BUILD_DEADLINE_S = 3600
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Base:
-    """The base image: its name, and a digest that says its content."""
+    """The base image: its name, and a digest of its content."""
 
     name: str
     digest: str
@@ -33,7 +33,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """One image to be built: its full name, what from, and the archive to be written."""
+    """One image to be built: its full name, its context, and the archive to be written."""
 
     reference: str
     dockerfile: Path
@@ -50,7 +50,7 @@ class Engine(Protocol):
         """Return the base image.
 
         Raises:
-            ImagesError: there is none to be had.
+            ImagesError: no engine is available.
         """
         ...
 
@@ -63,7 +63,7 @@ class Engine(Protocol):
         ...
 
     def load(self, archive: Path, log: Path) -> None:
-        """Take in the image of an archive, under its name, so that another can be built FROM it.
+        """Load the image of an archive under its name, so that another image can be built FROM it.
 
         Raises:
             ImagesError: it cannot be read.
@@ -129,7 +129,7 @@ class Buildah:
         The caller holds the lock of `folder`: containers that a killed build left in it are removed.
 
         Raises:
-            ImagesError: this is not root, or a part cannot be had.
+            ImagesError: the user is not root, or a part cannot be installed.
         """
         if os.geteuid() != 0:
             raise ImagesError(
@@ -150,7 +150,7 @@ class Buildah:
         return found
 
     def base(self) -> Base:
-        """Return the tree's image; the tree's file is named by what it was made from."""
+        """Return the tree's image; the name of the tree's file has a digest of its sources."""
         return self._base
 
     def build(self, order: Order) -> None:
@@ -183,7 +183,7 @@ class Buildah:
 
 
 def _what(order: Order) -> list[str]:
-    """Return the arguments that say what is built; the same for both."""
+    """Return the arguments that describe the build; docker and buildah take the same ones."""
     return [
         f"--tag={order.reference}",
         f"--file={order.dockerfile}",

@@ -1,4 +1,4 @@
-"""What can go wrong, said to the person who typed `make images`."""
+"""Errors for the person who typed `make images`."""
 
 
 class ImagesError(Exception):

@@ -1,7 +1,7 @@
-"""What an image has inside: packages of Debian and of Python, read from its archive.
+"""The packages of Debian and of Python in an image, read from its archive.
 
-The lock has what was asked for; the archive is what a node runs. A package that a later layer removes is not
-in the image.
+The lock has the requested packages; the archive has those that a node runs. A package that a later layer
+removes is not in the image.
 """
 
 import json

@@ -1,7 +1,8 @@
-"""Choose from `requirements.lock` what one image needs. Pure: text in, text out.
+"""Choose the packages that one image needs from `requirements.lock`. Pure: text in, text out.
 
-The lock says of every package who wants it (`# via`), so an image's share is found without an index.
-Markers are decided for the image, not for the machine that builds it: its Python is another one.
+The lock names for every package those that require it (`# via`), so the part for an image is found without
+an index. Markers are evaluated for the image's Python, which is another one than that of the building
+machine.
 """
 
 import re
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from packaging.markers import Marker
 
-PYTHON = "3.13"  # of Debian trixie
+PYTHON = "3.13"  # the version in Debian trixie
 
 _PIN = re.compile(r"^(?P<name>[a-z0-9-]+)==(?P<version>[^ ;]+)(?: ; (?P<marker>.+?))? \\$")
 _HASH = re.compile(r"^    --hash=(\S+?)(?: \\)?$")
@@ -50,7 +51,7 @@ def parse(lock: str) -> tuple[Pin, ...]:
 def share(pins: Iterable[Pin], packages: Collection[str], machine: str, without: Collection[str] = ()) -> str:
     """Return the requirements file of everything that `packages` need on Linux and a `machine` (x86_64).
 
-    Packages named in `without`, and what only they need, stay out.
+    Packages named in `without`, and packages that only these need, are left out.
     """
     here = [pin for pin in pins if _applies(pin, machine) and pin.name not in without]
     needed = set(packages)

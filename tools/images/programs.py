@@ -25,7 +25,7 @@ def run(command: Sequence[str], *, log: Path, deadline_s: float) -> None:
 
 
 def answer(command: Sequence[str], *, deadline_s: float) -> str | None:
-    """Return what a program says, without white space at the end; None when it fails."""
+    """Return the output of a program, without white space at its end; None if the program fails."""
     try:
         done = subprocess.run(
             [*_DIES_WITH_US, *command],
@@ -41,7 +41,7 @@ def answer(command: Sequence[str], *, deadline_s: float) -> str | None:
 
 
 def _tried(command: Sequence[str], log: Path, deadline_s: float) -> str | None:
-    """Run a program and return what went wrong, if anything did."""
+    """Run a program and return the error, if there was one."""
     quiet = subprocess.DEVNULL
     try:
         with log.open("wb") as output:

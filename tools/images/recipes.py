@@ -1,4 +1,4 @@
-"""The images: what each is made of."""
+"""The images and their parts."""
 
 import hashlib
 import tomllib
@@ -18,8 +18,8 @@ class Recipe:
     """One image.
 
     `packages` are folders of ours, of which the image has the optional dependencies that `extras` names, and
-    `files` what the Dockerfile runs or copies besides. `without` names locked packages that the image does
-    without, `extra` is a lock of its own that it has whole besides, and `arguments` are those of the
+    `files` are other files that the Dockerfile runs or copies. `without` names locked packages that the
+    image leaves out. `extra` is an additional lock, which the image has whole. `arguments` are those of the
     Dockerfile.
     """
 
@@ -39,7 +39,7 @@ class Recipe:
 
 def recipes(torch: str) -> Mapping[str, Recipe]:
     """Return all images by name, trainer and notebook with PyTorch of `debian` or with `cuda`."""
-    stood_in_for = ("torch",) if torch == "debian" else ()  # by the distribution's
+    stood_in_for = ("torch",) if torch == "debian" else ()  # the distribution's PyTorch replaces it
     return {
         "stub": Recipe(
             name="stub",
@@ -75,7 +75,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             without=(
                 *stood_in_for,
                 "kubernetes",
-            ),  # is in the other lock, so that the trainer's share is equal
+            ),  # kubernetes is in the notebook's lock, so that the trainer's part is the same in both images
             extra="images/notebook/requirements.lock",
             arguments={"TORCH": torch},
         ),
@@ -83,7 +83,8 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="operator",
             dockerfile="operator/Dockerfile",
             packages=("sim_image", "operator"),
-            without=("aiohttp", "aiohttp-retry"),  # of the client's asynchronous half, which is left out
+            # Only the client's asynchronous half needs them, and the image leaves it out.
+            without=("aiohttp", "aiohttp-retry"),
         ),
     }
 
@@ -95,7 +96,7 @@ def project(root: Path, package: str) -> Mapping[str, Any]:
 
 
 def left_out(project: Mapping[str, Any], extras: Collection[str]) -> frozenset[str]:
-    """Return the names that a project wants only for extras other than these."""
+    """Return the names of packages that a project needs only for extras other than these."""
     optional: Mapping[str, Sequence[str]] = project.get("optional-dependencies", {})
     wanted = [*project["dependencies"], *(each for extra in extras for each in optional.get(extra, ()))]
     return _names(each for listed in optional.values() for each in listed) - _names(wanted)
@@ -114,7 +115,7 @@ def sources(root: Path, package: str) -> Iterator[Path]:
 
 
 def digest(parts: Iterable[bytes | str]) -> str:
-    """Return 12 hexadecimal digits that stand for these parts, in this order and so divided."""
+    """Return 12 hexadecimal digits of a digest of these parts, which depends on their order and borders."""
     total = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part

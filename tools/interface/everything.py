@@ -27,7 +27,7 @@ _SETTINGS = {
 _MASS = "physics Physics { density -1 mass 1 }"  # without it no force moves a joint
 
 PHYSICS: Mapping[str, Callable[[], Physics]] = {"stub": StubPhysics, "mujoco": MujocoPhysics}
-# What a simulator cannot do fails, so that no client trains with a success that did nothing.
+# A service that a simulator cannot perform fails, so that no client trains with a success that did nothing.
 _STUB = frozenset(  # pictures and forces
     (
         "camera/enable",
@@ -99,7 +99,7 @@ def offered(simulator: str) -> KnownPaths:
 
 
 def groups(paths: Mapping[str, str]) -> dict[str, dict[str, str]]:
-    """Return paths by the thing that they are of: a type of device, "robot", "supervisor/node" and so on."""
+    """Return paths by their owner: a type of device, "robot", "supervisor/node" and so on."""
     types = {device_name(name): name for name in DEVICES}
     found: dict[str, dict[str, str]] = {}
     for path, type_name in paths.items():

@@ -29,7 +29,7 @@ _HEAD: Final = ("| path | type | md5 | stub | MuJoCo | Webots | tested by |", "|
 
 
 def page(text: str) -> str:
-    """Return docs/reference/ros-interface.md, now `text`, with its tables made anew.
+    """Return docs/reference/ros-interface.md with new tables; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.
@@ -63,7 +63,7 @@ def _row(group: str, path: str, type_name: str, md5: str) -> str:
 
 
 def _state(simulator: str, path: str) -> str:
-    """Return what becomes of a path in a simulator of ours."""
+    """Return whether a simulator of ours has a path: `yes`, `fails` or `no`."""
     survey = offered(simulator)
     if path not in survey.services and path not in survey.topics:
         return "no"

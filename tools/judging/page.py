@@ -1,16 +1,21 @@
-"""The checks on a replica, in docs/explain/judging.md: a row for each row of the operator's own list."""
+"""The checks on a replica, in docs/explain/judging.md: a row for each check of the operator's own lists."""
 
 from __future__ import annotations
 
 from palaestra.api.generated_sections import between_marks
-from palaestra.decide.replica_policy import JUDGED
+from palaestra.decide.replica_policy import ENDS, REASONS, STOPS
 
 PAGE = "docs/explain/judging.md"
 BEGIN = "<!-- generated: checks on a replica -->"
+CHECKS = (
+    *(("ended", check) for check in ENDS),
+    *(("final", check) for check in STOPS),
+    *((kind.value, check) for kind, check in REASONS),
+)
 
 
 def page(text: str) -> str:
-    """Return docs/explain/judging.md, now `text`, with the list made anew.
+    """Return docs/explain/judging.md with a new list; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.
@@ -21,7 +26,7 @@ def page(text: str) -> str:
 def table() -> str:
     """Return a row for each check in its order: class, name, and the first line of its docstring."""
     rows = (
-        f"| {number} | {kind.value} | `{check.__name__}` | {(check.__doc__ or '').strip().splitlines()[0]} |"
-        for number, (kind, check) in enumerate(JUDGED, 1)
+        f"| {number} | {kind} | `{check.__name__}` | {(check.__doc__ or '').strip().splitlines()[0]} |"
+        for number, (kind, check) in enumerate(CHECKS, 1)
     )
     return "\n".join(("| # | class | check | what it finds |", "|---|---|---|---|", *rows, ""))

@@ -1,6 +1,6 @@
 """The tables of docs/reference/metrics.md, made from the families that the programs declare.
 
-Here and in no program, since operator and trainer know nothing of each other.
+This module belongs to no program, because operator and trainer do not import each other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from palaestra_trainer import metric_definitions as trainer
 
 PAGE = "docs/reference/metrics.md"
 SERIES = "<!-- generated: how many series -->"
-PROCESS = 6  # process_*, as prometheus_client tells them of each program
+PROCESS = 6  # process_*, which prometheus_client exports in each program
 MOST_NAMED = 10  # values of a label that are written out
 
 JOBS, REPLICAS, SIMULATORS, NAMESPACES = 1000, 2, 3, 50
@@ -30,7 +30,7 @@ SIZES: Mapping[str, int] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """One program that serves metrics, and how many of it such a cluster has."""
+    """One program that serves metrics, and the number of its instances in a large cluster."""
 
     name: str
     families: Sequence[Family]
@@ -38,12 +38,12 @@ class Program:
 
     @property
     def mark(self) -> str:
-        """What its table stands behind in the page."""
+        """The mark in the page after which the program's table begins."""
         return f"<!-- generated: metrics of the {self.name} -->"
 
     @property
     def series(self) -> int:
-        """How many series one of it has at most, its process's among them."""
+        """The maximum number of series of one instance, with those of its process."""
         return sum(family.series(SIZES) for family in self.families) + PROCESS
 
 
@@ -55,7 +55,7 @@ PROGRAMS = (
 
 
 def page(text: str) -> str:
-    """Return docs/reference/metrics.md, of which `text` is what it was, with its tables made anew.
+    """Return docs/reference/metrics.md with new tables; `text` is its present content.
 
     Raises:
         ValueError: a mark is missing.
@@ -75,7 +75,7 @@ def table(families: Sequence[Family]) -> str:
 
 
 def cardinality() -> str:
-    """Return how many series the programs of a large cluster have, each and together."""
+    """Return the number of series in a large cluster, by program and in total."""
     rows = [f"| {it.name} | {it.series} | {it.count:,} | {it.series * it.count:,} |" for it in PROGRAMS]
     total = sum(it.series * it.count for it in PROGRAMS)
     cluster = f"{JOBS:,} jobs that all run, of {REPLICAS} replicas with {SIMULATORS} simulators each"

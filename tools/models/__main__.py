@@ -1,7 +1,7 @@
 """`python -m tools.models DIR...`: count the models of MuJoCo below folders that start as they are.
 
-dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite bring 140 with an actuator. Their
-wheels are enough, without what they depend on:
+dm_control, gymnasium, gymnasium-robotics, metaworld and robosuite bring 140 with an actuator. Their wheels
+are enough, without their dependencies:
 
     uv pip install --no-deps --target DIR dm_control gymnasium gymnasium-robotics metaworld robosuite
 """
@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Final
 
 DEADLINE_S: Final = 180.0
-# A file without an actuator moves nothing; one that MuJoCo refuses is a part of another.
+# A file without an actuator moves nothing; a file that MuJoCo refuses is a part of another file.
 IS_MODEL: Final = "import mujoco, sys; sys.exit(mujoco.MjModel.from_xml_path(sys.argv[1]).nu == 0)"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the count and what is refused; return 0 if every model starts."""
+    """Print the count and the refusals; return 0 if every model starts."""
     parser = argparse.ArgumentParser(prog="python -m tools.models", description=__doc__.splitlines()[0])
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path)
     folders = parser.parse_args(arguments).folders

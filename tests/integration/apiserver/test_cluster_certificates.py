@@ -9,7 +9,7 @@ import pytest
 
 from palaestra.cluster import Api, Timeouts, Untrusted, connect, service_account
 from palaestra.cluster.transport import Transport
-from palaestra.doctor import run
+from palaestra.doctor import examine
 from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
 from tests.integration.apiserver.server import command, reply, serving
@@ -151,7 +151,7 @@ def test_the_doctor_gives_the_remedy_of_the_certificate(wrong, tmp_path):
     address, authority = wrong["name"]
     api = connect(kubeconfig_of(tmp_path, address, **{"certificate-authority": authority}))
 
-    finding = next(iter(run.examine(SimpleNamespace(api=api, namespace="robots"))))
+    finding = next(iter(examine(SimpleNamespace(api=api, namespace="robots"))))
 
     assert "is for another name" in finding.fact
     assert "tls-server-name" in finding.remedy

@@ -111,24 +111,24 @@ def test_requests_act_for_the_user_that_the_kubeconfig_names(secure, tmp_path):
     [
         ({"as-groups": ["students"]}, "as is missing"),
         ({"as-uid": "7"}, "as is missing"),
-        ({"as": "a", "as-groups": "students"}, "as-groups: 'students' is no list"),
+        ({"as": "a", "as-groups": "students"}, "as-groups: 'students' is not a list"),
         ({"as": "a", "as-user-extra": {"k": "v"}}, "as-user-extra: .* is not usable"),
-        ({"as": "a\nAuthorization: x"}, "as: .* is no text of one line"),
-        ({"as": "a", "as-uid": 7}, "as-uid: 7 is no text"),
+        ({"as": "a\nAuthorization: x"}, "as: .* is not one line of text"),
+        ({"as": "a", "as-uid": 7}, "as-uid: 7 is not one line of text"),
         ({"token": "a", "username": "b"}, "both token and username"),
-        ({"token": "a\nb"}, "token is no text of one line"),
+        ({"token": "a\nb"}, "token is not one line of text"),
         ({"tokenFile": "/nowhere"}, "tokenFile: /nowhere is missing or empty"),
-        ({"exec": "plugin"}, "exec: 'plugin' is no program"),
+        ({"exec": "plugin"}, "exec: 'plugin' is not a mapping"),
         ({"exec": {"apiVersion": V1}}, "exec: command is missing"),
         ({"exec": {"apiVersion": "v0", "command": "x"}}, "exec: apiVersion 'v0' is not known"),
         ({"exec": {"apiVersion": V1, "command": "x"}}, "exec: interactiveMode '' is not known"),
         (
             {"exec": {"apiVersion": V1, "command": "x", "interactiveMode": "Never", "env": [1]}},
-            "env is no list",
+            "env is not a list",
         ),
         ({"auth-provider": {"name": "gcp"}}, "auth-provider: 'gcp' is not known any more"),
         ({"client-certificate-data": "AAAA"}, "client-key is missing"),
-        ({"client-certificate-data": "?", "client-key-data": "?"}, "client-certificate-data is no base64"),
+        ({"client-certificate-data": "?", "client-key-data": "?"}, "client-certificate-data is not base64"),
         ({"client-certificate-data": "AAAA", "client-key-data": "AAAA"}, "cannot be used together"),
         ({"client-certificate": "nowhere", "client-key": "nowhere"}, "nowhere"),
     ],
@@ -146,11 +146,11 @@ def test_a_wrong_user_is_refused_in_one_sentence(tmp_path, user, fact):
 @pytest.mark.parametrize(
     ("cluster", "fact"),
     [
-        ({"server": ""}, "server: '' is no address"),
-        ({"server": "ftp://host"}, "server: 'ftp://host' is no address"),
-        ({"proxy-url": "ftp://host"}, "proxy-url: ftp://host is no proxy"),
-        ({"proxy-url": "http://me:secret@"}, r"proxy-url: http://\*\*\*@ is no proxy"),
-        ({"certificate-authority-data": "AAAA"}, "certificate-authority is no certificate in PEM"),
+        ({"server": ""}, "server: '' is not an address"),
+        ({"server": "ftp://host"}, "server: 'ftp://host' is not an address"),
+        ({"proxy-url": "ftp://host"}, "proxy-url: ftp://host is not a proxy"),
+        ({"proxy-url": "http://me:secret@"}, r"proxy-url: http://\*\*\*@ is not a proxy"),
+        ({"certificate-authority-data": "AAAA"}, "certificate-authority is not a certificate in PEM"),
         ({"certificate-authority-data": "AAAA", "insecure-skip-tls-verify": True}, "exclude each other"),
     ],
 )
@@ -236,11 +236,11 @@ def test_a_plugin_may_give_a_certificate(authority, tmp_path):
     ("script", "fields", "fact"),
     [
         ("echo log in first >&2; exit 3", {}, "failed with exit code 3: log in first"),
-        ("echo nonsense", {}, "gave an answer that is no JSON"),
-        ("echo 7", {}, "gave an answer that is no ExecCredential"),
-        (f"echo '{given()}'", {}, "gave neither a token nor a certificate"),
-        (f"echo '{given(clientKeyData='k')}'", {}, "gave neither"),
-        (f"echo '{given(clientCertificateData='c')}'", {}, "gave a certificate without its key"),
+        ("echo nonsense", {}, "returned output that is not JSON"),
+        ("echo 7", {}, "returned output that is not an ExecCredential"),
+        (f"echo '{given()}'", {}, "returned neither a token nor a certificate"),
+        (f"echo '{given(clientKeyData='k')}'", {}, "returned neither"),
+        (f"echo '{given(clientCertificateData='c')}'", {}, "returned a certificate without its key"),
         (f"echo '{given(clientCertificateData='c', clientKeyData='k')}'", {}, "cannot be used together"),
         (f"echo '{given(token='t', expirationTimestamp='soon')}'", {}, "is not a time: 'soon'"),
         (f"echo '{given(token='t').replace('/v1', '/v1beta1')}'", {}, "returned apiVersion"),
@@ -327,7 +327,7 @@ def test_a_proxy_that_refuses_is_named(secure, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["http", "socks5"])
 def test_the_proxy_of_the_environment_is_used(secure, tmp_path, monkeypatch, scheme):
-    """It is used for a server on another machine."""
+    """The proxy is used for a server on another machine, not for one on loopback."""
     with relaying(secure.port) as (address, notes):
         monkeypatch.setenv("HTTPS_PROXY", f"{scheme}://{address}")
         settings = {"certificate-authority": secure.ca, "tls-server-name": "localhost"}

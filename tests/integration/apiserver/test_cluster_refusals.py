@@ -164,7 +164,7 @@ def test_every_request_is_counted_with_its_verb_and_its_end(rude):
 
 
 def test_a_watch_is_counted_when_it_ends_and_when_it_is_refused(rude):
-    """It is counted once in each case."""
+    """Each watch is counted once."""
     seen = []
     rude.api.on_request = lambda *request: seen.append(request[:3])
     rude.script.watches = [stream(), refusal(410, "Expired")]

@@ -69,7 +69,7 @@ def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
         connected = connect(kubeconfig)
         assert connected.version()
         connected.close()
-        # Each process starts as another program, which ends it together with its owner.
+        # Each process begins as a wrapper that makes it end with its owner; wait for the real programs.
         started = eventually(lambda: set((found := children(process.pid)).values()) == PROGRAMS and found)
         process.send_signal(end)
         process.wait(30)

@@ -3,7 +3,6 @@
 Every message names the field. If one of our rules refuses, the message is our sentence, with the remedy.
 """
 
-import copy
 import itertools
 import json
 from pathlib import Path
@@ -11,10 +10,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.jobs import changed, example
+
 STRICT = "/apis/palaestra.dev/v1alpha1/namespaces/default/trainingjobs?fieldValidation=Strict"
 ROOT = Path(__file__).parents[3]
 EXAMPLES = sorted((ROOT / "manifests" / "examples").glob("*.yaml"))
-MINIMAL = yaml.safe_load((ROOT / "manifests" / "examples" / "minimal.yaml").read_text())
+MINIMAL = example("minimal")
 FROZEN = "cannot be changed; make a new TrainingJob"
 COLLECT, EVALUATE = {"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}
 numbers = itertools.count(1)
@@ -49,19 +50,8 @@ def apply(defined):
     return applied
 
 
-def changed(obj, path, value):
-    """Return a copy of an object with another value at a path such as `spec.simulators.0.count`."""
-    whole = copy.deepcopy(obj)
-    *above, last = path.split(".")
-    inside = whole
-    for step in above:
-        inside = inside[int(step)] if isinstance(inside, list) else inside.setdefault(step, {})
-    inside[int(last) if isinstance(inside, list) else last] = value
-    return whole
-
-
-def make_job(**changes):
-    """Return the smallest TrainingJob, with a new name and changes by path (`__` for a dot)."""
+def changed_job(**changes):
+    """Return the minimal example, with a new name and changes by path (`__` for a dot)."""
     job = changed(MINIMAL, "metadata.name", f"job-{next(numbers)}")
     for path, value in changes.items():
         job = changed(job, path.replace("__", "."), value)
@@ -177,7 +167,7 @@ WRONG = [
 )
 def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, value, message):
     """The API server refuses it alone, because no operator runs here."""
-    code, said = create(changed(make_job(), path, value))
+    code, said = create(changed(changed_job(), path, value))
 
     assert code == 1
     assert_says(said, message)
@@ -185,7 +175,7 @@ def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, va
 
 def test_suspending_a_queued_job_by_hand_is_refused(create):
     """The two fields exclude each other, because Kueue decides about suspension."""
-    code, said = create(make_job(spec__suspend=True, spec__scheduling__queueName="team"))
+    code, said = create(changed_job(spec__suspend=True, spec__scheduling__queueName="team"))
 
     assert code == 1
     assert_says(said, "spec.suspend.*because Kueue then suspends and resumes the job; remove one of them")
@@ -193,7 +183,9 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
 
 def test_a_driver_that_is_a_command_needs_one(create):
     """The command stands next to the image, which the driver needs too."""
-    code, said = create(make_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1"))
+    code, said = create(
+        changed_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1")
+    )
 
     assert code == 1
     assert_says(said, "spec.simulators[0].command.*is for driver command, which requires it; set both")
@@ -211,8 +203,8 @@ def test_inline_worlds_are_bounded_together(create):
     """Each world is within its bounds, but a few such jobs would fill a cache."""
     fits, too_much = (180_000,) * 5, (180_000,) * 4 + (180_001,)
     evaluation = {"spec__trainer__evaluation": {"everySteps": 0}}
-    accepted, _ = create(make_job(spec__simulators=groups_with_worlds(*fits), **evaluation))
-    code, said = create(make_job(spec__simulators=groups_with_worlds(*too_much), **evaluation))
+    accepted, _ = create(changed_job(spec__simulators=groups_with_worlds(*fits), **evaluation))
+    code, said = create(changed_job(spec__simulators=groups_with_worlds(*too_much), **evaluation))
 
     assert accepted == 0
     assert code == 1
@@ -229,7 +221,7 @@ def test_every_example_is_accepted(apply, example):
 
 def test_an_empty_spec_is_accepted_and_completed(apply, defined):
     """The API server sets the defaults, so that everybody sees them."""
-    job = make_job(spec={})
+    job = changed_job(spec={})
     code, said = apply(job)
     stored = yaml.safe_load(defined.kubectl("get", "tj", job["metadata"]["name"], "-o", "yaml").stdout)
 
@@ -273,7 +265,7 @@ MAY_NOT_CHANGE = [
 @pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
 def test_what_may_change_changes(apply, path, value):
     """This is the complete list in docs/reference/trainingjob.md."""
-    job = make_job()
+    job = changed_job()
     apply(job)
 
     code, said = apply(changed(job, path, value))
@@ -287,7 +279,7 @@ def test_what_may_change_changes(apply, path, value):
 )
 def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
     """The result of a run that changed in the middle could not be explained."""
-    job = make_job()
+    job = changed_job()
     apply(job)
 
     code, said = apply(changed(job, path, value))
@@ -310,7 +302,7 @@ def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
 )
 def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, value):
     """With `spec.trainer: cannot be changed` a user had to compare forty fields."""
-    job = make_job()
+    job = changed_job()
     apply(job)
 
     code, said = apply(changed(job, path, value))

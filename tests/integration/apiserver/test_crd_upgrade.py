@@ -68,7 +68,7 @@ def apply(control_plane):
 
 
 def test_a_job_with_a_password_can_still_be_changed_and_its_status_written(control_plane, apply):
-    """Validation ratchets: a later rule does not apply to what is unchanged."""
+    """Validation ratchets: a later rule does not apply to unchanged fields."""
     apply(without_guards(definition()))
     eventually(lambda: apply(job("earlier"))[0] == 0)
     apply(definition())

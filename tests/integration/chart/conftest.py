@@ -11,7 +11,7 @@ from tests.chart.helm import NAMESPACE
 from tests.control_plane.plane import ControlPlane, running
 from tests.control_plane.programs import programs
 
-DEFINITION = "trainingjobs.palaestra.dev"  # tests that need nothing more of Palaestra leave it behind
+DEFINITION = "trainingjobs.palaestra.dev"  # not deleted after tests that need no other object of Palaestra
 NAMESPACES = (NAMESPACE, "robots", "drones")
 # These projects have dozens of kinds, which are megabytes that an API server takes seconds to read.
 KINDS = (

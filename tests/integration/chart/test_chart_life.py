@@ -13,8 +13,9 @@ from tests.chart import installation
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm
 from tests.chart.modes import MODES
 from tests.integration.chart.conftest import DEFINITION
-from tests.integration.operator.cluster import served, training_job
+from tests.integration.operator.cluster import served
 from tests.integration.operator.operators import RunningOperator
+from tests.jobs import make_job
 from tests.waiting import eventually
 
 
@@ -63,7 +64,7 @@ def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older,
     """Helm never upgrades the files in crds/, so the definition is a template."""
     release("install", "palaestra", chart=older)
     eventually(lambda: served(api))
-    made = api.create(TRAINING_JOBS, _in("robots", training_job("runs")))
+    made = api.create(TRAINING_JOBS, _in("robots", make_job("runs")))
     assert short_names(api) == ["old"]
 
     release("upgrade", "palaestra")
@@ -76,7 +77,7 @@ def test_the_end_of_a_release_leaves_the_jobs(release, api):
     """Deleting the definition would delete every TrainingJob of the cluster."""
     release("install", "palaestra")
     eventually(lambda: served(api))
-    api.create(TRAINING_JOBS, _in("robots", training_job("stays")))
+    api.create(TRAINING_JOBS, _in("robots", make_job("stays")))
 
     release("uninstall", "palaestra")
 
@@ -109,13 +110,14 @@ def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
     )
     try:
         for namespace in ("robots", "drones", "default"):
-            api.create(TRAINING_JOBS, _in(namespace, training_job("trains")))
+            api.create(TRAINING_JOBS, _in(namespace, make_job("trains")))
         for namespace in ("robots", "drones"):
             eventually(lambda where=namespace: api.list(JOBS, where))
 
         assert api.get(TRAINING_JOBS, "default", "trains")["status"]["observedGeneration"] == 0
         assert operator.said("watch broken") == []
-        eventually(lambda: pending(operator.ask("/metrics")) == 2)  # once it has seen its own writes
+        # The operator counts a job once it has seen its own writes.
+        eventually(lambda: pending(operator.ask("/metrics")) == 2)
     finally:
         operator.kill()
 
@@ -138,8 +140,8 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
     tester = connect(str(cluster.kubeconfig_of(account, "system:serviceaccounts")))
     told = []
 
-    with pytest.raises(TrialFailed, match=r"nothing has looked at it: does the operator run"):
-        attempt(tester, _in(NAMESPACE, training_job("trial")), within_s=1.0, report=told.append)
+    with pytest.raises(TrialFailed, match=r"no operator has reconciled it; check that the operator runs"):
+        attempt(tester, _in(NAMESPACE, make_job("trial")), within_s=1.0, report=told.append)
 
     assert [line.rpartition(": ")[2] for line in told] == ["Pending"]
     assert api.list(TRAINING_JOBS, NAMESPACE) == []
@@ -168,7 +170,7 @@ def test_helm_takes_over_what_kubectl_has_installed(release, kubectl, api):
     """Helm keeps the objects that kubectl created, even the definition and its jobs."""
     kubectl("apply", "-f", str(installation.PATH))
     eventually(lambda: served(api))
-    made = api.create(TRAINING_JOBS, _in("robots", training_job("before")))
+    made = api.create(TRAINING_JOBS, _in("robots", make_job("before")))
 
     release("install", "palaestra", "--take-ownership")
     release("upgrade", "palaestra", "--set=operator.replicas=2", "--force-conflicts")

@@ -1,6 +1,8 @@
-"""A client of a test's namespace, a function that types commands there, and one that writes statuses."""
+"""Clients: of a namespace of a real control plane, and of a server whose responses a test scripts."""
 
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -8,6 +10,7 @@ from palaestra import Client
 from palaestra.cli import main
 from palaestra.cluster.resources import TRAINING_JOBS
 from tests.control_plane.plane import ControlPlane
+from tests.integration.apiserver.server import Script, serving
 from tests.integration.operator.cluster import Place
 
 
@@ -52,3 +55,19 @@ def tell(place: Place) -> Callable[..., None]:
         place.api.merge(TRAINING_JOBS, place.name, name, {"status": status}, subresource="status")
 
     return write
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[tuple[Script, str]]:
+    """Yield the script of the server, and a kubeconfig whose context has the namespace `robots`."""
+    with serving() as (address, script):
+        context = {"cluster": "c", "user": "u", "namespace": "robots"}
+        content = {
+            "current-context": "a",
+            "contexts": [{"name": "a", "context": context}],
+            "clusters": [{"name": "c", "cluster": {"server": address}}],
+            "users": [{"name": "u", "user": {}}],
+        }
+        kubeconfig = tmp_path / "kubeconfig"
+        kubeconfig.write_text(json.dumps(content))
+        yield script, str(kubeconfig)

@@ -1,25 +1,15 @@
 """How commands treat responses that a real API server seldom gives; a scripted server gives them here."""
 
-import json
-from concurrent.futures import ThreadPoolExecutor
-
 import pytest
 import yaml
 
 from palaestra import Client
-from palaestra.api import validate
 from palaestra.cli import main
 from palaestra.client import NotInstalled
 from palaestra.cluster import connect
-from palaestra.cluster.errors import Unreachable
 from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
-from palaestra.job_input import data_of
-from palaestra.sweeps.cluster_backend import QUIET_LOOKS, ClusterBackend
-from palaestra.sweeps.model import LABEL
-from palaestra.sweeps.trial import Trial, TrialProgress
-from tests.integration.apiserver.server import hang_up, raw, refusal, reply, serving, stream
-from tests.waiting import eventually
+from tests.integration.apiserver.server import raw, refusal, reply, stream
 
 JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
 NAMED = {"name": "trial-x7k2p", "namespace": "robots", "uid": "0d1f"}
@@ -31,25 +21,8 @@ WAITS = {
     "since": "2026-01-31T12:00:05Z",
 }
 WHY = "ImagePull since 2026-01-31T12:00:05Z: container trainer: image a:1 cannot be pulled"
-PATIENCE_S = 30.0
 NO_RIGHT = 'trainingjobs.palaestra.dev is forbidden: User "me" cannot list resource "trainingjobs" in ...'
 NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, requested: 1, used: 1, limited: 1"
-
-
-@pytest.fixture
-def server(tmp_path):
-    """Yield the script of the server, and a kubeconfig whose context has the namespace `robots`."""
-    with serving() as (address, script):
-        context = {"cluster": "c", "user": "u", "namespace": "robots"}
-        content = {
-            "current-context": "a",
-            "contexts": [{"name": "a", "context": context}],
-            "clusters": [{"name": "c", "cluster": {"server": address}}],
-            "users": [{"name": "u", "user": {}}],
-        }
-        kubeconfig = tmp_path / "kubeconfig"
-        kubeconfig.write_text(json.dumps(content))
-        yield script, str(kubeconfig)
 
 
 @pytest.fixture
@@ -80,7 +53,7 @@ def tried(server, tmp_path):
 def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, phase, code):
     """The job may have passed its time to live, or a user has deleted it.
 
-    It was in the namespace of the context.
+    The job was in the namespace of the context.
     """
     assert tried(phase, refusal(404, "NotFound")) == code
 
@@ -296,99 +269,6 @@ def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
         client.delete("trial", deadline_s=20.0)
 
     assert len(script.of(watches=True)) == 0
-
-
-@pytest.fixture
-def trial():
-    """Return the first trial of the sweep `s`."""
-    job = {**yaml.safe_load(JOB), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
-    return Trial(number=0, changes={}, job=validate(job))
-
-
-def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
-    """With one trial at a time, the sweep would wait forever for a job that does not exist."""
-    script, kubeconfig = server
-    stored = {**data_of(trial.job), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
-    script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]
-
-    with Client(kubeconfig=kubeconfig) as client:
-        place = ClusterBackend(client, "s", 1, print, look_s=0.01)
-        place.begin(trial)
-        full = not place.has_room()
-        place.wait()
-        figures = place.look(trial)
-
-    assert full
-    assert figures.state is TrialProgress.FAILED
-    assert place.has_room()
-
-
-def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
-    """Otherwise the command seems to hang. A short time without a response is not reported."""
-    script, kubeconfig = server
-    none = reply(obj={"metadata": {}, "items": []})
-    away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)
-    script.calls = [none, *away, none, *away, hang_up]
-    said = []
-
-    with Client(kubeconfig=kubeconfig) as client, ThreadPoolExecutor(1) as pool:
-        place = ClusterBackend(client, "s", 1, said.append, look_s=0.01)
-        place.wait()
-        place.wait()
-        quiet = list(said)
-        waited = pool.submit(place.wait)
-        eventually(lambda: len(script.asked) > 4 * QUIET_LOOKS, PATIENCE_S)
-        script.calls = [none]
-        waited.result(PATIENCE_S)
-        place.wait()
-
-    assert quiet == []
-    assert len(said) == 2
-    assert said[0].startswith("the API server has not answered for a while (")
-    assert said[0].endswith("); the trials run on without this command, which asks again")
-    assert said[1] == "the API server answers again"
-
-
-def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwhile(server, trial):
-    """An upgrade of the control plane takes minutes, and a search takes days."""
-    script, kubeconfig = server
-    stored = {**data_of(trial.job), "metadata": {"name": "s-0", "uid": "u", "labels": {LABEL: "s"}}}
-    away, gone = refusal(503, "ServiceUnavailable"), refusal(404, "NotFound")
-    script.calls = [
-        *[reply(obj={"metadata": {}, "items": []}), away, gone, away, reply(obj=stored), reply(obj=stored)],
-        *[away, reply(obj=stored), away, gone],
-    ]
-
-    with Client(kubeconfig=kubeconfig) as client:
-        place = ClusterBackend(client, "s", 1, print, look_s=0.01)
-        place.wait()
-        place.begin(trial)
-        place.prune(trial)
-
-    methods = " ".join(asked.method for asked in script.asked)
-    assert methods == "GET GET GET PATCH GET PATCH GET GET DELETE GET"
-    assert place.has_room()
-
-
-def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, trial):
-    """The kubeconfig may name a cluster that does not exist, so the command fails at once."""
-    script, kubeconfig = server
-    script.calls = [hang_up]
-
-    with Client(kubeconfig=kubeconfig) as client, pytest.raises(Unreachable):
-        ClusterBackend(client, "s", 1, print, look_s=0.01).begin(trial)
-
-
-@pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
-def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
-    """A user and the sweep may both decide that the trial is not worth continuing."""
-    script, kubeconfig = server
-    script.calls = [*answers, refusal(404, "NotFound")]
-
-    with Client(kubeconfig=kubeconfig) as client:
-        ClusterBackend(client, "s", 1, print).prune(trial)
-
-    assert [asked.method for asked in script.asked] == ["GET", "DELETE"][: 1 + len(answers)]
 
 
 def test_a_lease_that_is_given_back_has_no_leader(server):

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import yaml
 
+from palaestra.cli.commands import COMMANDS
 from palaestra.cluster.resources import TRAINING_JOBS
 from tests.pages import blocks
-from tests.unit.cli.test_cli_cluster import COMMANDS
+from tests.unit.cli.test_cli_cluster import COMMANDS as FOR_CLUSTERS
 from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
@@ -40,5 +41,14 @@ def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monke
 
 
 def test_every_command_of_the_page_exists_and_every_command_is_on_it():
-    """Each command has a row in the table."""
-    assert set(re.findall(r"^\| `palaestra (\w+)", COMMANDS_PAGE, re.MULTILINE)) == set(COMMANDS)
+    """Each command has a row, in the table of those for a cluster or in that of the others."""
+    for_clusters, others = COMMANDS_PAGE.split("These commands need no cluster:")
+
+    assert commands_in(for_clusters) == {*FOR_CLUSTERS, "view"}
+    assert commands_in(for_clusters) | commands_in(others) == set(COMMANDS)
+
+
+def commands_in(text):
+    """Return the commands that have a row in a table."""
+    rows = re.findall(r"^\| (`palaestra .+?`) \|", text, re.MULTILINE)
+    return {name for row in rows for name in re.findall(r"`palaestra ([\w-]+)", row)}

@@ -56,7 +56,7 @@ def test_missing_nodes_storage_and_operator_are_reported(found):
         "nodes": "wrong",
         "TrainingJobs": "ok",
         "namespace": "ok",
-        "to look at jobs": "ok",
+        "to read jobs": "ok",
         "to author jobs": "ok",
         "to read logs": "ok",
         "to fetch runs": "ok",
@@ -203,15 +203,15 @@ def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(fo
     findings = found(nobody)
 
     nobody.close()
-    assert findings["to look at jobs"].verdict is CheckStatus.WRONG
-    assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to look at jobs"].fact
+    assert findings["to read jobs"].verdict is CheckStatus.WRONG
+    assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to read jobs"].fact
     assert findings["to author jobs"].verdict is CheckStatus.WRONG
-    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not everybody needs this
+    assert findings["to read logs"].verdict is CheckStatus.UNKNOWN  # not every user needs this right
     assert findings["to fetch runs"].verdict is CheckStatus.UNKNOWN
     assert "create pods/exec" in findings["to fetch runs"].fact
     assert findings["storage class"].verdict is CheckStatus.UNKNOWN
     assert findings["sidecars"].verdict is CheckStatus.UNKNOWN
-    assert place.name in findings["to look at jobs"].fact
+    assert place.name in findings["to read jobs"].fact
 
 
 def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(found, place):

@@ -16,7 +16,7 @@ from palaestra.client import NotFetched, TookTooLong
 from palaestra.cluster import Unreachable
 from palaestra.plan import ClusterLayout, Images, identified, plan
 from tests.integration.apiserver.server import command, refusal, reply, serving, stream
-from tests.unit.view.jobs import make_job
+from tests.unit.view.jobs import running_job
 
 SUCCESS = b"\x03" + json.dumps({"status": "Success"}).encode()
 FAILURE = (
@@ -129,13 +129,13 @@ class Scene:
     def _job(self):
         pod = {"name": RUN_POD, "uid": "u", "created": "2026-01-31T12:00:00Z"}
         spec = {"storage": {"ephemeral": self.ephemeral}}
-        job = make_job(spec=spec, pod=pod).model_dump(mode="json", by_alias=True, exclude_none=True)
+        job = running_job(spec=spec, pod=pod).model_dump(mode="json", by_alias=True, exclude_none=True)
         job["status"]["replicas"][0] |= self.replica
         return job
 
     def _replica(self):
         images = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
-        return dict(plan(identified(make_job(), "0d1f"), ClusterLayout(images=images)).replicas[0].job)
+        return dict(plan(identified(running_job(), "0d1f"), ClusterLayout(images=images)).replicas[0].job)
 
 
 @pytest.fixture

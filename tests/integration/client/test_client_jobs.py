@@ -12,7 +12,7 @@ from palaestra.cluster import Invalid
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from palaestra.errors import SpecErrors
 from palaestra_sim.world import builtin
-from tests.integration.operator.cluster import training_job
+from tests.jobs import make_job
 from tests.waiting import eventually
 
 SOON_S = 30.0
@@ -26,8 +26,8 @@ def later():
 
 
 def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
-    """It is stored as plain data, as by kubectl."""
-    stored = client.apply(training_job("a", seed=7))
+    """The job is stored as plain data, as by kubectl."""
+    stored = client.apply(make_job("a", seed=7))
 
     assert stored.spec.seed == 7
     assert place.get(TRAINING_JOBS, "a")["metadata"]["uid"] == stored.metadata.uid
@@ -39,7 +39,7 @@ def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
     file.write_text("apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: a}\nspec: {}\n")
     from_file = client.apply(file)
 
-    from_model = client.apply(validate(training_job("a")))
+    from_model = client.apply(validate(make_job("a")))
 
     assert from_model.metadata.uid == from_file.metadata.uid
     assert from_model.metadata.generation == 1
@@ -51,7 +51,7 @@ def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, pla
     One such job once hid all others of its namespace.
     """
     place.train("a")
-    made = place.create(TRAINING_JOBS, {**training_job(), "metadata": {"generateName": "try-"}})
+    made = place.create(TRAINING_JOBS, {**make_job(), "metadata": {"generateName": "try-"}})
     name = made["metadata"]["name"]
 
     tell(name, "Succeeded")
@@ -69,7 +69,7 @@ def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
         {"name": name, "role": role, "world": {"inline": world}}
         for name, role in (("collect", "Collect"), ("evaluate", "Evaluate"))
     ]
-    job = training_job("large", simulators=groups)
+    job = make_job("large", simulators=groups)
     file = tmp_path / "job.json"
     file.write_text(json.dumps(job))
     apply = ("-n", place.name, "apply", "-f", str(file))
@@ -85,7 +85,7 @@ def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
 def test_a_wrong_job_is_refused_before_anything_is_sent(client):
     """The error lists every mistake, as with `palaestra run`."""
     with pytest.raises(SpecErrors) as refused:
-        client.apply(training_job("a", seed=-1, replica=2))
+        client.apply(make_job("a", seed=-1, replica=2))
 
     assert len(refused.value.problems) == 2
     assert client.list() == ()
@@ -93,10 +93,10 @@ def test_a_wrong_job_is_refused_before_anything_is_sent(client):
 
 def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
     """The message of the API server names the field."""
-    client.apply(training_job("a", seed=1))
+    client.apply(make_job("a", seed=1))
 
     with pytest.raises(Invalid, match="seed"):
-        client.apply(training_job("a", seed=2))
+        client.apply(make_job("a", seed=2))
 
 
 def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
@@ -112,7 +112,7 @@ def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
 
 def test_a_wait_ends_with_the_job(client, tell, later):
     """The test waits with `until="ended"`, which both results satisfy."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
     tell("a", "Running")
@@ -123,7 +123,7 @@ def test_a_wait_ends_with_the_job(client, tell, later):
 
 def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
     """The error contains the reason, because the user would ask for it next."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     tell("a", "Failed")
 
     with pytest.raises(EndedOtherwise, match="job a: is Failed, not Succeeded: Because: so it is"):
@@ -132,7 +132,7 @@ def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
 
 def test_a_wait_has_a_deadline(client):
     """No operator works on this job."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     began = time.monotonic()
 
     with pytest.raises(TookTooLong, match="TrainingJob a"):
@@ -142,7 +142,7 @@ def test_a_wait_has_a_deadline(client):
 
 def test_a_job_that_is_deleted_is_not_waited_for(client, later):
     """The job will not come back."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     waited = later(client.wait, "a", deadline_s=SOON_S)
 
     client.delete("a")
@@ -153,7 +153,7 @@ def test_a_job_that_is_deleted_is_not_waited_for(client, later):
 
 def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
     """Right after `resume` the status still says Suspended."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     client.suspend("a")
     tell("a", "Suspended", generation=2)
     client.resume("a")
@@ -168,7 +168,7 @@ def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
 
 def test_statuses_come_until_the_end(client, tell, later):
     """The last status is the final one, and the iterator ends by itself."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     seen = []
 
     def collect():
@@ -184,11 +184,11 @@ def test_statuses_come_until_the_end(client, tell, later):
 
 
 def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_what_stops_it(client):
-    """The queue decides.
+    """Kueue decides when such a job runs.
 
     The API server's own message would speak of a wrong spec, which is not the problem.
     """
-    client.apply(training_job("a", scheduling={"queueName": "robots"}))
+    client.apply(make_job("a", scheduling={"queueName": "robots"}))
 
     for call in (client.suspend, client.resume):
         with pytest.raises(QueueDecides, match=r"job a: Kueue decides .* queue robots; .*spec\.active"):
@@ -197,7 +197,7 @@ def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_w
 
 def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
     """A job with the same name can be created right afterwards."""
-    job = client.apply(training_job("a"))
+    job = client.apply(make_job("a"))
     owner = {
         "apiVersion": job.api_version,
         "kind": job.kind,
@@ -216,7 +216,7 @@ def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
 
 def test_events_of_pods_are_the_jobs(client, place):
     """A kubelet's warning explains why a job makes no progress."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
     place.complain({"metadata": {"name": "other-0-x7k2p", "uid": "v"}}, "BackOff", "another's")
 
@@ -227,7 +227,7 @@ def test_events_of_pods_are_the_jobs(client, place):
 
 def test_a_replica_without_a_pod_has_no_log(client):
     """The error names another command as remedy."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
 
     with pytest.raises(NoPod, match=r"replica 0 has no pod; .*palaestra describe a"):
         list(client.logs("a", deadline_s=SOON_S))
@@ -235,7 +235,7 @@ def test_a_replica_without_a_pod_has_no_log(client):
 
 def test_reading_a_log_that_went_with_its_pod_is_an_error(client, tell):
     """The status keeps its last lines."""
-    client.apply(training_job("a"))
+    client.apply(make_job("a"))
     pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     tell("a", "Running", replicas=[{"index": 0, "phase": "Running", "pod": pod}])
 

@@ -15,14 +15,10 @@ from palaestra.sweeps.optuna_search import OptunaSearch
 from palaestra.sweeps.runner import carry_out
 from palaestra.sweeps.search import InTurn
 from palaestra.sweeps.trial import TrialProgress
+from tests.jobs import make_job
 from tests.waiting import eventually
 
-JOB = {
-    "apiVersion": "palaestra.dev/v1alpha1",
-    "kind": "TrainingJob",
-    "metadata": {"name": "j"},
-    "spec": {"scheduling": {"queueName": "trainings"}},
-}
+JOB = make_job("j", scheduling={"queueName": "trainings"})
 PATIENCE_S = 60.0
 SUCCESS = Objective.SUCCESS_RATE
 
@@ -93,12 +89,12 @@ def test_the_job_of_a_pruned_trial_is_deleted(file, client, place, tell, tmp_pat
 
 
 def test_a_job_that_is_not_of_the_sweep_is_not_touched(file, client, place, tmp_path):
-    """It has the name of a trial by chance."""
+    """A job may have the name of a trial by chance."""
     place.train("s-0")
     before = place.get(TRAINING_JOBS, "s-0")
     search = InTurn(trials(load(file(matrix={"seed": [1]}))), {})
 
-    with pytest.raises(NotOfThisSweep, match="not of this sweep; give the sweep another name"):
+    with pytest.raises(NotOfThisSweep, match="outside of this sweep; give the sweep another name"):
         carry_out(search, ClusterBackend(client, "s", None, print), tmp_path, Objective.SUCCESS_RATE, print)
 
     assert place.get(TRAINING_JOBS, "s-0") == before

@@ -43,7 +43,7 @@ def test_the_script_of_the_page_about_python_trains(tmp_path, monkeypatch, capsy
 
 @pytest.fixture
 def sweep(tmp_path, monkeypatch):
-    """Return a function that writes the sweep with a given fence on the page, beside the examples."""
+    """Return a function that writes the sweep with a given fence on the page, next to the examples."""
     (tmp_path / "manifests").symlink_to(ROOT / "manifests")
     monkeypatch.chdir(tmp_path)
 

@@ -198,8 +198,8 @@ def test_a_run_that_is_done_before_its_deadline_is_not_held_up(play):
 
 def test_the_second_ctrl_c_kills(play, eventually):
     """A user does not have to wait for a checkpoint that hangs."""
-    runner = play.start("trap 'echo asked > $FOLDER/asked' TERM; while :; do sleep 0.02; done")
-    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+    runner = play.start(f"trap 'echo asked > $FOLDER/asked' TERM; {TRAIN}")
+    eventually((play.folder / "training").exists)
 
     os.kill(runner.pid, signal.SIGINT)
     eventually((play.folder / "asked").exists)
@@ -212,8 +212,8 @@ def test_the_second_ctrl_c_kills(play, eventually):
 
 def test_a_run_that_was_done_when_it_was_interrupted_stays_done(play, eventually):
     """The trainer had nothing more to save."""
-    runner = play.start("trap 'exit 0' TERM; while :; do sleep 0.02; done")
-    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+    runner = play.start(f"trap 'exit 0' TERM; {TRAIN}")
+    eventually((play.folder / "training").exists)
 
     os.kill(runner.pid, signal.SIGTERM)
     out, _ = runner.communicate(timeout=20)

@@ -248,7 +248,7 @@ def test_output_goes_to_a_file_for_each_container(stage):
 
 
 def test_a_log_of_a_program_that_prints_without_end_has_a_limit(stage):
-    """It would fill the disk and end the run.
+    """An unlimited log would fill the disk and end the run.
 
     The log keeps its beginning and its end, and the exit code stays that of the program.
     """

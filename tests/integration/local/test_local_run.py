@@ -6,19 +6,16 @@ import pty
 import re
 import signal
 import socket
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
 import yaml
 
-from tests.local_run import below, left_of
+from tests.integration.local.desk import PATIENCE_S, Desk
+from tests.local_run import left_of
 from tests.strangers import DRIVE, rover
 
-PALAESTRA = Path(sys.executable).with_name("palaestra")
-PATIENCE_S = 60
 ASK = """\
 import os, pathlib, xmlrpc.client, yaml
 run = pathlib.Path(os.environ["PALAESTRA_RUN"])
@@ -59,58 +56,6 @@ for simulator in config["simulators"]:
     sidecar.start()
 """
 TRAIN = START + WAIT
-
-
-class Desk:
-    """A folder with a job file, in which a user types `palaestra run`."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.job = folder / "job.yaml"
-        self.run_directory = folder / "runs" / "desk" / "0"
-        self._started: list[subprocess.Popen] = []
-
-    def write(self, program: str, **spec) -> None:
-        """Write a job whose trainer is a Python program."""
-        file = self.folder / "program.py"
-        file.write_text(program)
-        job = {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "desk"},
-            "spec": {"backoffLimit": 0, "trainer": {"command": ["python", str(file)]}, **spec},
-        }
-        self.job.write_text(yaml.safe_dump(job))
-
-    def start(self, *options: str, **how) -> subprocess.Popen:
-        """Start `palaestra run`."""
-        how = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **how}
-        self._started.append(subprocess.Popen([PALAESTRA, "run", self.job, *options], cwd=self.folder, **how))
-        return self._started[-1]
-
-    def clear(self) -> None:
-        """Kill the runs that a failed test left, with all their processes."""
-        for process in (each for each in self._started if each.poll() is None):
-            process.kill()
-            process.communicate()
-
-    def training(self, eventually, program: str) -> tuple[subprocess.Popen, list[int]]:
-        """Start a run whose trainer starts its simulators.
-
-        Returns:
-            The run's process, and the process ids of all its processes once they exist.
-        """
-        self.write(program)
-        process = self.start()
-        eventually((self.run_directory / "begun").exists)
-        eventually(lambda: sum("palaestra-stub" in " ".join(words) for _, words in below(process.pid)) >= 2)
-        return process, [pid for pid, _ in below(process.pid)]
-
-    def run(self, *options: str) -> tuple[int, str]:
-        """Run `palaestra run`, and return its exit code and output."""
-        process = self.start(*options)
-        out, _ = process.communicate(timeout=PATIENCE_S)
-        return process.returncode, out
 
 
 @pytest.fixture
@@ -179,7 +124,7 @@ def test_the_run_directory_holds_what_was_run(desk):
 
 
 def test_fresh_begins_anew_and_keeps_the_old_run(desk):
-    """The second training has its directory beside the first."""
+    """The second training has its directory next to the first."""
     desk.write(ASK)
     desk.run()
 
@@ -200,7 +145,7 @@ def test_a_wrong_job_is_corrected_without_fresh(desk):
 
     assert (refused, code) == (2, 0), out
     aside = desk.run_directory.parent / "0.old-1"
-    assert f"{desk.run_directory}: the run that was there is now {aside}" in out
+    assert f"{desk.run_directory}: the earlier run was moved to {aside}" in out
     assert (aside / "logs" / "trainer.log").exists()
 
 
@@ -215,7 +160,7 @@ def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
     _, _ = first.communicate(timeout=PATIENCE_S)
 
     assert code == 2
-    assert "is at work there (process" in out
+    assert "is in use by `palaestra run` (process" in out
     assert first.returncode == 75
 
 
@@ -227,7 +172,7 @@ def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, event
     out, _ = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 75
-    assert "the same command goes on" in out
+    assert "interrupted; the same command starts its program again" in out
     assert not _processes_that_name(desk.folder)
     assert left_of(pids) == []
 
@@ -242,7 +187,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(des
     out, _ = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 130
-    assert "killed; the same command goes on" in out
+    assert "killed; the same command starts its program again" in out
     assert not _processes_that_name(desk.folder)
     assert left_of(pids) == []
 

@@ -15,6 +15,7 @@ import palaestra
 from palaestra.errors import SpecErrors
 from palaestra.local.bounded_log import FIRST, LAST
 from palaestra.local.errors import RunRefused, StillRunning
+from tests.jobs import make_job
 from tests.local_run import below, left_of
 from tests.waiting import eventually
 
@@ -80,12 +81,7 @@ def job(tmp_path):
     def make(program, name="desk", **spec):
         file = tmp_path.with_name(f"{tmp_path.name}-{hash(program)}.py")
         file.write_text(program)
-        return {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": name},
-            "spec": {"backoffLimit": 0, "trainer": {"command": ["python", str(file)]}, **spec},
-        }
+        return make_job(name, **{"backoffLimit": 0, "trainer": {"command": ["python", str(file)]}, **spec})
 
     return make
 
@@ -175,7 +171,7 @@ def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
 def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
     """The call raises the error, so that it is not only in the log."""
     with palaestra.run(job(WAIT), runs=tmp_path) as run:
-        with pytest.raises(RunRefused, match="is at work there"):
+        with pytest.raises(RunRefused, match="is in use by"):
             palaestra.run(job(WAIT), runs=tmp_path)
         begun(run)
 

@@ -12,6 +12,7 @@ import yaml
 from palaestra.cli import main
 from palaestra.job_input import job_of
 from palaestra.sweeps.local_backend import busy
+from tests.jobs import make_job
 from tests.local_run import EXAMPLES, below, left_of
 from tests.waiting import eventually
 
@@ -64,12 +65,7 @@ def desk(tmp_path):
         (tmp_path / "program.py").write_text(COMMON + program)
         command = ["python", str(tmp_path / "program.py")]
         trainer = {"command": command, "algorithm": {"name": "DQN"}}
-        job = {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "j"},
-            "spec": {"backoffLimit": 0, "trainer": trainer},
-        }
+        job = make_job("j", backoffLimit=0, trainer=trainer)
         sweep = {
             "apiVersion": "palaestra.dev/v1alpha1",
             "kind": "Sweep",

@@ -9,24 +9,21 @@ import pytest
 import yaml
 
 from tests import without_ros
+from tests.jobs import make_job
 
 PALAESTRA = Path(sys.executable).with_name("palaestra")
-DEADLINE_S = 240.0  # of what takes ten seconds, on a busy machine
+DEADLINE_S = 240.0  # the work takes ten seconds, but the machine may be busy
 MODULES = ("rospy", "rosmaster", "rosgraph", "genpy", "std_msgs", "netifaces")
-JOB = {
-    "apiVersion": "palaestra.dev/v1alpha1",
-    "kind": "TrainingJob",
-    "metadata": {"name": "bare"},
-    "spec": {
-        "simulators": [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}],
-        "trainer": {
-            "environment": {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
-            "algorithm": {"name": "A2C", "hyperparameters": {"n_steps": 20}},
-            "steps": 100,
-            "evaluation": {"everySteps": 100, "episodes": 1, "confirmEpisodes": 1},
-        },
+JOB = make_job(
+    "bare",
+    simulators=[{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}],
+    trainer={
+        "environment": {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
+        "algorithm": {"name": "A2C", "hyperparameters": {"n_steps": 20}},
+        "steps": 100,
+        "evaluation": {"everySteps": 100, "episodes": 1, "confirmEpisodes": 1},
     },
-}
+)
 # A program of a user, which is a node by itself and starts a master.
 PROGRAM = f"""
 import importlib.util, os, xmlrpc.client

@@ -17,7 +17,7 @@ from tests.local_run import LocalRun, send
 from tests.monitoring import targets
 from tests.monitoring.prometheus import PROGRAMS, scraping
 from tests.monitoring.questions import ALERTS, alerts
-from tests.soak.jobs import LITTLE_PPO, make_job
+from tests.soak.jobs import LITTLE_PPO, tiny_job
 
 pytestmark = pytest.mark.minutes(2)
 
@@ -74,7 +74,7 @@ def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_n
 
 def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
     """Its simulators are slow and later stopped, it saves no checkpoint, and its budget runs out."""
-    job = make_job(**SICK)
+    job = tiny_job(**SICK)
     job["spec"]["stallDeadlineSeconds"] = 30
     with LocalRun(tmp_path, job) as run, scraping(targets.of_run(run, "lab"), folder, rules) as prometheus:
         _fires(prometheus, "PalaestraSimulatorSlow")

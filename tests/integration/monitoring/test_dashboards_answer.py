@@ -8,7 +8,7 @@ from tests.local_run import LocalRun
 from tests.monitoring import targets
 from tests.monitoring.prometheus import NotAnswered, scraping
 from tests.monitoring.questions import looked_at, questions
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 OVER, SHOWN = "30s", "10m"  # range of the rates; the time range at the top of a dashboard
 ANSWERED_S = 150
@@ -29,7 +29,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
     folder.mkdir()
     asked = [*questions(OVER, SHOWN), *looked_at()]
 
-    with LocalRun(tmp_path, make_job(**FAULTY)) as run:
+    with LocalRun(tmp_path, tiny_job(**FAULTY)) as run:
         scraped = [*targets.of_run(run, place.name), targets.of_operator(address(operator))]
         with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # reported below, by its name
             prometheus.until(lambda: prometheus.query("palaestra_operator_leader == 1"), ANSWERED_S)

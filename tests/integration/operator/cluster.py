@@ -19,6 +19,7 @@ from palaestra.cluster.resources import (
 )
 from palaestra_protocol.pod.status import Termination
 from palaestra_sim.world import builtin
+from tests.jobs import make_job
 from tests.waiting import DEADLINE_S, TooLate, eventually
 
 BINDINGS = Resource(api_version="v1", kind="Binding", plural="bindings")
@@ -35,16 +36,6 @@ def served(api: Api) -> bool:
     except NotFound:
         return False
     return True
-
-
-def training_job(name: str = "job", **spec: Any) -> Object:
-    """Return a TrainingJob; keywords are fields of its spec."""
-    return {
-        "apiVersion": "palaestra.dev/v1alpha1",
-        "kind": "TrainingJob",
-        "metadata": {"name": name},
-        "spec": spec,
-    }
 
 
 def world_of(config_map: str) -> Object:
@@ -129,7 +120,7 @@ class Place:
 
     def train(self, name: str = "job", **spec: Any) -> Object:
         """Create a TrainingJob, as its author does."""
-        return self.create(TRAINING_JOBS, training_job(name, **spec))
+        return self.create(TRAINING_JOBS, make_job(name, **spec))
 
     def status(self, name: str = "job") -> Object:
         """Return the status of a TrainingJob, or an empty one."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from palaestra_sim.world import builtin
-from tests.integration.operator.cluster import training_job
+from tests.jobs import make_job
 from tests.waiting import eventually
 
 LARGE, MOST_MIB = 40, 100
@@ -56,7 +56,7 @@ def test_large_jobs_that_are_refused_leave_the_operator_small(place, start):
     """The jobs exist before the operator starts, so it reads them all at once."""
     worlds = with_worlds(*(["x" * 180_000] * 5))
     for number in range(LARGE):
-        place.create(TRAINING_JOBS, training_job(f"job-{number}", **worlds))
+        place.create(TRAINING_JOBS, make_job(f"job-{number}", **worlds))
     operator = start()
 
     eventually(lambda: all_have_failed(place), 90)

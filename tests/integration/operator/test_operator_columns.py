@@ -41,7 +41,7 @@ def test_kubectl_get_shows_why_a_job_waits_and_how_far_it_has_to_go(place, start
 
 
 def test_kubectl_get_wide_shows_the_attempts_of_the_replicas(place, start, kubectl):
-    """They show the restarts of a replica, its node, and what a failure now would cost."""
+    """The columns show the restarts of a replica, its node, and how many steps a failure now would cost."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):

@@ -85,7 +85,7 @@ def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
 
 
 def test_a_claim_that_was_never_bound_goes_with_its_job(place, start):
-    """It contains no run. Once, claims of jobs that never began filled the quota of the namespace."""
+    """Such a claim has no run. Once, claims of jobs that never began filled the quota of the namespace."""
     start()
     place.train("idle", suspend=True, replicas=2)
     place.train()
@@ -121,7 +121,7 @@ def claim_or_other(name):
 
 
 def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
-    """A user suspends with `kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
+    """A user can type `kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
     start()
     place.train()
     place.pods()

@@ -9,9 +9,8 @@ from palaestra.decide import Delete, Discard, SetSuspend, Stop
 from palaestra.decide.decision import Basis
 from palaestra.operator.executor import Executor
 from palaestra.operator.fenced_client import FencedClient
-from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import ForeignJobs, RejectedCreations
 from tests.integration.operator.cluster import stranger
 from tests.integration.operator.installed import USER
 from tests.waiting import eventually
@@ -61,9 +60,9 @@ def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, cont
 
 
 def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place, start, control_plane):
-    """An annotation records it.
+    """An annotation records the value that the operator set.
 
-    It is created with the Job and patched together with `spec.suspend`.
+    The annotation is created with the Job and patched together with `spec.suspend`.
     """
     start()
     place.train()
@@ -100,7 +99,7 @@ def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(place, start
 
 
 def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
-    """It has another claim, so that nothing has to wait for a kubelet that does not respond."""
+    """The new job has another claim, so it need not wait for a kubelet that does not respond."""
     start()
     place.train(replicas=2)
     for pod in place.pods(count=2):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from palaestra.api.reasons import LONGEST_FACT
+from palaestra.api.reason_texts import LONGEST_FACT
 from palaestra.cluster import NotFound, Resource
 from palaestra.cluster.resources import DEFINITIONS, JOBS, RIGHTS, WORKLOADS
 from palaestra.observe.kueue import NO_WORKLOAD

@@ -163,7 +163,7 @@ def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
 def test_the_figures_of_the_operator_can_be_measured(crowd, tmp_path):
     """The functions of `make bench` run on the existing control plane.
 
-    Their numbers mean nothing here.
+    On such a small scale the numbers mean nothing.
     """
     plane, api = crowd
     figures = bench.figures_of_a_crowd(plane, api.within(60), tmp_path, count=2, quiet_s=1)

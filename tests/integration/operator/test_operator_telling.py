@@ -118,7 +118,7 @@ def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_p
     asked = [
         event
         for event in control_plane.audit(place.name)
-        if event["user"].get("username") == USER  # none for a request without credentials
+        if event["user"].get("username") == USER  # a request without credentials has no user
         and event.get("objectRef", {}).get("namespace") == place.name
     ]
     assert asked

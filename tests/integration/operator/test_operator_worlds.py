@@ -60,7 +60,7 @@ def test_a_world_over_its_budget_is_refused(budget: dict[str, int], size: int, w
 
     found = WorldCheckProcess(**budget).check([FINE, large])
 
-    problem = f"{FIELD}: its check takes more than the {words} that a world has; {REMEDY}"
+    problem = f"{FIELD}: its check needs more than {words}, the limit for one world; {REMEDY}"
     assert found == {
         FINE.digest: WorldVerdict(),
         large.digest: WorldVerdict(problem=problem, too_costly=True),
@@ -91,7 +91,7 @@ def test_a_check_ends_with_the_operator(tmp_path: Path) -> None:
 def test_another_tenant_does_not_wait_for_costly_worlds(installed: Api, place: Place, start: Start) -> None:
     """Only the author of the costly worlds waits.
 
-    That author's jobs say that the worlds are being checked, and are planned one by one.
+    The costly worlds are checked one by one, and the status of their jobs says so.
     """
     other = Place(installed, "other")
     operator = start(f"--namespace={other.name}", "--workers=1")

@@ -6,7 +6,7 @@ import pytest
 
 from palaestra_sim.ros import LATER, Loop, RosNode, ServiceFailed
 
-DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
+DEADLINE_S = 60.0  # the work takes milliseconds, but the machine may be busy
 
 
 class Peer:

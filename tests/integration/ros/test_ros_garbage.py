@@ -12,7 +12,7 @@ from palaestra_trainer.errors import MasterLost, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, RosSubscriber, ensure_node
 from palaestra_trainer.ros.tcpros_client import TcprosClient
 
-DEADLINE_S = 60.0  # of what takes moments, on a busy machine
+DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
 HTTP = b"HTTP/1.0 200 OK\r\nContent-Type: text/xml\r\n\r\n"
 WHOLE = xmlrpc.client.dumps(([1, "", "rosrpc://localhost:1"],), methodresponse=True).encode()
 
@@ -73,7 +73,7 @@ def test_a_master_that_answers_garbage_is_a_fault_of_the_simulator_that_was_aske
     monkeypatch.setenv("ROS_MASTER_URI", server(answer))
 
     with pytest.raises(
-        WrongData, match=r"robotino: /robotino/robot/get_time cannot be looked up: .*answered"
+        WrongData, match=r"robotino: /robotino/robot/get_time cannot be looked up: .*responded"
     ):
         RosService("/robotino/robot/get_time", "webots_ros/get_float")(ask=True)
     with pytest.raises(WrongData, match="robotino: /robotino/ir1/value cannot be subscribed to: "):

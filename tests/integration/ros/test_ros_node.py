@@ -232,7 +232,7 @@ def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
         _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
         assert "error" in answer
 
-    eventually(lambda: len(links_there()) < before + count)  # the loop still holds its last one
+    eventually(lambda: len(links_there()) < before + count)  # the loop still holds the last connection
 
 
 def links_there():

@@ -56,7 +56,7 @@ def test_it_prints_its_address_and_ends_at_a_signal():
 @pytest.mark.parametrize(
     ("address", "named", "variables"),
     [
-        ("127.0.0.1:0", "localhost", {}),
+        ("127.0.0.1:0", "127.0.0.1", {}),
         ("0.0.0.0:0", socket.gethostname(), {}),
         ("0.0.0.0:0", "10.1.2.3", {"ROS_IP": "10.1.2.3"}),
         ("127.0.0.2:0", "127.0.0.2", {}),
@@ -73,7 +73,7 @@ def test_its_address_has_the_name_that_nodes_would_choose(address, named, variab
 
 
 def test_a_port_in_use_is_one_line():
-    """A person chose it."""
+    """A person chose the port, so no other one is tried."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         with started(PROGRAM, "--listen", address) as program:

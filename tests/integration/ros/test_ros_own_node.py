@@ -1,16 +1,20 @@
 """Our node, which the trainer uses where rospy is absent, and which of the two a program gets."""
 
 import os
+import re
+import signal
 import subprocess
 import sys
 import xmlrpc.client
 
 import pytest
 
-from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.ros import Master, own_node
+from palaestra_trainer.ros.node_name import full_name
 
-WITHOUT_ROSPY = "import sys; sys.modules['rospy'] = None\n"  # as where it is not installed
+# rospy then cannot be imported, as if it were not installed.
+WITHOUT_ROSPY = "import sys; sys.modules['rospy'] = None\n"
 WHICH = "from palaestra_trainer.ros import node; print(node.ensure_node.__module__)"
 LISTEN = """
 import os
@@ -66,7 +70,7 @@ def test_a_program_without_rospy_calls_listens_and_is_listed(peer):
 
 
 def test_our_node_answers_the_master_and_tools(master):
-    """`rosnode info` and `rosnode ping` ask it, and a second node of a name would have it shut down."""
+    """`rosnode info` and `rosnode ping` ask it."""
     name = own_node.ensure_node("tester")
     with xmlrpc.client.ServerProxy(own_node.node_uri()) as node:
         answers = {
@@ -81,7 +85,6 @@ def test_our_node_answers_the_master_and_tools(master):
                 "publisherUpdate": ("/t", []),
                 "paramUpdate": ("/p", 1),
                 "requestTopic": ("/t", [["TCPROS"]]),
-                "shutdown": ("a reason",),
             }.items()
         }
 
@@ -96,8 +99,76 @@ def test_our_node_answers_the_master_and_tools(master):
         "publisherUpdate": [1, 0],
         "paramUpdate": [1, 0],
         "requestTopic": [0, 0],
-        "shutdown": [1, 0],
     }
+
+
+NAMED = "import sys; sys.argv[1:] = {}\n"
+ENSURE = "from palaestra_trainer.ros import ensure_node; print(ensure_node('tester'))"
+
+
+@pytest.mark.usefixtures("master")
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (["__name:=mine"], "/lab/mine"),
+        (["__ns:=/other/", "__name:=mine", "a:=b", "_p:=1"], "/other/mine"),
+        (["__name:=/mine"], "/mine"),
+        (["__ns:=other"], r"/other/tester_\d+"),
+        (["name:=mine"], r"/lab/tester_\d+"),
+    ],
+)
+def test_arguments_rename_our_node_as_they_rename_rospys(arguments, name):
+    """`roslaunch` adds them, and a program must have one name on every machine."""
+    program = NAMED.format(arguments) + ENSURE
+
+    assert re.fullmatch(name, run(program, ROS_NAMESPACE="lab").splitlines()[-1])
+    assert re.fullmatch(name, run(WITHOUT_ROSPY + program, ROS_NAMESPACE="lab").strip())
+
+
+def test_a_name_that_no_node_can_have_is_refused():
+    """The master would take it, and tools would not find the node."""
+    with pytest.raises(ConfigurationError, match="__name:=my robot: is not a name of ROS; begin"):
+        full_name("tester", ["__name:=my robot"], {})
+
+
+UNTIL_KILLED = """
+import time
+from palaestra_trainer.ros import ensure_node
+from palaestra_trainer.ros.node import node_uri
+from palaestra_trainer.waiting.signals import Interruption
+ensure_node()
+print(node_uri(), flush=True)
+with {} as interruption:
+    for _ in range(600):
+        time.sleep(0.1)
+        if interruption and interruption.requested:
+            time.sleep(1)
+            print(interruption.requested.name)
+            break
+"""
+
+
+@pytest.mark.usefixtures("master")
+@pytest.mark.parametrize(
+    ("listening", "code", "printed"),
+    [("Interruption()", 0, ["SIGTERM"]), ("__import__('contextlib').nullcontext()", -signal.SIGTERM, [])],
+    ids=["a training", "a script"],
+)
+def test_rosnode_kill_ends_our_process_as_sigterm_does(listening, code, printed):
+    """The caller gets its response first, and asking twice does not take the checkpoint away."""
+    with subprocess.Popen(
+        [sys.executable, "-c", WITHOUT_ROSPY + UNTIL_KILLED.format(listening)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as program:
+        with xmlrpc.client.ServerProxy(program.stdout.readline().strip()) as node:
+            responses = [node.shutdown("/rosnode", "user request")[::2] for _ in range(2)]
+        ended, _ = program.communicate(timeout=60)
+
+    assert responses == [[1, 0], [1, 0]]
+    assert program.returncode == code
+    assert ended.splitlines()[1:] == printed  # the first line is the log's
 
 
 NO_MASTER = (
@@ -116,6 +187,6 @@ except MasterLost as error:
 def test_without_a_master_there_is_no_node():
     """As with rospy, which is not asked before the master has answered."""
     assert issubclass(MasterLost, ConnectionError)
-    assert "no ROS master answers at http://localhost:1" in run(
+    assert "no ROS master responds at http://localhost:1" in run(
         NO_MASTER, ROS_MASTER_URI="http://localhost:1"
     )

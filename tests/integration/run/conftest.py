@@ -2,8 +2,8 @@
 
 import pytest
 
+from tests.jobs import example
 from tests.local_run import LocalRun
-from tests.soak.jobs import example
 
 
 @pytest.fixture

@@ -16,11 +16,12 @@ from tests.bench.__main__ import PARTS
 from tests.local_run import ROOT
 from tests.soak import chaos
 
-SMALL = ("newcomer", "parallel", "planning", "simulators", "stepping")
+SMALL = ("newcomer", "parallel", "planning", "simulators", "stepping", "watched")
 OF_A_CLUSTER = ("hostile",)
-OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")  # of each example in MEASURED
+# They run the examples that MEASURED names in test_run_from_file_to_policy.py.
+OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")
 ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
-DEADLINE_S = 800  # of a minute or two, on a busy machine
+DEADLINE_S = 800  # the work takes a minute or two, but the machine may be busy
 
 
 def numbers(found):

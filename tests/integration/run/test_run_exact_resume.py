@@ -16,7 +16,7 @@ import yaml
 from tests.local_run import ROOT, LocalRun
 from tests.pages import fenced
 from tests.soak import resume
-from tests.soak.jobs import make_job
+from tests.soak.jobs import tiny_job
 
 PAGE = dict(fenced((ROOT / "docs/howto/randomization.md").read_text()))
 EXAMPLES = ROOT / "examples"
@@ -49,7 +49,7 @@ def learning(environment: dict[str, Any], steps: int, driver: str) -> Variant:
 
 def seeing() -> Variant:
     """Return PPO on pictures, which a new simulator must draw exactly as the first one would."""
-    job = make_job(
+    job = tiny_job(
         collect=SEEING,
         evaluate=SEEING,
         environment={"id": "SeeTarget-v0", "options": {"max_steps": 40, "cylinders": True}},

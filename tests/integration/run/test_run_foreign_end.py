@@ -1,7 +1,7 @@
 """Code of a job's author that ends the process itself: the run is not complete."""
 
 from tests.local_run import LocalRun
-from tests.soak.jobs import LITTLE_PPO, make_job
+from tests.soak.jobs import LITTLE_PPO, tiny_job
 
 LEAVES = """
 import os, gymnasium
@@ -23,7 +23,7 @@ def test_a_library_that_ends_the_process_does_not_complete_the_run(tmp_path, mon
     (tmp_path / "leaves.py").write_text(LEAVES)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     environment = {"id": "leaves:Leaves-v0"}
-    job = make_job(environment=environment, algorithm=LITTLE_PPO, steps=100, evaluation={"everySteps": 0})
+    job = tiny_job(environment=environment, algorithm=LITTLE_PPO, steps=100, evaluation={"everySteps": 0})
     job["spec"]["backoffLimit"] = 0
 
     with LocalRun(tmp_path, job) as run:

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import pytest
 
+from palaestra.cli.demo import playing_job
+from palaestra.job_input import data_of, job_of
 from palaestra_sim.world import robots
 from palaestra_trainer.ros.master import Master
-from tests.local_run import EXAMPLES, LocalRun, left_of
-from tests.soak.jobs import example
+from tests.jobs import example
+from tests.local_run import EXAMPLES, PALAESTRA, LocalRun, left_of
 
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 FEW = {
@@ -29,8 +31,16 @@ FEWEST = {
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
 # The tests in test_bench.py run these.
-MEASURED = {"chaos", "move-to-target", "move-to-target-mujoco", "navigate", "see-target", "sparse-reward"}
-# For the example two-collectors, whose own rollouts have eight times as many steps.
+MEASURED = {
+    "chaos",
+    "move-to-target",
+    "move-to-target-mujoco",
+    "navigate",
+    "paper-dqn",
+    "see-target",
+    "sparse-reward",
+}
+# The example two-collectors runs with rollouts of this length; its own are eight times as long.
 ROLLOUT_STEPS = 64
 
 
@@ -137,6 +147,30 @@ def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
     assert "faults            1" in finished.output
 
 
+def test_a_person_reads_how_the_run_goes(finished):
+    """Warnings are sentences, and nobody has to know the fields of a log line."""
+    lines = finished.output.splitlines()
+
+    assert any(line.startswith("step ") and " of 1,000 · " in line for line in lines), lines
+    (fault,) = [line for line in lines if line.startswith("warning: simulator fault: ")]
+    assert fault.endswith("(kind dead, simulator collect-0)")
+    assert "[info" not in finished.output
+
+
+def test_the_demo_plays_a_policy_until_it_is_interrupted(finished, tmp_path):
+    """While it plays, the policy learns nothing; the same command plays it again."""
+    job = data_of(playing_job(job_of(finished.run.file), finished.run.directory))
+
+    with LocalRun(tmp_path, job) as run:
+        run.until(lambda: "[trainer] episode 1: " in run.output())
+        run.process.send_signal(signal.SIGTERM)
+        code, output = run.end()
+
+    assert code == 75, output
+    assert " succeeded" in output
+    assert "interrupted; the same command starts its program again" in output
+
+
 def test_a_finished_run_is_reported_and_not_repeated(finished):
     """A second `make run` prints the result within seconds."""
     before = (finished.run.directory / "attempts.jsonl").read_text()
@@ -161,6 +195,38 @@ def test_a_policy_can_be_measured_afterwards(finished):
     assert json.loads(result.stdout)["episodes"] == 3
 
 
+def test_a_policy_is_measured_on_the_same_episodes_in_each_simulator(finished):
+    """A policy may succeed in the simulator that it knows, and fail in another one."""
+    result = subprocess.run(
+        [EVAL, finished.run.directory, "--episodes", "2", "--in", "stub,mujoco"],
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=True,
+    )
+
+    head, *rows = result.stdout.splitlines()
+    assert head.split()[:2] == ["simulator", "success"]
+    assert [row.split()[0] for row in rows] == ["stub", "mujoco"]
+    assert all(re.search(r"\d+% +\d+% to \d+%", row) for row in rows), rows
+
+
+def test_a_policy_is_compared_with_itself_in_two_simulators(finished):
+    """In a deterministic simulator no episode tells a policy from itself."""
+    result = subprocess.run(
+        [PALAESTRA, "compare", *[finished.run.directory] * 2, "--episodes", "20", "--json"],
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+
+    found = json.loads(result.stdout)
+    assert result.returncode == 3, result.stderr
+    assert (found["verdict"], found["episodes"], found["difference"]) == ("undecided", 20, 0.0)
+    assert (found["only_a"], found["only_b"]) == (0, 0)
+
+
 def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(tmp_path):
     """It ends at the boundary of PPO's rollout, as without an interruption; test_run_exact_resume.py has DQN.
 
@@ -179,7 +245,7 @@ def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(tmp_path):
         saved = max(int(folder.name) for folder in (training.directory / "checkpoints").iterdir())
 
         assert code == 75, output
-        assert "the same command goes on" in output
+        assert "the same command continues" in output
         assert len(pids) >= 8
         assert left == []
         code, output = training.start().end()

@@ -4,7 +4,7 @@ import re
 
 from palaestra_sim.world import builtin
 from tests.local_run import running
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 LINE = r"{0}: the stub simulates no Colosseum: 2 nodes left out \({0}-0.wbt, lines \d+, \d+\)"
 
@@ -15,7 +15,7 @@ def test_what_simulators_leave_out_reaches_the_person_who_reads_the_run():
         "world": {"inline": builtin("arena").decode() + "Colosseum { }\nColosseum { }\n"},
         "options": ["--leave-out", "Colosseum"],
     }
-    job = make_job(
+    job = tiny_job(
         collect=part | {"count": 2, "standby": True}, evaluate=part, algorithm=LITTLE_DQN, steps=1_000_000
     )
 

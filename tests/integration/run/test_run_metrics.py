@@ -11,7 +11,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from tests.local_run import LocalRun
 from tests.metrics import complaints, documented, served
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 HEALTH = re.compile(r"health=(\S+)")
 
@@ -25,7 +25,7 @@ def scrape(address):
 @pytest.fixture(scope="module")
 def texts(tmp_path_factory):
     """Return the metrics of a run's trainer and sidecar, after an evaluation and a checkpoint."""
-    job = make_job(
+    job = tiny_job(
         environment={"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
         algorithm=LITTLE_DQN,
         steps=50_000,

@@ -5,7 +5,7 @@ from pathlib import Path
 from stable_baselines3 import PPO
 
 from tests.local_run import running
-from tests.soak.jobs import make_job
+from tests.soak.jobs import tiny_job
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 ROLLOUT = 512  # the script's PPO learns from this many steps at once
@@ -20,7 +20,7 @@ def mended(training):
 
 def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job_through_their_faults():
     """Users copy this script, so it must work; the summary at its end must match the run directory."""
-    job = make_job(
+    job = tiny_job(
         faults=f"crash:step={CRASH_AT}",
         command=["python", str(SCRIPT)],
         steps=300,

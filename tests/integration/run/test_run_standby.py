@@ -6,7 +6,7 @@ import pytest
 
 from tests.local_run import is_running, running
 from tests.soak import recovery, recycling
-from tests.soak.jobs import LITTLE_DQN, make_job
+from tests.soak.jobs import LITTLE_DQN, tiny_job
 
 SELDOM = {
     "evaluation": {"everySteps": 500_000, "episodes": 1, "confirmEpisodes": 1},
@@ -19,7 +19,7 @@ READY = {"collect-0": "ready", "collect-1": "ready", "evaluate-0": None}
 def job(steps, **collect):
     """Return a job of two simulators with spares, and one for evaluation without a spare."""
     pair = {"count": 2, "standby": True} | collect
-    return make_job(collect=pair, algorithm=LITTLE_DQN, steps=steps, **SELDOM)
+    return tiny_job(collect=pair, algorithm=LITTLE_DQN, steps=steps, **SELDOM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ def replaced():
 
 
 def test_a_crash_waits_for_no_start(replaced):
-    """It costs next to nothing, like a recycled simulator, as `make soak` measures."""
+    """A crash costs next to no time, like recycling, as `make soak` measures."""
     assert replaced.waited
 
 

@@ -135,7 +135,7 @@ def test_restarts_of_simulators_leave_nothing_behind():
     """Neither the trainer nor the sidecars keep anything."""
     with running(leaks.job()) as run:
         early, late = leaks.least(run, 3, 6), leaks.least(run, 12, 15)
-        if leaks.grown(early, late):  # a leak stays, but the memory of a restart does not
+        if leaks.grown(early, late):  # memory that leaked stays; memory for a restart is freed later
             late = leaks.least(run, 20, 40)
 
     assert leaks.grown(early, late) == []

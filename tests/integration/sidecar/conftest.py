@@ -19,9 +19,9 @@ from tests import waiting
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
-DEADLINE_S = 20.0  # of what takes milliseconds, on a busy machine
+DEADLINE_S = 20.0  # the work takes milliseconds, but the machine may be busy
 ENDS = {0, EXIT_HUNG}  # exit codes after a signal: without or with its alarm
-PACE_S = 0.005  # between two polls where there is no event
+PACE_S = 0.005  # between two polls of a state without events
 
 
 def eventually(seen, deadline_s=DEADLINE_S):

@@ -34,7 +34,7 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
     [
         (["--driver=gazebo"], "argument --driver: invalid choice: 'gazebo' (choose from 'stub', "),
         (["--world=/no.wbt"], "--world: /no.wbt: No such file or directory; give a .wbt or .xml file"),
-        (["--control=7100"], "argument --control: '7100' is no address such as 127.0.0.1:7100; see"),
+        (["--control=7100"], "argument --control: '7100' is not an address such as 127.0.0.1:7100; see"),
         (["--control=0.0.0.0:0"], "--control: 0.0.0.0:0 is not a loopback address; use 127.0.0.1 or [::1]"),
         (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
         (["--job=j"], "--work: is missing; with --job, give the folder for the generated world"),

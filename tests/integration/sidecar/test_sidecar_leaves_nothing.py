@@ -63,7 +63,7 @@ def test_a_signal_ends_everything(sidecar, request, left, eventually_true, numbe
 
 
 def test_the_end_takes_less_than_two_seconds() -> None:
-    """The last sidecars of a pod get no more.
+    """The sidecars of a pod that stop last have only this time.
 
     The simulator's SIGKILL comes first, and the alarm after it.
     """

@@ -40,6 +40,20 @@ def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
     assert it.ask("GET", "/healthz", address=it.health) == (200, "ok\n")
 
 
+def test_a_driver_that_shows_nothing_says_so_on_both_ports(sidecar, waits) -> None:
+    """A person who asks to see it learns which drivers can be seen."""
+    it = sidecar(waits)
+
+    answers = {
+        it.ask("GET", path, address=port)
+        for path in ("/scene", "/watch", "/camera")
+        for port in (it.control, it.health)
+    }
+
+    sentence = "driver command does not describe its world to viewers; use driver stub or mujoco"
+    assert answers == {(404, f'{{"error": "{sentence}"}}\n')}
+
+
 def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
     """The trainer reads one port, users and the operator read the other."""
     it = sidecar(waits)
@@ -94,7 +108,7 @@ def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> Non
 
     (rss,) = re.findall(r"^palaestra_simulator_rss_bytes{slot=\"a\"} (\S+)$", text, re.MULTILINE)
     assert 'palaestra_simulator_up{slot="a"} 1.0' in text
-    assert float(rss) > 4 * 4e6  # four Pythons
+    assert float(rss) > 4 * 4e6  # room for four processes of Python
 
 
 def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> None:
@@ -113,7 +127,7 @@ def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> Non
     [
         ({"deadline": 1}, "deadline: is not a field of this request"),
         ({}, "deadline_s: is missing"),
-        ([], "body: a list is no object"),
+        ([], "body: a list is not an object"),
         ({"deadline_s": -1}, "deadline_s: is not within 0 to 3600"),
     ],
 )

@@ -94,7 +94,7 @@ def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
 
 @pytest.mark.parametrize(("broken", "whole"), [(FIRST, SECOND), (SECOND, FIRST)])
 def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> None:
-    """It has its own fault, its own count, and its own start after that."""
+    """Each simulator has its own fault, its own count of faults, and its own next start."""
     it = two(waits)
     pid, other = it.start(broken).pid, it.start(whole).pid
 
@@ -203,7 +203,7 @@ def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
 
 
 def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family) -> None:
-    """It is the memory of all its processes.
+    """The figure is the memory of all processes of the simulator.
 
     Before that, the state is read fifty times a second.
     """
@@ -213,4 +213,4 @@ def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family
     it.request("/ready")
 
     assert before is None
-    assert it.state.rss_bytes > 4 * 4e6  # four Pythons
+    assert it.state.rss_bytes > 4 * 4e6  # room for four processes of Python

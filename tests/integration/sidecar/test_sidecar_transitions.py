@@ -88,7 +88,7 @@ def test_a_failure_says_how_it_ended_and_its_last_words(sidecar, ends) -> None:
 
     it.request("/start")
 
-    assert it.until(FAILED).detail == ("the simulator ended with code 1; it said last: cannot open display")
+    assert it.until(FAILED).detail == ("the simulator ended with code 1; its last line: cannot open display")
 
 
 def test_a_simulator_that_failed_is_started_again(sidecar, ends, tmp_path) -> None:

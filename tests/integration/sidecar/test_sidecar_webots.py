@@ -14,7 +14,7 @@ WORLD = """#VRML_SIM R2023b utf8
 Robot { name "robotino" controller "ros" supervisor TRUE }
 Robot { name "ball" controller "roll" }
 """
-# Source: WbRobot.cpp, updateControllerDir: controllers/<name> beside the world's folder, else <generic>.
+# Source: WbRobot.cpp, updateControllerDir: controllers/<name> next to the world's folder, else <generic>.
 WEBOTS = f"""#!{os.path.realpath(sys.executable)} -ISu
 import pathlib, signal, sys
 world = next(pathlib.Path(option) for option in sys.argv if option.endswith(".wbt"))
@@ -71,7 +71,7 @@ def test_webots_finds_the_controllers_of_the_project(webots) -> None:
 
     line = "started roll.py in collect-0.wbt"
     assert (it.lines.count(line), again.lines.count(line)) == (2, 1)
-    assert not any("in no Webots project" in line for line in it.lines + again.lines)
+    assert not any("not in a Webots project" in line for line in it.lines + again.lines)
 
 
 @pytest.mark.usefixtures("roll")
@@ -95,7 +95,7 @@ def test_a_controller_without_a_project_is_named_once(webots) -> None:
     it.request("/start")
     it.until_said("a: started <generic> in collect-0.wbt")
 
-    [warning] = [line for line in it.lines if "in no Webots project" in line]
+    [warning] = [line for line in it.lines if "not in a Webots project" in line]
     assert warning.startswith("palaestra-sidecar: warning: --world: ")
     assert '"ball" (controller "roll"); put the project into' in warning
 

@@ -17,7 +17,7 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.webots import Mode, Webots
 
-DEADLINE_S = 60.0  # of what takes moments, on a busy machine
+DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
 STUB = Path(sys.executable).with_name("palaestra-stub")
 ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 

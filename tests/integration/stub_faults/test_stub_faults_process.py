@@ -166,13 +166,13 @@ def test_the_environment_orders_faults_for_a_job(stub):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("crsh", "--fault: crsh: there is no fault 'crsh'; use one of crash, "),
+        ("crsh", "--fault: crsh: 'crsh' is not a fault; use one of crash, "),
         (
             "hang:service=ir99/enable",
             "the world has no service ir99/enable; name another, such as ir9/enable",
         ),
         ("lost:topic=ir1", "the world has no topic ir1; name another, such as ir1/value"),
-        ("start_refused:start=2", "nobody counts the starts here; give --fault-life N"),
+        ("start_refused:start=2", "the number of this start is unknown; give --fault-life N"),
     ],
 )
 def test_what_is_written_wrongly_is_refused_before_anything_starts(stub, text, words):

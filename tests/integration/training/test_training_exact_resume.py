@@ -20,7 +20,6 @@ from palaestra_trainer.configuration import load
 from palaestra_trainer.errors import MasterLost
 from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.telemetry.display import Lines
 from palaestra_trainer.telemetry.logs import configure_logs
 from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.waiting import shutdown_deadline
@@ -90,7 +89,7 @@ def attempt(fakes):
             fakes.before_step(members[0].robot, at, interrupt)
             return members
 
-        around = run_attempt.AttemptDependencies(make_members=make_members, display=Lines(), environment={})
+        around = run_attempt.AttemptDependencies(make_members=make_members, environment={})
         end = run_attempt.Attempt(configuration, directory, progress, around).play()
         episodes += progress.ended
         return end.code

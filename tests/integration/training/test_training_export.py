@@ -13,7 +13,8 @@ import onnxruntime
 import pytest
 from safetensors import safe_open
 
-from palaestra_trainer import cli, exporting, load_policy
+from palaestra_trainer import exporting, load_policy
+from palaestra_trainer.cli.export import export
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting import onnx_file
 from palaestra_trainer.testing import fake_arena, fake_seeing
@@ -70,7 +71,7 @@ def test_onnxruntime_acts_as_the_policy_in_the_environment(trained, case):
 
 
 def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
-    """The file alone says what the policy takes, in which units, and how good it is."""
+    """The file alone describes the policy's input, its units, and its success."""
     run = trained(**CASES["PPO"])
 
     written = exporting.export(run, "onnx")
@@ -134,7 +135,7 @@ def test_the_program_prints_where_the_file_is(trained, capsys):
     """The output is JSON, for scripts."""
     run = trained(**CASES["A2C"])
 
-    assert cli.export([str(run), "--to", "safetensors"]) == 0
+    assert export([str(run), "--to", "safetensors"]) == 0
 
     printed = json.loads(capsys.readouterr().out)
     assert printed["path"] == str(run / "policy.safetensors")
@@ -143,7 +144,7 @@ def test_the_program_prints_where_the_file_is(trained, capsys):
 
 def test_a_folder_without_a_model_is_refused(tmp_path, capsys):
     """The error gives the remedy, and the exit code is that of wrong input."""
-    assert cli.export([str(tmp_path), "--to", "onnx"]) == 2
+    assert export([str(tmp_path), "--to", "onnx"]) == 2
 
     assert "model.zip: does not exist; train first" in capsys.readouterr().err
 

@@ -76,7 +76,8 @@ def test_a_run_with_hindsight_survives_faults_and_ends(job, attempt, name, more)
         ("achieved_goal", "desired_goal"), np.zeros(2, np.float32)
     )
     assert code == 0
-    assert (summary["faults"], summary["steps"]) == (2, 500)
+    # Two simulators take two steps at once, but only one step while one of them restarts.
+    assert (summary["faults"], summary["steps"]) in {(2, 500), (2, 501)}
     assert policy.predict(seen)[0].shape == (() if name == "DQN" else (3,))
 
 

@@ -89,7 +89,7 @@ def stored_by_value(write_job, play, tmp_path):
 
 
 def test_byte_code_is_read_by_the_python_that_wrote_it(stored_by_value):
-    """It runs there."""
+    """The Python that trained can execute the byte code."""
     model = load_policy(stored_by_value()).model
 
     assert type(model.policy.features_extractor).__name__ == "SmallCnn"

@@ -17,7 +17,7 @@ TEMPLATES = "/usr/share/gencpp"
 MESSAGES = Path("/usr/share")  # Debian's message definitions, in one folder per package
 NESTED = ("std_msgs", "geometry_msgs", "sensor_msgs")
 LIBRARIES = ("roscpp", "roscpp_serialization", "rosconsole", "rostime", "boost_thread")
-DEADLINE_S = 240.0  # of the compiler, on a slow and busy machine
+DEADLINE_S = 240.0  # for the compiler on a slow and busy machine
 
 
 def build(folder, services, topics):
@@ -26,7 +26,8 @@ def build(folder, services, topics):
     package = write(folder)
     kinds = {name: "srv" if name in services else "msg" for name in ours}
     files = [package / kinds[name] / f"{name.partition('/')[2]}.{kinds[name]}" for name in ours]
-    nested = [*(package / "msg").glob("*.msg")]  # of messages and services that contain others of the package
+    # Messages that services and other messages of the package contain.
+    nested = [*(package / "msg").glob("*.msg")]
     includes = folder / "include"
     _run(sys.executable, __file__, includes / "webots_ros", package, *{*files, *nested})
     (includes / "interface.inc").write_text(_interface(services, topics))

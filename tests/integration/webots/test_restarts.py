@@ -73,7 +73,7 @@ def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(own_arena, begin
 
 
 def test_a_simulator_that_is_on_its_way_is_not_restarted(own_arena):
-    """It does not respond either, but it only needs time."""
+    """A simulator that is starting does not respond either, but it only needs time."""
     own_arena.webots.stop()
     own_arena.launcher.start()
 

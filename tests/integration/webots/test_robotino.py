@@ -146,3 +146,16 @@ def test_readings_are_asked_for_in_vain_before_the_first_period(arena, ask):
 
     arena.robot.advance()
     ask(arena.robot)
+
+
+def test_a_viewer_sees_where_it_is(arena):
+    """A replay of an episode needs the looks of the world once, and the poses of every step."""
+    scene = arena.webots.observer.scene()
+    arena.scene.reset(1, START, (1.0, 0.5))
+
+    state = arena.webots.observer.scene_state()
+
+    (robot,) = (node for node in scene.nodes if node.robot)
+    assert state.poses[robot.name][:2] == pytest.approx((START.x_m, START.y_m), abs=1e-4)
+    assert state.poses["TARGET"][:2] == pytest.approx((1.0, 0.5))
+    assert state.revision == scene.revision

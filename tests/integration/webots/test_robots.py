@@ -111,7 +111,7 @@ def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
 
 
 def test_a_robotino_uses_what_its_world_fits_it_with(running):
-    """They are laser scanner, forklift and gripper, and cost nothing before their use."""
+    """The optional devices are laser scanner, forklift and gripper; they cost nothing before their use."""
     world = builtin("arena").replace(
         b"  supervisor TRUE\n  children [", b"  supervisor TRUE\n  children [" + FITTED
     )

@@ -18,7 +18,7 @@ from tests.integration.webots.roscpp_client import RoscppClient
 from tests.tables import for_each
 from tools.interface.everything import FAILING, offered, world
 
-DEADLINE_S = 120.0  # of what takes seconds, on a busy machine
+DEADLINE_S = 120.0  # the work takes seconds, but the machine may be busy
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 PAGE = (ROOT / "docs/reference/ros-interface.md").read_text()
@@ -61,7 +61,7 @@ def program(folder):
 
 @pytest.fixture(scope="module", params=[of_rospy, of_roscpp], ids=["rospy", "roscpp"])
 def outcomes(request, master, tmp_path_factory):
-    """Yield a function that returns the results of a client with a simulator.
+    """Return a function that runs a client with a simulator, and returns the results.
 
     They are the responses by call, the messages by topic, and the simulator's exit status.
     """

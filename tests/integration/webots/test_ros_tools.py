@@ -14,7 +14,7 @@ from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/howto/ros-tools.md").read_text()
-DEADLINE_S = 60.0  # of what takes moments, on a busy machine
+DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
 PRINT_MD5 = """
 import webots_ros.msg, webots_ros.srv
 for type_ in (*vars(webots_ros.msg).values(), *vars(webots_ros.srv).values()):

@@ -2,9 +2,12 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import uuid
+import xmlrpc.client
 
 import pytest
 
@@ -20,6 +23,10 @@ from palaestra_trainer.webots import Attached, Webots
 
 START = Pose(0.0, 0.0, 0.0)
 DEADLINE_S = 60.0
+_OF_ANOTHER_MASTER = (
+    b"HTTP/1.0 200 OK\r\n\r\n"
+    + xmlrpc.client.dumps(([1, "", "http://localhost:1/"],), methodresponse=True).encode()
+)
 
 
 @pytest.fixture
@@ -137,7 +144,7 @@ def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
 
 def test_attaching_to_nothing_says_so_at_once(make):
     """There is nothing to wait for."""
-    with pytest.raises(SimulatorDead, match="no simulator answers under this name"):
+    with pytest.raises(SimulatorDead, match="no simulator responds under this name"):
         make(launcher=Attached()).start()
 
 
@@ -145,3 +152,30 @@ def test_a_node_that_does_not_run_is_known_as_such(master):
     """The node itself is queried, because its registration may be old."""
     del master
     assert not Master("/test").runs("/nobody")
+
+
+@pytest.mark.parametrize(
+    "response",
+    [b"HTTP/1.0 404 Not Found\r\n\r\n", _OF_ANOTHER_MASTER],
+    ids=["another program", "a node of another master"],
+)
+def test_the_name_of_a_killed_node_is_free_when_another_program_has_its_port(master, name, response):
+    """The kernel may give a free port to the next program, and then a request to the node is answered."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        uri = f"http://127.0.0.1:{server.getsockname()[1]}/"
+        with xmlrpc.client.ServerProxy(master) as registry:
+            registry.registerService(f"/{name}", "/of_a_killed_node", "rosrpc://127.0.0.1:1", uri)
+        responding = threading.Thread(target=_respond_once, args=(server, response), daemon=True)
+        responding.start()
+
+        runs = Master("/test").runs(f"/{name}")
+        responding.join(DEADLINE_S)
+
+    assert not runs
+
+
+def _respond_once(server, response):
+    connection, _ = server.accept()
+    with connection:
+        connection.recv(4096)
+        connection.sendall(response)

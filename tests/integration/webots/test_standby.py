@@ -175,7 +175,7 @@ def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number
     it = pair().begin()
     os.kill(pid_of(it.second), number)
 
-    with pytest.raises(SimulatorDead, match="its standby no longer answers"):
+    with pytest.raises(SimulatorDead, match="its standby no longer responds"):
         it.member.restart()
     it.member.restart()
 

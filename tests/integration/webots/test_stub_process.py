@@ -11,7 +11,7 @@ import pytest
 
 from palaestra_trainer.ros import Master, RosService
 
-DEADLINE_S = 60.0  # of what takes moments, on a busy machine
+DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
 STUB = Path(sys.executable).with_name("palaestra-stub")
 WITHOUT_ROS = """
 import sys
@@ -144,4 +144,4 @@ def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
 
     line = process.stderr.readline()
 
-    assert "the node process_test was shut down (user request); its robot has no controller any more" in line
+    assert "the node process_test was shut down (user request); its robot no longer has a controller" in line

@@ -13,7 +13,7 @@ from palaestra_trainer.webots import Mode, Webots
 
 STEPS = 20
 START = Pose(0.9, 0.3, 0.2)  # close enough to the wall ahead to reach it
-STAMP = slice(4, 12)  # of a message, after the number in its header
+STAMP = slice(4, 12)  # the bytes of a message's stamp, after the number in its header
 DEADLINE_S = 30.0
 IMAGE, RANGE = "sensor_msgs/Image", "sensor_msgs/Range"
 FLOAT, BOOL = "webots_ros/Float64Stamped", "webots_ros/BoolStamped"

@@ -144,7 +144,7 @@ def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, st
 
 
 def test_a_single_motor_always_sends_its_velocity(motor, stranger):
-    """It belongs to no simulation, so no reset would make it send its velocity again."""
+    """Such a motor belongs to no simulation, so no reset would make it send its velocity again."""
     motor.set_velocity(2.0)
     stranger.tell(7.0)
 

@@ -1,7 +1,6 @@
 """Build the job files of these tests: a test names only the fields that matter to it."""
 
 from collections.abc import Callable
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -9,24 +8,16 @@ import pytest
 
 from palaestra.api import validate
 from palaestra.errors import SpecErrors
+from tests.jobs import changed, make_job
 
 _GROUPS = [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}]
 
 
 def _job_data(changes: dict[str, Any] | None = None) -> dict[str, Any]:
     """Return a job as plain data. A change maps a dotted path in `spec` to its new value."""
-    data: dict[str, Any] = {
-        "apiVersion": "palaestra.dev/v1alpha1",
-        "kind": "TrainingJob",
-        "metadata": {"name": "reach"},
-        "spec": {"simulators": deepcopy(_GROUPS)},
-    }
+    data = make_job("reach", simulators=_GROUPS)
     for path, value in (changes or {}).items():
-        *above, last = path.split(".")
-        at: Any = data["spec"]
-        for piece in above:
-            at = at[int(piece)] if piece.isdigit() else at.setdefault(piece, {})
-        at[int(last) if last.isdigit() else last] = value
+        data = changed(data, f"spec.{path}", value)
     return data
 
 

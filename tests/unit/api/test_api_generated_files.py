@@ -20,6 +20,7 @@ EXAMPLES = [
     "move-to-target",
     "move-to-target-mujoco",
     "navigate",
+    "paper-dqn",
     "reinforce",
     "see-target",
     "sparse-reward",
@@ -74,7 +75,7 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
     assert job("reinforce").trainer.algorithm.name == "REINFORCE"
     assert (job("move-to-target").trainer.algorithm.name, job("move-to-target").trainer.steps) == (
         "DQN",
-        50_000,
+        30_000,
     )
 
 

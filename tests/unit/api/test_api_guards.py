@@ -6,6 +6,7 @@ import pytest
 
 from palaestra.api import TrainingJob, broken_guards, validate
 from palaestra.api.model_walk import fields_of, walk
+from tests.jobs import make_job
 
 URI = "http://alice:S3CR%40ET@tracking.example.com:5000/mlflow"
 IN_VALUE = "contains a password in an address; put the value into a Secret and use secretKeyRef"
@@ -58,14 +59,7 @@ BROKEN = {
 def job(spec):
     """Return a job that has no evaluation."""
     trainer = {"evaluation": {"everySteps": 0}, **spec.get("trainer", {})}
-    return validate(
-        {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "job"},
-            "spec": {"simulators": [GROUP], **spec, "trainer": trainer},
-        }
-    )
+    return validate(make_job(**{"simulators": [GROUP], **spec, "trainer": trainer}))
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -232,7 +232,7 @@ def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
     [{"phase": "Halted"}, {"replicas": [{"index": 0, "phase": "Halted"}]}, {"replicas": [{"index": "0"}]}],
 )
 def test_a_phase_or_type_that_is_unknown_is_still_refused(wrong, job_data) -> None:
-    """It could mean that a replica has ended, and an ended replica must never be started again."""
+    """An unknown phase could mean that a replica has ended, and it must then never be started again."""
     with pytest.raises(SpecErrors, match=r"^status"):
         validate(job_data() | {"status": wrong})
 

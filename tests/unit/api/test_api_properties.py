@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from palaestra.api import as_data, dump, load, validate
 from palaestra.errors import SpecErrors
+from tests.jobs import make_job
 
 NAMES = st.from_regex(r"[a-z][a-z0-9]{0,8}", fullmatch=True)
 COUNTS = st.integers(1, 10_000)
@@ -124,7 +125,7 @@ RUBBISH = st.recursive(
     max_leaves=6,
 )  # fmt: skip
 
-LINE = re.compile(r"""(\w+|\[").*?: .+; .+""")  # `.` matches no line break, so each is one line
+LINE = re.compile(r"""(\w+|\[").*?: .+; .+""")  # `.` matches no line break, so each text is one line
 
 
 def told(data: object) -> tuple[str, ...] | None:
@@ -264,13 +265,6 @@ AFFINITIES = st.fixed_dictionaries(
 @given(AFFINITIES)
 def test_any_affinity_of_a_pod_is_accepted(affinity):
     """The API server accepts it, so the operator would refuse it only after `kubectl apply`."""
-    job = validate(
-        {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "spread"},
-            "spec": {"scheduling": {"affinity": affinity}},
-        }
-    )
+    job = validate(make_job(scheduling={"affinity": affinity}))
 
     assert job.spec.scheduling.affinity == affinity

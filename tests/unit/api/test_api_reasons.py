@@ -6,7 +6,8 @@ import string
 import pytest
 
 from palaestra.api.generated_files import reasons_page, reasons_table
-from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason, say
+from palaestra.api.reason_texts import ROWS, say
+from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 
 
 def test_every_reason_has_a_row() -> None:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from palaestra.api import TrainingJob, WorldSource
 from palaestra.api.model_walk import fields_of, walk
 
+ROLES = ("Collect", "Collect", "Evaluate")
 COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
 
 # What breaks each rule, and the one line that reports it.
@@ -21,13 +22,7 @@ BROKEN = {
         "spec.simulators: no group has role Collect; add one",
     ),
     "too many simulators for a pod": (
-        {
-            "simulators": [
-                {"name": "a", "role": "Collect", "count": 16},
-                {"name": "b", "role": "Evaluate", "count": 16},
-                {"name": "c", "role": "Evaluate"},
-            ]
-        },
+        {"simulators": [{"name": f"g{n}", "role": ROLES[n], "count": 11} for n in range(3)]},
         "spec.simulators: has more than 32 simulators in one pod; lower the counts or use replicas",
     ),
     "more inline worlds than a ConfigMap holds": (

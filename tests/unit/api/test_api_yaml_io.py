@@ -110,7 +110,7 @@ def test_aliases_count_as_often_as_they_are_used() -> None:
 
 @given(st.text())
 def test_any_text_is_read_or_refused_with_the_file_s_name(text) -> None:
-    """Whatever text a file has, the reader raises no other error."""
+    """For any text of a file, the reader raises no other error."""
     try:
         read(text, "job.yaml")
         problem = "job.yaml: none"

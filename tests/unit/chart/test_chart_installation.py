@@ -59,7 +59,7 @@ def test_nothing_of_helm_test_is_in_it(made):
 
 
 def test_the_operator_is_that_of_the_release(made):
-    """It is never `latest`: an upgrade needs a person's decision."""
+    """The image tag is never `latest`: an upgrade needs a person's decision."""
     [container] = made["Deployment", NAME]["spec"]["template"]["spec"]["containers"]
 
     assert container["image"] == f"palaestra-operator:{version('palaestra')}"

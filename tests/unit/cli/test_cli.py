@@ -280,7 +280,7 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
 
 def test_an_operator_that_cannot_be_is_not_started(fails):
     """The command ends before it connects to anything."""
-    told = "--metrics-address: '8080' is no address; write it as 0.0.0.0:8080"
+    told = "--metrics-address: '8080' is not an address; write it as 0.0.0.0:8080"
     assert fails("operator", "--metrics-address=8080") == [told]
 
 
@@ -305,9 +305,9 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
             "--node-selector: 'gpu' is not a label; use a label such as kubernetes.io/arch=amd64",
         ),
         ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
-        ("delete a --timeout=soon", "--timeout: 'soon' is no number"),
+        ("delete a --timeout=soon", "--timeout: 'soon' is not a number"),
         ("logs a --tail=-3", "--tail: -3 is refused; give 0 or more"),
-        ("fetch a --replica=1.5", "--replica: '1.5' is no whole number"),
+        ("fetch a --replica=1.5", "--replica: '1.5' is not a whole number"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
@@ -317,6 +317,30 @@ def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsy
 
     assert ended.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1].endswith(f"error: argument {wrong}")
+
+
+@pytest.mark.parametrize("option", ["--agent=zero", "--episodes=3", "--json"])
+def test_what_is_tried_here_is_not_an_option_of_a_cluster(job, fails, option):
+    """A person who forgets --local would wait for a cluster."""
+    [line] = fails("try", job, option)
+
+    assert line == "--agent, --episodes, --json: are for --local; add it, or leave them out"
+
+
+def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
+    """Nothing is started, and the remedy is in the line."""
+    job.write_text(
+        JOB
+        + "  simulators:\n"
+        + "    - {name: collect, role: Collect, driver: command, command: [sim, '{world}'], image: sim:1}\n"
+        + "  trainer: {evaluation: {everySteps: 0}}\n"
+    )
+
+    [line] = fails("try", "--local", job)
+
+    assert line.startswith(
+        "spec.simulators[0].driver: command cannot be tried here; set stub, mujoco or webots"
+    )
 
 
 def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
@@ -334,7 +358,7 @@ def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
 
     out = " ".join(capsys.readouterr().out.split())
     assert "exit codes of all commands: 0 done 1 failed, or the cluster has no such job" in out
-    assert "75 of `run` and `sweep`: interrupted after a checkpoint 80, 81, 82 of `run` only" in out
+    assert "75 of `run` and `sweep`: interrupted after a checkpoint 80 of `run`, `compare` and" in out
     assert "`COMMAND --help` explains the exit codes of one command" in out
 
 
@@ -362,7 +386,7 @@ def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
 
 def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
     """An operator's image has the command but no trainer."""
-    monkeypatch.setattr("palaestra.local.export.PROGRAM", "palaestra-none")
+    monkeypatch.setattr("palaestra.cli.export.PROGRAM", "palaestra-none")
 
     assert main(["export", str(tmp_path), "--to", "onnx"]) == 2
 

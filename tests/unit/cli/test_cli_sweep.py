@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from palaestra.cli import main
+from tests.jobs import make_job
 
 SWEEP = {
     "apiVersion": "palaestra.dev/v1alpha1",
@@ -13,7 +14,7 @@ SWEEP = {
     "metadata": {"name": "s"},
     "spec": {"job": "job.yaml", "random": {"seed": {"low": 1, "high": 2}}, "trials": 2, "optuna": {}},
 }
-JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}, "spec": {}}
+JOB = make_job("j")
 
 
 @pytest.fixture

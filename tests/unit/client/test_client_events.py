@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.client.events import concerns
-from tests.unit.view.jobs import make_job
+from tests.unit.view.jobs import running_job
 
 
 def event(kind, name, uid=None):
@@ -22,7 +22,7 @@ def event(kind, name, uid=None):
 )
 def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
     """If a pod cannot be scheduled, that concerns its job."""
-    assert concerns(event(kind, name, uid), make_job())
+    assert concerns(event(kind, name, uid), running_job())
 
 
 @pytest.mark.parametrize(
@@ -38,4 +38,4 @@ def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
 )
 def test_what_only_looks_like_it_does_not(kind, name, uid):
     """A job `job-0` may exist next to `job`."""
-    assert not concerns(event(kind, name, uid), make_job())
+    assert not concerns(event(kind, name, uid), running_job())

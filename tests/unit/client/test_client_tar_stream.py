@@ -77,10 +77,10 @@ HOSTILE = {
     "not asked for": ([member(".bashrc")], ".bashrc is not a file of the run"),
     "below a file that was asked for": (
         [member("model.zip"), member("model.zip/x")],
-        "is there twice, or is",
+        "occurs twice, or is",
     ),
-    "a folder of a file": ([member("tensorboard/a/b"), member("tensorboard/a")], "is there twice, or is"),
-    "twice": ([member("model.zip"), member("model.zip")], "model.zip is there twice"),
+    "a folder of a file": ([member("tensorboard/a/b"), member("tensorboard/a")], "occurs twice, or is"),
+    "twice": ([member("model.zip"), member("model.zip")], "model.zip occurs twice"),
     "without a name": ([member("")], "a member without a name is not a file of the run"),
     "escape sequences": ([member("tensorboard/\x1b[2J")], "tensorboard/ [2J is not a file of the run"),
     "deep": ([member("tensorboard/" + "d/" * 20 + "e")], "has too long a name"),

@@ -4,7 +4,7 @@ import pytest
 
 from palaestra.client.volume_reader_pod import reading_pod, run_directory
 from palaestra.plan import ClusterLayout, Images, identified, plan
-from tests.unit.view.jobs import make_job
+from tests.unit.view.jobs import running_job
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 SCHEDULING = {"nodeSelector": {"pool": "robots"}, "tolerations": [{"key": "robots", "operator": "Exists"}]}
@@ -13,7 +13,7 @@ SCHEDULING = {"nodeSelector": {"pool": "robots"}, "tolerations": [{"key": "robot
 @pytest.fixture
 def job():
     """A job for certain nodes."""
-    return identified(make_job(spec={"scheduling": SCHEDULING}), UID)
+    return identified(running_job(spec={"scheduling": SCHEDULING}), UID)
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_it_mounts_the_run_and_nothing_else_for_reading_only(pod):
 
 
 def test_it_meets_restricted_and_holds_no_token(pod, template):
-    """It is admitted in every namespace in which the run was."""
+    """Therefore the pod is admitted in every namespace in which the run's own pod was."""
     [container] = pod["spec"]["containers"]
 
     assert pod["spec"]["securityContext"] == template["spec"]["securityContext"]

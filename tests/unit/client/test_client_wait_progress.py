@@ -80,7 +80,7 @@ def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
     ],
 )
 def test_steps_on_the_way_and_ends_are_no_reason_to_wait(news, replica):
-    """The job's phases report those steps."""
+    """The line about the job's phase already reports such replicas."""
     assert news(replica) == ["lab/job: Pending"]
 
 

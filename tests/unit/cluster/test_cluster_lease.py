@@ -19,7 +19,8 @@ def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent,
     """The two clocks differ by `offset`, and agree only on the length of a second."""
     tenure = Tenure(sent=sent, duration_s=duration_s)
     follower = ObservedLease()
-    seen = sent + travel + looked + offset  # written after it was sent, seen after it was written
+    # A renewal is written `travel` after it was sent, and the follower sees it `looked` after that.
+    seen = sent + travel + looked + offset
     follower.see(claim(duration_s=duration_s), seen)
 
     assert not (tenure.holds(now) and now + offset >= seen and follower.free(now + offset))

@@ -69,7 +69,7 @@ def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
 )
 def test_what_is_no_proxy_is_refused_without_its_password(text):
     """The message has the name of the variable and the remedy."""
-    with pytest.raises(NotConfigured, match=r"^HTTPS_PROXY: .* is no proxy; write http://") as refused:
+    with pytest.raises(NotConfigured, match=r"^HTTPS_PROXY: .* is not a proxy; write http://") as refused:
         proxy_named(text, "HTTPS_PROXY")
 
     assert "secret" not in str(refused.value)

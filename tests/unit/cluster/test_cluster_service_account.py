@@ -86,7 +86,7 @@ def test_an_authority_that_is_none_is_refused(files):
     """An error of ssl would end the operator without the name of the file."""
     (files / "ca.crt").write_text("nothing")
 
-    with pytest.raises(NotConfigured, match="is no certificate"):
+    with pytest.raises(NotConfigured, match="is not a certificate"):
         account(files)
 
 

@@ -39,7 +39,7 @@ class Workers(RuleBasedStateMachine):
 
     @rule(seconds=st.floats(min_value=0, max_value=10))
     def time_passes(self, seconds):
-        """Let time pass; keys that are due become owed."""
+        """Let time pass; keys that are due are then expected from the queue."""
         self.now += seconds
 
     @rule()
@@ -107,7 +107,7 @@ def test_a_crowd_in_one_lane_delays_no_other_lane():
 
 
 def test_a_worker_that_waits_is_woken_by_work_that_falls_due():
-    """No worker polls."""
+    """A worker must not have to poll for it."""
     queue = WorkQueue()
     taken = []
     worker = threading.Thread(target=lambda: taken.append(queue.get(10)))

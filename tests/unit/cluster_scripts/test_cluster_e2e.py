@@ -143,7 +143,7 @@ def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop
 def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
     """On a busy machine the tests may end before the script receives Ctrl-C.
 
-    It must still report the interruption.
+    A delayed script must still report the interruption.
     """
     with e2e.started(tests_end="") as process:
         eventually(lambda: "tests" in e2e.calls)

@@ -82,7 +82,7 @@ def test_the_page_about_queues_installs_the_kueue_that_is_tested():
 
 
 def test_kueue_runs_as_nobody(tmp_path):
-    """Its chart refuses an image that runs as root, and so is the image here run as a non-root user."""
+    """Its chart refuses an image that runs as root, so the image here also runs as another user."""
     image = manager(tmp_path / "kueue")
 
     assert image.name == f"registry.k8s.io/kueue/kueue:{images.version_of('kueue', 'sigs.k8s.io/kueue')}"

@@ -30,10 +30,12 @@ from palaestra.decide import (
 from palaestra.observe import Objects, Polled, observe, references
 from palaestra.plan import ClusterLayout, Images, WorldVerdict
 from palaestra_protocol.pod.status import SimulatorStatus, Termination, TrainerStatus
+from tests.jobs import make_job
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
-# The world is minimal: no decision depends on its content, and each one generates the missing worlds.
+# The world is minimal, because no decision depends on its content, and each decision generates the worlds
+# that are missing.
 WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
 GROUPS = (
     {"name": "collect", "role": "Collect", "world": WORLD},
@@ -51,12 +53,8 @@ class Scene:
     """One TrainingJob `job` in an API server's memory."""
 
     def __init__(self, **spec: Any) -> None:
-        self.raw: dict[str, Any] = {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "job", "namespace": "default", "uid": UID, "generation": 1},
-            "spec": {"simulators": list(GROUPS), **spec},
-        }
+        named = {"namespace": "default", "uid": UID, "generation": 1}
+        self.raw = make_job(metadata=named, **{"simulators": GROUPS, **spec})
         self.now = START  # the operator's wall clock, which somebody may set
         self.clock_s = 1000.0  # the operator's monotonic clock
         self.record = ReconcileRecord()

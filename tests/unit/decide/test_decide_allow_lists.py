@@ -13,6 +13,7 @@ from palaestra.api import validate
 from palaestra.api.status import Phase
 from palaestra.decide.allow_lists import PREFERRED, REQUIRED, not_allowed
 from palaestra.plan import Allowed
+from tests.jobs import make_job
 
 OWN = {"matchLabels": {"palaestra.dev/job": "job"}}
 TERM = f"affinity.podAntiAffinity.{PREFERRED}[0].podAffinityTerm"
@@ -258,13 +259,6 @@ VALUES = st.recursive(
 @given(st.dictionaries(st.sampled_from(["podAffinity", "podAntiAffinity"]), VALUES, max_size=2))
 def test_no_affinity_breaks_the_check(affinity):
     """An affinity is a free object, so its values may have any type."""
-    job = validate(
-        {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "job"},
-            "spec": {"scheduling": {"affinity": affinity}},
-        }
-    )
+    job = validate(make_job(scheduling={"affinity": affinity}))
 
     not_allowed(job, Allowed())

@@ -287,7 +287,7 @@ def test_an_attempt_that_kueue_took_back_says_so(make_scene):
     delete(scene, pod)
     decision = scene.settle(5)
 
-    taken = "waits in queue robots for Kueue, which took it back; it continues when it is admitted again"
+    taken = "waits in queue robots for Kueue, which evicted it; it continues when it is admitted again"
     assert last(scene) == (1, 75, "Queued")
     assert scene.replica().last_attempt.message == scene.replica().message == taken
     assert [each.message for each in decision.events if each.reason == "Queued"] == [taken]

@@ -4,7 +4,7 @@ import pytest
 
 from palaestra.api.status import Phase
 from palaestra.decide import Replace, Stop
-from palaestra.decide.remaining_containers import OUTLIVED_S
+from palaestra.decide.eviction import OUTLIVED_S
 
 PROXY = {"name": "istio-proxy", "image": "proxy"}
 

@@ -280,7 +280,7 @@ def test_a_suspension_that_kueue_ignores_is_reported(training):
 
     assert scene.settle().actions == ()
     assert scene.replica().message == (
-        "attempt 1 trains; spec.suspend is not heeded, as queue default starts and stops it"
+        "attempt 1 trains; spec.suspend has no effect, because queue default starts and stops it"
     )
 
 

@@ -121,7 +121,7 @@ def test_without_a_limit_it_was_its_node_that_ran_short(scene_and_pod):
 
     decision = scene.settle(1)
 
-    assert "(no limit, so its node ran short, 1 so far)" in told(decision)[0]
+    assert "(no limit, so its node ran out of memory, 1 so far)" in told(decision)[0]
 
 
 def test_the_trainers_kills_are_counted_too(training):

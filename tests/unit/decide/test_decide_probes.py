@@ -42,7 +42,7 @@ def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
     scene, _ = start_slowly()
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "Starting")
-    assert scene.replica().message == "its trainer starts, and has not answered yet"
+    assert scene.replica().message == "its trainer starts, and has not responded yet"
     assert running(scene) == "False"
 
 
@@ -66,7 +66,7 @@ def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly)
     scene.settle(601)
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.FAILED, "StartTimeout")
-    assert "its trainer starts, and has not answered yet" in scene.replica().message
+    assert "its trainer starts, and has not responded yet" in scene.replica().message
 
 
 @pytest.mark.parametrize(("words", "probe"), [(LIVENESS, "liveness"), (STARTUP, "startup")])

@@ -6,7 +6,8 @@ from datetime import UTC, datetime, timedelta
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason
+from palaestra.api.reason_texts import ROWS
+from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.status import Phase
 from palaestra.decide import Create, Times, accept, as_data, decide, prepare
 from palaestra.observe import Objects, Polled, observe, trimmed

@@ -7,7 +7,7 @@ from palaestra.api.status import Phase
 
 SHORT = "insufficient unused quota for cpu in flavor any-machine, 425m more needed"
 WAITS = "waits in queue robots for Kueue"
-TAKEN = f"{WAITS}, which took it back"
+TAKEN = f"{WAITS}, which evicted it"
 AGAIN = "; it continues when it is admitted again"
 
 
@@ -116,6 +116,6 @@ def test_a_workload_that_was_not_read_is_reported_once(queued):
         queued.settle()
 
     assert queued.replica().message == (
-        f"{WAITS}; why that takes long was not asked, as too many others wait; "
+        f"{WAITS}; the cause was not looked up, because too many other replicas wait; "
         "`kubectl describe workload` shows it"
     )

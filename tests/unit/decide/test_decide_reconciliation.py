@@ -132,7 +132,7 @@ def test_a_job_in_a_queue_is_on_its_way_whatever_its_spec_says_of_a_suspension(t
     scene.settle()
 
     why = scene.replica().message
-    assert "spec.suspend is not heeded" in why
+    assert "spec.suspend has no effect" in why
     assert gaps(scene.status) == {"Reconciling": ("Training", why)}
 
     scene.job()["spec"]["suspend"] = True

@@ -179,7 +179,7 @@ def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(t
     scene.settle()
 
     assert scene.replica().phase is Phase.RUNNING
-    assert scene.replica().message == "attempt 1 has ended, its simulators are stopped"
+    assert scene.replica().message == "attempt 1 has ended; its simulators are being stopped"
 
 
 def test_a_condition_keeps_the_time_at_which_it_last_changed(training):

@@ -35,7 +35,7 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
     assert scene.settle().actions == ()
     assert (scene.status.phase, scene.replica().reason) == (Phase.SUSPENDED, "Suspended")
     assert scene.replica().message == (
-        "suspended by kueue, not by spec.suspend; it goes on when Job job-0 is resumed"
+        "suspended by kueue, not by spec.suspend; it continues when Job job-0 is resumed"
     )
 
 
@@ -67,7 +67,7 @@ def test_a_job_that_another_manager_resumes_is_left_running_and_reported(trainin
     by_kueue(scene, suspend=False)
 
     assert scene.settle().actions == ()
-    assert scene.replica().message == "attempt 1 trains; resumed by kueue though spec.suspend is true"
+    assert scene.replica().message == "attempt 1 trains; resumed by kueue although spec.suspend is true"
 
 
 @pytest.mark.parametrize("suspended", [True, False])

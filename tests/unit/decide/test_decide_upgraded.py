@@ -1,10 +1,10 @@
-"""A job that was accepted goes on, whatever a new rule says about its spec."""
+"""A job that was accepted continues, whatever a new rule says about its spec."""
 
 import pytest
 
 from palaestra.api.status import Phase
 
-# What an operator does not accept in a new job.
+# Fields that an operator does not accept in a new job.
 ANTI_AFFINITY = {
     "requiredDuringSchedulingIgnoredDuringExecution": [
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}

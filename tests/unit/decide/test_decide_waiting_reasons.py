@@ -356,6 +356,6 @@ def test_a_pod_that_is_not_there_and_was_not_asked_about_says_so(make_scene):
 
     assert scene.replica().reason == "Starting"
     assert scene.replica().message == (
-        "its pod is about to be created; why that takes long was not asked, as too many others wait; "
+        "its pod is about to be created; the cause was not looked up, because too many other replicas wait; "
         "`kubectl describe` shows it"
     )

@@ -137,12 +137,15 @@ def test_the_operators_rights_are_those_of_an_installation():
 
 def test_a_finding_is_a_line_and_its_remedy_another():
     """A reader looks for the remedy first."""
-    found = (right("nodes", "v1.36.0"), wrong("storage class", "there is none", "annotate one"))
+    found = (
+        right("nodes", "v1.36.0"),
+        wrong("storage class", "the cluster has no storage class", "annotate one"),
+    )
 
     lines = [line for each in found for line in shown(each)]
 
     assert [line.split() for line in lines] == [
         ["ok", "nodes", "v1.36.0"],
-        ["wrong", "storage", "class", "there", "is", "none"],
+        ["wrong", "storage", "class", "the", "cluster", "has", "no", "storage", "class"],
         ["->", "annotate", "one"],
     ]

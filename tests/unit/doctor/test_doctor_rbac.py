@@ -55,7 +55,7 @@ def test_without_workloads_that_the_operator_reads_their_right_is_not_checked(se
 
 
 def test_a_right_that_training_needs_is_wrong_beside_the_warning():
-    """One remedy solves both; only the first changes the exit code."""
+    """One remedy solves both problems; only the missing right changes the exit code."""
     found = examined(JOBS, WORKLOADS)
 
     assert [each.verdict for each in found] == [CheckStatus.WRONG, CheckStatus.WARNING]
@@ -63,7 +63,7 @@ def test_a_right_that_training_needs_is_wrong_beside_the_warning():
 
 
 def test_a_role_of_this_release_suffices():
-    """It suffices with and without Kueue."""
+    """The role suffices with and without Kueue."""
     [found] = examined()
 
     assert found.verdict is CheckStatus.RIGHT

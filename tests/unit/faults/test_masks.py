@@ -47,7 +47,7 @@ def test_what_differs_between_two_undisturbed_runs_is_masked():
 
 
 def test_a_counter_that_differs_is_said_with_both_values():
-    """The rig looks for faults such as a restart that is counted twice."""
+    """The rig looks for bugs of the operator, such as a restart that is counted twice."""
     assert differences({"/trainer": 1}, {"/trainer": 2}, frozenset()) == ["/trainer: 2 in place of 1"]
 
 

@@ -16,7 +16,7 @@ def pod(uid, phase="Running", job_uid=OWNER):
 
 
 def test_two_pods_of_a_replica_at_one_moment_are_found():
-    """They would write to one volume."""
+    """Two such pods would write to one volume."""
     assert doubles([("ADDED", pod("a")), ("ADDED", pod("b"))]) == ["replica job-0 has 2 pods at once"]
 
 

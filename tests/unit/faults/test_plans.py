@@ -42,7 +42,7 @@ def test_writes_meet_every_fault_of_writes_in_turns():
 
 
 def test_every_kind_of_fault_has_a_row():
-    """No plan would use a kind without a row, so the kind would prove nothing."""
+    """A plan draws only kinds that have a row, so a kind without one would never be tested."""
     assert {row.kind for row in ROWS} == set(Kind)
 
 

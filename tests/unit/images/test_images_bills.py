@@ -130,7 +130,7 @@ def test_what_is_no_archive_is_refused_with_its_path(image):
 
 
 def test_a_bill_of_a_wheel_lists_what_it_was_tested_with(tmp_path):
-    """It has the hashes of the lock, so that a person can install the same packages."""
+    """The bill has the hashes of the lock, so that a person can install the same packages."""
     sim, trainer, operator = bills.of_wheels(ROOT, tmp_path, "x86_64")
 
     assert f"pkg:pypi/palaestra-sim@{version('palaestra-sim')}" in listed(operator)

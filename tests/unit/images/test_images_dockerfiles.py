@@ -139,7 +139,7 @@ def test_mujoco_begins_with_the_layers_of_the_stub():
 
 
 def test_mujoco_s_image_can_draw():
-    """It uses EGL and Mesa's driver for the processor, which comes with EGL.
+    """The image has EGL, and with it Mesa's driver for the processor.
 
     PyOpenGL also loads libopengl.
     """

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from palaestra.api import validate
 from palaestra.local.errors import RunRefused
+from palaestra.local.output import as_seen
 from palaestra.local.pod_spec import read_pod
-from palaestra.local.terminal import as_seen
 from palaestra.plan import Images, LocalLayout, identified, plan
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}

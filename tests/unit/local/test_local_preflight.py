@@ -155,7 +155,7 @@ def test_a_world_without_an_end_is_refused(request_for, tmp_path):
 
     for path in (device, pipe):
         [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": str(path)})))
-        assert f"{path}: is no regular file; name a world" in problem
+        assert f"{path}: is not a regular file; name a world" in problem
 
 
 def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, tmp_path):

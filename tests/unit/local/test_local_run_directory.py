@@ -168,7 +168,7 @@ def test_a_run_that_begins_has_no_outcome_of_the_one_before(directory):
     ],
 )
 def test_what_does_not_change_what_is_learned_may_change(directory, change):
-    """These are deadlines and the number of replicas, as in a cluster."""
+    """Deadlines and the number of replicas may change, as in a cluster."""
     run_directory.refuse_another_job(directory, record(**change))
 
 
@@ -321,12 +321,21 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
 
     lines = summary(ended, directory)
 
-    assert [line.split()[0] for line in lines] == ["success", "steps", "trained", "run", "look", "try"]
+    assert [line.split()[0] for line in lines] == [
+        "success",
+        "steps",
+        "trained",
+        "run",
+        "look",
+        "try",
+        "take",
+    ]
     assert lines[0].endswith("95%")
     assert lines[1].endswith("50,000")
     assert lines[2].endswith("93% of the wall clock")
     assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
     assert lines[5].endswith(f"palaestra-eval {directory}")
+    assert lines[6].endswith(f"palaestra export {directory} --to onnx")
 
 
 def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
@@ -338,8 +347,12 @@ def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
 
     commands = [shlex.split(line[20:]) for line in uses(directory)]
 
-    assert [words[1:] for words in commands] == [["--logdir", f"{directory}/tensorboard"], [str(directory)]]
-    assert [Path(words[0]).name for words in commands] == ["tensorboard", "palaestra-eval"]
+    assert [words[1:] for words in commands] == [
+        ["--logdir", f"{directory}/tensorboard"],
+        [str(directory)],
+        ["export", str(directory), "--to", "onnx"],
+    ]
+    assert [Path(words[0]).name for words in commands] == ["tensorboard", "palaestra-eval", "palaestra"]
 
 
 def test_the_summary_has_the_interval_of_the_success_rate(directory):

@@ -27,8 +27,7 @@ HOMES = {
     "trainer": ("palaestra_trainer_", "palaestra_simulator_"),
     "sidecar": ("palaestra_sidecar_", "palaestra_simulator_"),
 }
-# These endings are units, or mark a value without one; a name with another ending counts the objects that it
-# names.
+# These endings are units, or mark a value without a unit. UNITLESS lists the names with other endings.
 ENDS = ("_seconds", "_bytes", "_ratio", "_steps", "_info", "_per_second", "_total")
 UNITLESS = {
     "palaestra_jobs",
@@ -66,7 +65,7 @@ def test_a_name_is_declared_once():
 
 @pytest.mark.parametrize("program", page.PROGRAMS, ids=lambda program: program.name)
 def test_a_name_tells_its_home(program):
-    """It also begins with the project's prefix."""
+    """Each name also begins with the project's prefix."""
     assert all(family.name.startswith(PREFIX) for family in program.families)
     assert [it.name for it in program.families if not it.name.startswith(HOMES[program.name])] == []
 

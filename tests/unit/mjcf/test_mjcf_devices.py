@@ -7,6 +7,7 @@ import pytest
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.ros_interfaces import UnsimulatedError
+from palaestra_sim.world.mjcf.elements import Element
 from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 
@@ -144,7 +145,7 @@ def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command
 
 
 def test_sensors_have_the_values_of_the_moment(load):
-    """MuJoCo computes them at the beginning of a step; the devices have those after it."""
+    """MuJoCo computes sensor values when a step begins; devices must have those at its end."""
     simulation = load()
     simulation.robots[0].motors["push"].set_effort(5.0)
 
@@ -194,7 +195,7 @@ def test_the_other_sensors_have_the_units_of_webots(load):
     ],
 )
 def test_what_cannot_be_a_device_is_refused_before_anything_starts(load, texts, message):
-    """One message has the fact and the remedy."""
+    """The message for each such element has the fact and the remedy."""
     with pytest.raises(WorldError, match=message):
         load(*texts)
 
@@ -206,6 +207,32 @@ def test_devices_of_one_name_are_told_apart(load):
     found = kinds(load(servo + FORCE, '<jointpos name="push" joint="hinge"/>'))
 
     assert {"slider_position", "slider_velocity", "push", "push_jointpos"} <= set(found)
+
+
+def test_sensors_without_names_on_one_joint_have_their_numbers(load):
+    """MuJoCo loads them, and a text in <custom> could not name one of them."""
+    twice = '<jointvel joint="hinge"/><jointvel joint="hinge"/>'
+
+    found = kinds(load(FORCE, twice))
+
+    numbered = [name for name in found if name.startswith("hinge_jointvel")]
+    assert len(numbered) == 2
+    assert all(name.removeprefix("hinge_jointvel").isdigit() for name in numbered)
+
+
+def test_refused_sensors_do_not_search_the_file_once_each(load, monkeypatch):
+    """60,000 sensors of one name took more than a minute until the refusal."""
+    searched = []
+    walk = Element.walk
+    monkeypatch.setattr(Element, "walk", lambda element: searched.append(element) or walk(element))
+
+    load(FORCE, '<jointvel name="a b" joint="hinge"/>')
+    few = len(searched)
+    searched.clear()
+    with pytest.raises(WorldError):
+        load(FORCE, "".join(f'<jointvel name="a{mark}b" joint="hinge"/>' for mark in " -./()"))
+
+    assert len(searched) <= few + 10
 
 
 def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):

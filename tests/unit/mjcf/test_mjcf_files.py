@@ -70,7 +70,7 @@ def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
     head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'
     inner = '<mujocoinclude><option timestep="0.003"/></mujocoinclude>'
 
-    with pytest.raises(WorldError, match=r"basicTimeStep 4 is no multiple of the timestep of 0\.003 s"):
+    with pytest.raises(WorldError, match=r"basicTimeStep 4 is not a multiple of the timestep of 0\.003 s"):
         load_mjcf(world(head, files={"defaults.xml": inner}), Mode.FAST)
 
 
@@ -141,3 +141,28 @@ def test_a_rounded_timestep_is_made_exact(world):
         simulation.step(25)
 
     assert simulation.robots[0].sensors["hinge_jointpos"].value == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_model_that_attaches_itself_is_refused(world):
+    """MuJoCo attached it until the process crashed."""
+    path = world('<asset><model name="m" file="other.xml"/></asset>')
+    for name, other in (("other.xml", "third.xml"), ("third.xml", "other.xml")):
+        text = f'<mujoco><asset><model name="m" file="{other}"/></asset></mujoco>'
+        (path.parent / name).write_text(text)
+
+    with pytest.raises(WorldError, match=r"the model contains itself: other\.xml, third\.xml; attach fewer"):
+        load_mjcf(path, Mode.FAST)
+
+
+def test_models_that_attach_each_other_twice_are_counted_before_they_are_made(world):
+    """Twenty files of one line each make a million copies of the last."""
+    path = world('<asset><model name="m" file="f0.xml"/></asset>')
+    for level in range(20):
+        twice = "".join(f'<attach model="m" body="b" prefix="{it}"/>' for it in "xy")
+        asset = f'<asset><model name="m" file="f{level + 1}.xml"/></asset>'
+        text = f'<mujoco>{asset}<worldbody><body name="b">{twice}</body></worldbody></mujoco>'
+        (path.parent / f"f{level}.xml").write_text(text)
+    (path.parent / "f20.xml").write_text('<mujoco><worldbody><body name="b"/></worldbody></mujoco>')
+
+    with pytest.raises(WorldError, match=r"the attached models have \d+ elements; 1000000 are the most"):
+        load_mjcf(path, Mode.FAST)

@@ -128,7 +128,7 @@ def test_a_reset_returns_its_numbers_and_the_control(load):
     ("actuator", "name"), [(GRIP, "grip"), (MUSCLE, "arm"), (GENERAL, "any")], ids=["grip", "arm", "any"]
 )
 def test_an_actuator_without_a_motor_takes_mujocos_control(robot, actuator, name):
-    """These are a muscle, an adhesion, and an actuator that integrates its control."""
+    """The examples are a muscle, an adhesion, and an actuator that integrates its control."""
     node = robot(FORCE + actuator)
     path = f"mujoco/{name}"
     assert node.get(f"{path}/get_control") == 0.0

@@ -175,7 +175,7 @@ def test_a_body_on_joints_takes_no_velocity(load):
     """Its joints have their own speeds, and a client's velocity would contradict them."""
     simulation = load()
 
-    with pytest.raises(UnsimulatedError, match="'pole' is on joints or stands, so it takes no velocity"):
+    with pytest.raises(UnsimulatedError, match="'pole' is on joints or fixed, so its velocity cannot be set"):
         simulation.motion.set_velocity(simulation.tree.of_def("pole"), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -251,5 +251,7 @@ def test_the_basic_step_is_the_shortest_that_fits_the_timestep(load):
 
     assert load(FORCE, "", without).basic_step_ms == 2
     assert load(FORCE, "", without, ('timestep="0.002"', 'timestep="0.0025"')).basic_step_ms == 5
-    with pytest.raises(ValueError, match="3 ms is no multiple of the basic step; use one of 2 ms"):
+    with pytest.raises(
+        ValueError, match="3 ms is not a positive multiple of the basic step; use a multiple of 2 ms"
+    ):
         load(FORCE, "", without).step(3)

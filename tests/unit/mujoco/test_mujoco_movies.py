@@ -99,7 +99,7 @@ def test_a_movie_follows_the_viewpoint(tmp_path):
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """It keeps the hidden files of other movies, and those that another simulator writes."""
+    """Hidden files of other movies stay, and so do those that another simulator is still writing."""
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal

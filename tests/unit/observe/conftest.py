@@ -9,31 +9,25 @@ import pytest
 from palaestra.api import TrainingJob, validate
 from palaestra.observe import Objects, Observed, observe
 from palaestra.plan import ClusterLayout, Images, plan
+from tests.jobs import make_job
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 
 
-def _make_job(**spec: Any) -> TrainingJob:
-    return validate(
-        {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": "job", "uid": UID},
-            "spec": spec,
-        }
-    )
+def _valid_job(**spec: Any) -> TrainingJob:
+    return validate(make_job(metadata={"uid": UID}, **spec))
 
 
 @pytest.fixture
-def make_job() -> Callable[..., TrainingJob]:
+def valid_job() -> Callable[..., TrainingJob]:
     """Return a builder: keywords are fields of the spec, in camelCase."""
-    return _make_job
+    return _valid_job
 
 
 @pytest.fixture
 def raw_job() -> dict[str, Any]:
     """Return the batch/v1 Job of the replica."""
-    planned = plan(_make_job(), ClusterLayout(images=Images.of_release("1")))
+    planned = plan(_valid_job(), ClusterLayout(images=Images.of_release("1")))
     job = deepcopy(dict(planned.replicas[0].job))
     job["metadata"]["uid"] = "job-uid"
     return job
@@ -51,4 +45,4 @@ def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
 @pytest.fixture
 def look(raw_job: dict[str, Any]) -> Callable[..., Observed]:
     """`look(pods=[...])` returns the observation of the job; its Job exists unless `jobs` replaces it."""
-    return lambda **objects: observe(_make_job(), Objects(**({"jobs": [raw_job]} | objects)))
+    return lambda **objects: observe(_valid_job(), Objects(**({"jobs": [raw_job]} | objects)))

@@ -6,6 +6,7 @@ import pytest
 
 from palaestra.api import validate
 from palaestra.observe import Lacking, lacking, trimmed
+from tests.jobs import make_job
 
 COLLECT, EVALUATE = {"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}
 WORLD = "x" * 180_000
@@ -26,13 +27,9 @@ LARGE = {
 
 def raw_job(metadata=None, **spec):
     """Return a TrainingJob as an API server holds it; keywords are fields of its spec."""
-    return {
-        "apiVersion": "palaestra.dev/v1alpha1",
-        "kind": "TrainingJob",
-        "metadata": {"name": "job", "namespace": "default", "uid": "u", **(metadata or {})},
-        "spec": {"replicas": 3, "suspend": True, "ttlSecondsAfterFinished": 9, **spec},
-        "status": {"phase": "Pending"},
-    }
+    named = {"namespace": "default", "uid": "u", **(metadata or {})}
+    spec = {"replicas": 3, "suspend": True, "ttlSecondsAfterFinished": 9, **spec}
+    return make_job(metadata=named, status={"phase": "Pending"}, **spec)
 
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra.observe.managed_fields import suspends
+from palaestra.observe.jobs import suspends
 
 
 def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
@@ -11,7 +11,7 @@ def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
 
 
 def test_the_manager_of_the_field_is_found():
-    """Other managers own other fields."""
+    """The other managers of the Job own other fields."""
     fields = [entry("palaestra", "f:backoffLimit"), entry("kueue"), entry("kubectl-edit", "f:parallelism")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"

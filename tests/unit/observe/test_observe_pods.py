@@ -58,7 +58,7 @@ def test_a_container_that_runs_again_still_tells_how_it_ended_before(look, raw_p
 
 
 def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
-    """They are shown in a status of limited size and on terminals."""
+    """Messages of other programs are shown on terminals, and in a status of limited size."""
     waiting = {"waiting": {"reason": "ErrImagePull", "message": "a\n\x1b[31mred" + "x" * 5000}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=waiting)]
 
@@ -79,7 +79,7 @@ def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
         ),
         ({"type": "PodScheduled", "status": "False", "reason": "SchedulingGated"}, "unschedulable", ""),
         ({"type": "DisruptionTarget", "status": "True", "message": "drained"}, "disruption", "drained"),
-        ({"type": "DisruptionTarget", "status": "True"}, "disruption", "it was taken"),
+        ({"type": "DisruptionTarget", "status": "True"}, "disruption", "it was disrupted"),
         ({"type": "DisruptionTarget", "status": "False", "message": "no"}, "disruption", ""),
         ({"type": "Ready", "status": "True"}, "ready", True),
     ],
@@ -92,7 +92,7 @@ def test_conditions_say_why(look, raw_pod, condition, field, value):
 
 
 def test_the_last_word_is_of_our_protocol(look, raw_pod):
-    """It is JSON, and strictly parsed."""
+    """The termination message is JSON, and strictly parsed."""
     word = Termination(step=7, reason="Completed", success_rate=0.5, attempt=2, restarts=1)
     ended = {"terminated": {"exitCode": 0, "message": word.to_message()}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
@@ -104,7 +104,7 @@ def test_the_last_word_is_of_our_protocol(look, raw_pod):
     "message", ["Traceback: it", "{}", '{"step": -1, "reason": ""}', "[" * 5000, None, 3, ""]
 )
 def test_anything_else_is_no_last_word(look, raw_pod, message):
-    """It may be the end of a log, or any text of the program's author."""
+    """A termination message may also be the end of a log, or any text of the program's author."""
     ended = {"terminated": {"exitCode": 1, "message": message}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
 

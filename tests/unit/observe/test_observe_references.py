@@ -5,14 +5,14 @@ from palaestra.observe import ReferenceKind, references
 SECRET = {"env": [{"name": "A", "secretKeyRef": {"name": "keys", "key": "a"}}]}
 
 
-def test_a_job_of_defaults_refers_to_nothing(make_job):
+def test_a_job_of_defaults_refers_to_nothing(valid_job):
     """Its worlds are in the images, and its claims are created."""
-    assert references(make_job()) == ()
+    assert references(valid_job()) == ()
 
 
-def test_worlds_secrets_and_claims_are_named_with_their_fields(make_job):
+def test_worlds_secrets_and_claims_are_named_with_their_fields(valid_job):
     """To fix a missing object, the author must know the field that refers to it."""
-    job = make_job(
+    job = valid_job(
         simulators=[
             {"name": "a", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "a.wbt"}}},
             {"name": "b", "role": "Evaluate", **SECRET},
@@ -30,8 +30,8 @@ def test_worlds_secrets_and_claims_are_named_with_their_fields(make_job):
     ]
 
 
-def test_an_object_that_is_named_twice_is_looked_up_once(make_job):
+def test_an_object_that_is_named_twice_is_looked_up_once(valid_job):
     """Thirty variables from one Secret are one request."""
     env = [{"name": name, "secretKeyRef": {"name": "keys", "key": name}} for name in "ABC"]
 
-    assert len(references(make_job(trainer={"env": env}))) == 1
+    assert len(references(valid_job(trainer={"env": env}))) == 1

@@ -12,9 +12,9 @@ from palaestra_protocol.pod.status import TrainerStatus
 NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 
 
-def test_every_replica_of_the_spec_is_there(make_job):
+def test_every_replica_of_the_spec_is_there(valid_job):
     """A replica without any object is included."""
-    seen = observe(make_job(replicas=3), Objects())
+    seen = observe(valid_job(replicas=3), Objects())
 
     assert [each.index for each in seen.replicas] == [0, 1, 2]
     assert all(each.job is None and each.pod is None for each in seen.replicas)
@@ -95,7 +95,7 @@ def test_failures_that_are_about_to_be_booked_count(look, raw_job):
 
 
 def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
-    """It must be of this Job by uid, because an earlier Job may have had the same name."""
+    """The event must have the uid of this Job, because an earlier Job may have had the same name."""
 
     def event(words, second, uid="job-uid"):
         return {
@@ -123,9 +123,9 @@ def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
     assert look(jobs=[raw_job], events=[event]).replicas[0].refused.at.hour == 13
 
 
-def test_what_is_there_is_known_by_kind_and_name(make_job):
+def test_what_is_there_is_known_by_kind_and_name(valid_job):
     """A ConfigMap and a claim may have the same name."""
-    job = make_job()
+    job = valid_job()
     named = {"metadata": {"name": "x", "ownerReferences": [{"uid": job.metadata.uid}]}}
 
     seen = observe(job, Objects(claims=[named], policies=[named]))
@@ -133,20 +133,20 @@ def test_what_is_there_is_known_by_kind_and_name(make_job):
     assert seen.present == {("PersistentVolumeClaim", "x"), ("NetworkPolicy", "x")}
 
 
-def test_a_config_map_or_policy_of_somebody_else_is_not_there(make_job):
+def test_a_config_map_or_policy_of_somebody_else_is_not_there(valid_job):
     """The operator's label alone does not make it the operator's.
 
     A claim has no owner, because it outlives its job.
     """
     named = {"metadata": {"name": "x"}}
 
-    seen = observe(make_job(), Objects(claims=[named], policies=[named], config_maps=[named]))
+    seen = observe(valid_job(), Objects(claims=[named], policies=[named], config_maps=[named]))
 
     assert seen.present == {("PersistentVolumeClaim", "x")}
 
 
 def test_of_other_kinds_only_who_wrote_them_is_forgotten():
-    """Events are read field by field, so their other fields stay."""
+    """An object of an unlisted kind, such as an Event, loses only `managedFields`."""
     event = {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x", "managedFields": [1]}}
 
     assert trimmed(event) == {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x"}}
@@ -189,10 +189,10 @@ def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
     assert (replica.pods, replica.in_the_way) == ((), ("job-0-x",))
 
 
-def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(make_job, raw_pod):
+def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(valid_job, raw_pod):
     """A user deleted the Job, but its pod still saves a checkpoint."""
     named = {"name": "job-0-x", "uid": "pod-1", "created": NOW}
-    job = make_job()
+    job = valid_job()
     status = job.status.model_copy(
         update={"replicas": (ReplicaStatus(index=0, attempt=1, pod=PodReference(**named)),)}
     )
@@ -202,10 +202,10 @@ def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(m
     assert [each.uid for each in replica.pods] == ["pod-1"]
 
 
-def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
+def test_what_was_refused_is_of_the_replica_or_of_all(valid_job):
     """The message is that of the API server, on one line."""
-    seen = observe(make_job(replicas=2), Objects(denied={1: "over\nquota"}))
-    of_all = observe(make_job(replicas=2), Objects(denied={None: "no policy"}))
+    seen = observe(valid_job(replicas=2), Objects(denied={1: "over\nquota"}))
+    of_all = observe(valid_job(replicas=2), Objects(denied={None: "no policy"}))
 
     assert [each.denied for each in seen.replicas] == ["", "over quota"]
     assert [each.denied for each in of_all.replicas] == ["no policy"] * 2

@@ -5,26 +5,22 @@ import pytest
 from palaestra.cluster import Forbidden
 from palaestra.decide import accept
 from palaestra.operator.bounded_cache import REMEMBERED, BoundedCache
-from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.observer import JobObserver
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import ForeignJobs, RejectedCreations
 from palaestra.operator.world_verdicts import WorldChecker
+from tests.jobs import make_job
 
 KEY, UID = ("robots", "job"), "u"
 OTHER = ("robots", "other")
 WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
-TRAINING_JOB = {
-    "apiVersion": "palaestra.dev/v1alpha1",
-    "kind": "TrainingJob",
-    "metadata": {"name": "job", "namespace": "robots", "uid": UID, "generation": 1},
-    "spec": {
-        "suspend": True,
-        "simulators": [
-            {"name": "collect", "role": "Collect", "world": WORLD},
-            {"name": "evaluate", "role": "Evaluate", "world": WORLD},
-        ],
-    },
-}
+TRAINING_JOB = make_job(
+    metadata={"namespace": "robots", "uid": UID, "generation": 1},
+    suspend=True,
+    simulators=[
+        {"name": "collect", "role": "Collect", "world": WORLD},
+        {"name": "evaluate", "role": "Evaluate", "world": WORLD},
+    ],
+)
 
 
 @pytest.fixture

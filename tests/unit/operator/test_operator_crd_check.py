@@ -82,7 +82,7 @@ def test_an_older_definition_gets_no_condition_that_it_would_refuse(definition, 
 def test_a_status_keeps_its_conditions_while_the_definition_cannot_be_read(definition):
     """Otherwise an operator would remove them from every job and restore them later.
 
-    That happened while the API server was busy at the operator's start.
+    This occurred when the API server was busy while the operator started.
     """
     made, _ = definition(None)
 

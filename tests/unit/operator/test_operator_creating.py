@@ -6,9 +6,8 @@ from palaestra.cluster import AlreadyExists, NotFound
 from palaestra.decide import Create
 from palaestra.operator.executor import Executor
 from palaestra.operator.fenced_client import FencedClient
-from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import ForeignJobs, RejectedCreations
 
 KEY = ("robots", "job")
 RAW = {"metadata": {"namespace": "robots", "name": "job", "uid": "u", "resourceVersion": "1"}}
@@ -57,8 +56,8 @@ class Server:
     [
         ({}, None),
         ({"data": {"training.yaml": "seed: 2"}}, "with other content"),
-        ({"metadata": {"name": "job-0-abc"}}, "and is not this job's"),
-        ({"immutable": False}, "and is not immutable, so that anybody may change it"),
+        ({"metadata": {"name": "job-0-abc"}}, "and does not belong to this job"),
+        ({"immutable": False}, "and is not immutable, so others could change it"),
     ],
     ids=["ours, of a moment ago", "other content", "of somebody else", "not immutable"],
 )
@@ -69,7 +68,7 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
 
     refused = acting.carry_out(RAW, (Create(object=WANTED, replica=0),))
 
-    told = {} if wrong is None else {0: f"ConfigMap job-0-abc is there already, {wrong}; delete it"}
+    told = {} if wrong is None else {0: f"ConfigMap job-0-abc already exists {wrong}; delete it"}
     assert (denials.known(KEY, "u"), bool(refused)) == (told, bool(told))
 
 

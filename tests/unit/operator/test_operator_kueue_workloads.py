@@ -3,10 +3,8 @@
 import pytest
 
 from palaestra.cluster import Forbidden, NotFound, ServerError
-from palaestra.operator.bounded_cache import REMEMBERED
-from palaestra.operator.kueue_workloads import KueueWorkloads
-from palaestra.operator.pod_events import PodEvents
-from palaestra.operator.rate_limited_lookup import PATIENCE_S, RECHECK_S, Answers
+from palaestra.operator.bounded_cache import PATIENCE_S, RECHECK_S, REMEMBERED, Answers
+from palaestra.operator.unwatched_facts import KueueWorkloads, PodEvents
 
 KEY, UID = ("robots", "job"), "job-uid"
 QUEUED = {"kueue.x-k8s.io/queue-name": "trainings"}

@@ -89,7 +89,7 @@ def test_a_success_is_an_end_too(metrics):
 
 
 def test_an_end_for_a_reason_that_ends_nothing_is_counted_as_unknown(metrics):
-    """A mark on a Job may have any reason, but the labels must stay bounded."""
+    """The annotation of a stopped Job may name any reason, but a label of a metric has few values."""
     metrics.written(job(), status(replica("Failed", "Queued"), phase="Failed"))
 
     assert value(metrics, "palaestra_replica_ends_total", reason="JobFailed") == 1

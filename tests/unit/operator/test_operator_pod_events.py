@@ -3,10 +3,8 @@
 import pytest
 
 from palaestra.cluster import NotFound
-from palaestra.operator.bounded_cache import REMEMBERED
-from palaestra.operator.foreign_jobs import ForeignJobs
-from palaestra.operator.pod_events import PodEvents
-from palaestra.operator.rate_limited_lookup import LONGEST_PAUSE_S, PATIENCE_S, RECHECK_S, Answers
+from palaestra.operator.bounded_cache import LONGEST_PAUSE_S, PATIENCE_S, RECHECK_S, REMEMBERED, Answers
+from palaestra.operator.unwatched_facts import ForeignJobs, PodEvents
 
 KEY, UID = ("robots", "job"), "job-uid"
 FAILED = {"reason": "FailedCreate", "message": "exceeded quota", "lastTimestamp": "2026-01-31T12:00:00+00:00"}
@@ -167,7 +165,7 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     ids=["no Job", "a pod", "suspended", "ended"],
 )
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
-    """If nothing changes, no request is sent."""
+    """If no Job lacks a pod, no events are read."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S

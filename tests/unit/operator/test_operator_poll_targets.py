@@ -72,7 +72,7 @@ def test_any_other_pod_is_not_asked(trainers, other):
 
 
 def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
-    """It does not matter which of the three is deleted first."""
+    """TrainingJob, Job and pod may be deleted in any order."""
     trainers.pod(pod(), exists=True)
 
     trainers.job(named("job-r0", "job-uid", "tj-uid"), exists=False)

@@ -8,9 +8,8 @@ from palaestra.decide import Delete, Discard, Stop
 from palaestra.decide.decision import Basis
 from palaestra.operator.executor import Executor
 from palaestra.operator.fenced_client import FencedClient
-from palaestra.operator.foreign_jobs import ForeignJobs
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import ForeignJobs, RejectedCreations
 
 RAW = {"metadata": {"namespace": "robots", "name": "job", "uid": "u", "resourceVersion": "7"}}
 BASIS = Basis(uid="job-uid", version="20", pods=frozenset({("pod-1", "30")}))

@@ -4,7 +4,7 @@ import pytest
 
 from palaestra.cluster import Forbidden, Invalid, ServerError, TooManyRequests, Unreachable
 from palaestra.observe.json_access import MOST_TEXT
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import RejectedCreations
 
 KEY, UID = ("robots", "job"), "u"
 QUOTA = Forbidden(403, "Forbidden", "exceeded quota")
@@ -22,7 +22,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
     ],
 )
 def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(error):
-    """It is kept by replica, with the message of the API server or the webhook."""
+    """The refusal is kept by replica, with the message of the API server or the webhook."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})

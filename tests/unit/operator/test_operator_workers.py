@@ -14,7 +14,7 @@ from palaestra.decide.decision import Basis
 from palaestra.operator.executor import Executor
 from palaestra.operator.fenced_client import FencedClient, NotLeading
 from palaestra.operator.preconditions import Outdated
-from palaestra.operator.rejected_creations import RejectedCreations
+from palaestra.operator.unwatched_facts import RejectedCreations
 from palaestra.operator.workers import Workers
 
 WAIT_S = 10.0
@@ -131,7 +131,7 @@ def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
     def reconcile(key):
         del key
         tries.release()
-        raise Outdated("pod job-0-x is not as in the cache; nothing was created")
+        raise Outdated("pod job-0-x differs from the cache; nothing was created")
 
     with structlog.testing.capture_logs() as lines:
         at_work = desk(reconcile)
@@ -186,5 +186,6 @@ def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_
         assert all(tries.acquire(timeout=WAIT_S) for _ in range(10))
 
     repeated = [line for line in lines if line["event"] == "conflict repeats"]
-    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]  # it continues
+    # The operator continues to retry.
+    assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]
     assert MODIFIED in repeated[0]["error"]

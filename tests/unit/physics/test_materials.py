@@ -91,7 +91,7 @@ def test_things_fall_as_the_gravity_of_the_world_says():
 
 @pytest.mark.parametrize(("mass_kg", "moves"), [(5.0, False), (200.0, True)])
 def test_a_heavy_robot_pushes_what_a_light_one_does_not(drive, mass_kg, moves):
-    """The servos of a base grow with its mass."""
+    """The servos of a base get stronger with its mass."""
     crate = b"""DEF CRATE Solid { translation 0.6 0 0.15 boundingObject Box { size 0.3 0.3 0.3 }
       physics Physics { density -1 mass 100 } }"""
     source = builtin("arena").replace(b"mass 20\n", f"mass {mass_kg}\n".encode())

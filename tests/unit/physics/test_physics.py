@@ -13,7 +13,7 @@ from palaestra_sim.scene.tree.field_types import FieldType
 from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 
-RADIUS_M = 0.2286  # of the arena's Robotino with its bumper
+RADIUS_M = 0.2286  # the arena's Robotino with its bumper
 WALL_M = 2.0
 OTHER = b"""
 Robot {
@@ -188,7 +188,7 @@ def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
 
 
 def test_robots_run_into_each_other(load, drive):
-    """Each is an obstacle for the other, also for its rays."""
+    """Each robot is an obstacle for the other one and for its rays."""
     simulation = load(builtin("arena") + OTHER)
 
     body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
@@ -198,7 +198,7 @@ def test_robots_run_into_each_other(load, drive):
 
 
 def test_a_robot_inside_a_pose_stands_where_the_pose_puts_it(load, drive):
-    """It has no body of its own there, so it is an obstacle."""
+    """Such a robot has no body of its own, so it is an obstacle."""
     simulation = load(builtin("arena") + b"Pose { translation 0.5 0 0 children [" + OTHER + b"] }")
     standing = simulation.scene.solids[-1].pose.position
 

@@ -12,7 +12,7 @@ from palaestra_sim.scene.visuals import drawn
 from tests.values.shapes import SHAPES
 from tests.values.worlds import PHYSICS, Setting
 
-# What has no reading and moves nothing, so that no formula gives a value of it.
+# Nodes that have no reading and move nothing, so that no formula gives a value for them.
 WITHOUT_VALUES = {
     "LED": "keeps a number",
     "Speaker": "makes no sound",
@@ -55,7 +55,7 @@ def test_a_device_type_has_rows_or_a_reason_to_have_none(name):
 
 
 def test_each_type_of_distance_and_touch_sensor_has_rows():
-    """They measure in different ways."""
+    """The types measure in different ways."""
     kinds = {kind.name.lower().replace("_", "-") for kind in DistanceSensorType}
 
     assert [kind for kind in (*kinds, "bumper", "force", "force-3d") if f'"{kind}"' not in ROWS] == []

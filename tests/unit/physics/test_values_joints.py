@@ -1,4 +1,4 @@
-"""Motors, brakes and joints: where they put what is on them, and what sensors there read, by formulas."""
+"""Motors, brakes and joints: the positions of parts on them and the readings of sensors, by formulas."""
 
 import math
 
@@ -13,7 +13,7 @@ from tests.values.worlds import SETTINGS, STEP_MS, Setting, cached, device, move
 STEP_S = STEP_MS / 1000.0
 AXIS = np.array([0.36, 0.48, 0.8])
 ANCHOR = np.array([0.1, -0.2, 0.3])
-END = frame((0.4, 0.1, 0.2), (0.0, 0.6, 0.8), 0.5)  # of the end of each joint, where the file has it
+END = frame((0.4, 0.1, 0.2), (0.0, 0.6, 0.8), 0.5)  # where the end of each joint is in the file
 BEGIN = {"hinge": 0.4, "slider": 0.15}  # the position of the joint there
 SENSORS = """GPS {{ name "{0} gps" {1} }} Gyro {{ name "{0} gyro" {1} }}
   InertialUnit {{ name "{0} unit" {1} }}"""
@@ -70,7 +70,7 @@ def test_a_motor_puts_the_end_of_its_joint_where_the_formula_says(joint, setting
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 @pytest.mark.parametrize("joint", JOINTS)
 def test_a_motor_at_a_velocity_moves_its_end_by_the_formula(joint, setting):
-    """Its sensors read the position, the velocity of their place, and the turning."""
+    """The sensors on the end read its position, its velocity and its angular velocity."""
     simulation = simulation_of(setting)
     motor = device(simulation, joint)
     for pose, speed in zip(POSES, (0.5, -1.0, 2.0, -0.3), strict=True):
@@ -176,7 +176,7 @@ TURNS = [
 
 @pytest.mark.parametrize("mounted", TURNS, ids=lambda it: it.fields[20:])
 def test_a_sensor_of_force_measures_its_own_weight_in_its_own_axes(mounted):
-    """MuJoCo: with three axes the force on its robot, with one that along x; the stub simulates no forces."""
+    """MuJoCo: with three axes the sensor reads the force on its robot, with one axis the part along x."""
     weight = mounted.rotation.T @ [0.0, 0.0, -2.0 * 9.81]
     rotation = mounted.fields.partition("rotation")[2]
     for kind, expected in (("force-3d", weight), ("force", [max(0.0, -weight[0])])):

@@ -1,4 +1,4 @@
-"""Level rays at several heights, of a robot that drives: each meets what stands at its own height."""
+"""Level rays at several heights, on a robot that drives: each meets the objects at its own height."""
 
 from functools import partial
 
@@ -11,11 +11,12 @@ from tests.values.shapes import ELL, SHAPES
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, move, robot
 
 REACH_M = 6.0
-HEIGHTS_M = (0.15, 0.5, 0.9)  # of the sensors
+HEIGHTS_M = (0.15, 0.5, 0.9)  # where the sensors are
 AZIMUTHS = (0.0, 0.6, -2.0)
 ELL_FORMULA = next(shape.formula for shape in SHAPES if shape.type == "IndexedFaceSet")
 QUARTER = np.pi / 2.0
-# What stands around, in the axes of the ground: where, as what, and how far a ray in its frame travels to it.
+# The objects around the robot, in the axes of the ground: the place, the shape, and how far a ray in its
+# frame travels to it.
 AROUND = [
     (
         frame((3.0, 0.0, 0.15), (0, 0, 1), 0.3),
@@ -50,7 +51,7 @@ AROUND = [
         partial(rays.cylinder, radius=0.5, height=0.8),
     ),
 ]
-# Robots: one that is low; one that is long, with a mast in its middle.
+# One other robot is low; the other one is long, with a mast in its middle.
 OTHER = frame((2.0, 2.5, 0.0))
 OTHER_SHAPE = "Pose { translation 0 0 0.15 children [ Cylinder { radius 0.4 height 0.3 } ] }"
 OTHER_FORMULA = partial(rays.cylinder, radius=0.4, height=0.3)

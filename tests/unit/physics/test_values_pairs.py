@@ -24,7 +24,8 @@ CONNECTOR = 'Connector {{ name "{}" {} distanceTolerance 0.05 axisTolerance 0.2 
 RADAR = """Radar {{ name "radar" {} minRange 1 maxRange 20 horizontalFieldOfView 1.5 verticalFieldOfView 1.2
   minRadialSpeed 0 maxRadialSpeed 0 antennaGain 15 frequency 20 transmittedPower 2 }}"""
 TARGETS = [(3.0, 0.5, 0.4), (7.0, -4.0, -1.0), (19.0, 0.0, 6.0)]  # in the frame of the radar, in meters
-HIDDEN = [(3.0, 4.0, 0.0), (-3.0, 0.0, 0.0), (3.0, 0.0, 2.5), (25.0, 0.0, 0.0)]  # which it cannot see
+# Points that the radar cannot see.
+HIDDEN = [(3.0, 4.0, 0.0), (-3.0, 0.0, 0.0), (3.0, 0.0, 2.5), (25.0, 0.0, 0.0)]
 
 
 @cached
@@ -40,7 +41,7 @@ def simulation_of(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_connector_feels_another_one_where_both_fit(setting):
-    """However the robots lean: only their places in each other's frames count."""
+    """The robots may lean: only their positions in each other's frames count."""
     simulation = simulation_of(setting)
     for pose in POSES:
         move(simulation, "R", setting.put(pose))
@@ -71,7 +72,7 @@ def test_a_radar_measures_distance_azimuth_and_power_of_a_point(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_radar_sees_nothing_beyond_its_field_of_view(setting):
-    """Aside, behind, above, and farther than its range."""
+    """The targets are beside, behind and above the radar, and beyond its range."""
     simulation = simulation_of(setting)
     for pose in POSES:
         move(simulation, "R", setting.put(pose))
@@ -83,7 +84,7 @@ def test_a_radar_sees_nothing_beyond_its_field_of_view(setting):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_radar_measures_how_fast_a_target_moves_away(setting):
-    """The change of its place, along the way to it."""
+    """The speed is the change of the target's place, along the line from the radar to the target."""
     simulation = simulation_of(setting)
     before, after = np.array([4.0, 1.0, 0.2]), np.array([4.1, 0.9, 0.25])
     for pose in POSES:

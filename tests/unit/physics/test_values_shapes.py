@@ -9,7 +9,7 @@ from tests.values.standing import MOUNT
 from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
 
 REACH_M = 9.0
-APART_M = 40.0  # from one shape to the next
+APART_M = 40.0  # distance from one shape to the next
 SENSORS = f"""
 DistanceSensor {{ name "laser" MOUNTED type "laser" lookupTable [ 0 0 0, {REACH_M} {REACH_M} 0 ] }}
 DistanceSensor {{ name "generic" MOUNTED lookupTable [ 0 0 0, {REACH_M} {REACH_M} 0 ] }}
@@ -17,7 +17,7 @@ DistanceSensor {{ name "infrared" MOUNTED type "infra-red" lookupTable [ 0 0 0, 
 Lidar {{ name "lidar" MOUNTED numberOfLayers 1 horizontalResolution 3 fieldOfView 0.6
   minRange 0.01 maxRange {REACH_M} }}
 """
-RED = "appearance PBRAppearance { baseColor 1 0 0 roughness 0 }"  # which gives all infra-red light back
+RED = "appearance PBRAppearance { baseColor 1 0 0 roughness 0 }"  # reflects all infra-red light
 UPRIGHT = [frame(), frame(axis=(0, 0, 1), angle_rad=0.7)]
 LYING = [*UPRIGHT, frame(axis=(0, 1, 0), angle_rad=np.pi / 2), frame(axis=(0.6, 0.8, 0), angle_rad=np.pi / 2)]
 POSES = {"Plane": UPRIGHT, "Box": [*UPRIGHT, frame(axis=(1, 0, 0), angle_rad=np.pi / 2)]}

@@ -101,41 +101,88 @@ def test_a_distance_sensor_measures_by_its_type(name, setting):
         assert device(simulation, name).value == pytest.approx(value, abs=0.01), sensor
 
 
-ROUND_RAD, HIGH_RAD = 1.2, 0.5
-LIDAR = f"""Lidar {{ name "lidar" {MOUNT.fields} horizontalResolution 5 numberOfLayers 4
-  fieldOfView {ROUND_RAD} verticalFieldOfView {HIGH_RAD} minRange 0.1 maxRange {REACH_M} }}"""
+ROUND_RAD, HIGH_RAD, TILT_RAD = 1.2, 0.5, -0.35
+FREQUENCY_HZ, COLUMNS = 6.25, 20  # two columns a step
+LIDAR = f"""Lidar {{ name "NAME" {MOUNT.fields} FIELDS numberOfLayers 4 fieldOfView {ROUND_RAD}
+  verticalFieldOfView {HIGH_RAD} minRange 0.1 maxRange {REACH_M} }}"""
+TURNING = f"""tiltAngle {TILT_RAD} type "rotating" horizontalResolution {COLUMNS}
+  defaultFrequency {FREQUENCY_HZ}"""
+FIXED = {"lidar": 0.0, "tilted": TILT_RAD}
 
 
 @cached
 def scanned(setting):
-    """Return a simulation of the wall, and of a robot with a lidar of four layers."""
+    """Return a simulation of the wall, and of a robot with three lidars of four layers."""
     shape = f"Shape {{ geometry Box {{ size {SIZE[0]} {SIZE[1]} {SIZE[2]} }} }}"
-    simulation = setting.load(f"Solid {{ {setting.put(WALL).fields} children [ {shape} ] }}" + robot(LIDAR))
+    five = "horizontalResolution 5"
+    fields = {"lidar": five, "tilted": f"{five} tiltAngle {TILT_RAD}", "turning": TURNING}
+    lidars = " ".join(LIDAR.replace("NAME", name).replace("FIELDS", it) for name, it in fields.items())
+    simulation = setting.load(f"Solid {{ {setting.put(WALL).fields} children [ {shape} ] }}" + robot(lidars))
     enable(simulation)
     return simulation
 
 
+def towards(left, up):
+    """Return the direction at an azimuth and an elevation, from x ahead and z up."""
+    return np.array([math.cos(up) * math.cos(left), math.cos(up) * math.sin(left), math.sin(up)])
+
+
+def is_seen(lidar, layer, sensor, ways):
+    """Compare a layer with the distances along its rays, and its points with where they end."""
+    met, _ = distances(sensor, ways)
+    points = [way * far if far < REACH_M else [math.inf] * 3 for way, far in zip(ways, met, strict=True)]
+
+    read = [min(each, REACH_M) for each in lidar.layers[layer]]
+    assert read == pytest.approx(list(met), rel=1e-5), (lidar.name, sensor, layer)
+    assert np.array(list(lidar.points(layer))) == pytest.approx(np.array(points), abs=1e-4)
+
+
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting):
-    """Layers from the top down, their ends included; rays from the left, in the middle of their shares."""
+@pytest.mark.parametrize("name", FIXED)
+def test_each_ray_of_a_lidar_leaves_at_its_azimuth_and_elevation(setting, name):
+    """Layers from the top down, their ends included; rays from the left, in the middle of their shares.
+
+    A tilt turns them all upwards about the y axis.
+    """
     simulation = scanned(setting)
+    upwards = turn([0, 1, 0], -FIXED[name])
     for sensor in LOOKS:
         move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
         simulation.step(STEP_MS)
-        lidar = device(simulation, "lidar")
         for layer, up in enumerate(HIGH_RAD * np.array([0.5, 1 / 6, -1 / 6, -0.5])):
-            azimuths = ROUND_RAD * np.array([0.4, 0.2, 0.0, -0.2, -0.4])
-            ways = [
-                np.array([math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)])
-                for it in azimuths
-            ]
-            met, _ = distances(sensor, ways)
-            read = [min(each, REACH_M) for each in lidar.layers[layer]]
-            assert read == pytest.approx(list(met), rel=1e-5), (sensor, layer)
-            points = [
-                way * far if far < REACH_M else [math.inf] * 3 for way, far in zip(ways, met, strict=True)
-            ]
-            assert np.array(list(lidar.points(layer))) == pytest.approx(np.array(points), abs=1e-4)
+            ways = [upwards @ towards(ROUND_RAD * it, up) for it in (0.4, 0.2, 0.0, -0.2, -0.4)]
+            is_seen(device(simulation, name), layer, sensor, ways)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_rotating_lidar_sees_all_around_within_a_turn(setting):
+    """It begins ahead and turns to the right; each of its rays looks up by the tilt."""
+    simulation = scanned(setting)
+    for sensor in LOOKS:
+        move(simulation, "R", setting.put(WALL @ sensor @ MOUNT.inverse))
+        simulation.step(STEP_MS * COLUMNS // 2)
+        for layer, up in enumerate(TILT_RAD + HIGH_RAD * np.array([0.5, 1 / 6, -1 / 6, -0.5])):
+            ways = [towards(-math.tau * (it + 0.5) / COLUMNS, up) for it in range(COLUMNS)]
+            is_seen(device(simulation, "turning"), layer, sensor, ways)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_step_measures_the_part_that_the_head_of_a_lidar_passes(setting):
+    """Before that, ranges are 0, also after a reset of the world."""
+    simulation = scanned(setting)
+    lidar = device(simulation, "turning")
+    simulation.reset()
+    simulation.step(STEP_MS)
+
+    for passed in (0, 2, 4):
+        assert np.count_nonzero(np.array(lidar.layers), axis=1).tolist() == [passed] * 4
+        assert all(lidar.layers[0][:passed])
+        simulation.step(STEP_MS)
+
+    lidar.enabled(0)
+    simulation.step(STEP_MS)
+    assert np.count_nonzero(lidar.layers[0]) == 6
+    enable(simulation)
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
@@ -204,7 +251,7 @@ def test_a_pixel_of_a_range_finder_is_a_distance_along_the_lens(setting):
 
 @pytest.mark.parametrize("setting", MUJOCO, ids=str)
 def test_a_camera_recognizes_an_object_where_it_is(setting):
-    """MuJoCo: its place and rotation in the frame of the camera, and the middle of it in the picture."""
+    """MuJoCo returns its place and rotation in the frame of the camera, and its middle in the picture."""
     simulation = pictures_of(setting)
     starts = [(2.0, 0.3, -0.4), (1.5, -1.0, 0.6), (3.0, 1.0, 1.0)]
     for roll, start in enumerate(starts):

@@ -15,7 +15,7 @@ from tests.values.standing import MOUNT
 from tests.values.worlds import PHYSICS, STEP_MS, device, move, robot
 
 COLUMNS, ROWS = 8, 4
-REDS = np.arange(20, 20 + 7 * COLUMNS * ROWS, 7).reshape(ROWS, COLUMNS)  # another one in each pixel
+REDS = np.arange(20, 20 + 7 * COLUMNS * ROWS, 7).reshape(ROWS, COLUMNS)  # each pixel has another value
 OTHERS = REDS[::-1, ::-1]
 REACH_M = 30.0
 PLACE = frame((3.0, -1.0, 0.5), (0.3, -0.5, 0.8), 1.1)
@@ -32,7 +32,7 @@ def picture(reds):
 
 @pytest.fixture
 def project(tmp_path):
-    """Return the folder of a world, in a project, with two images in a folder beside it."""
+    """Return the folder of a world, in a project, with two images in a folder next to it."""
     folder = tmp_path / "project" / "worlds"
     (folder / "textures").mkdir(parents=True)
     (folder / "textures" / "reds.png").write_bytes(picture(REDS))
@@ -102,7 +102,8 @@ def on_sphere(point):
 
 
 SIDES = [(1, 0.3), (-1, 0.7), (-0.6, -1), (0.8, -1)]
-# A geometry, how far a ray travels to it, and the place in its texture of a point of its surface.
+# Each row: a geometry, how far a ray travels to it, and a function from a point of its surface to the place
+# in its texture.
 CASES = [
     (
         "Plane { size 4 2 }",
@@ -176,7 +177,8 @@ LOOKS = [
     (PHONG % TEXTURE, 0.75, 1.0),
     (f"Appearance {{ texture {TEXTURE} }}", 1.0, 1.0),
 ]
-CENTER = ((0.3, 0.2, 1.0), (-0.7, 0.4, 0.0))  # of a Plane of 4 x 2 m: the third column and the second row
+# The pixel in the third column and the second row of a Plane of 4 x 2 m.
+CENTER = ((0.3, 0.2, 1.0), (-0.7, 0.4, 0.0))
 
 
 @for_each("look, share, smooth", LOOKS)

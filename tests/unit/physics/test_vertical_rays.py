@@ -39,7 +39,7 @@ def test_a_ray_straight_down_meets_the_floor_and_no_post_elsewhere(physics, angl
 
 
 def test_a_ray_straight_up_meets_nothing(physics):
-    """It measures its maximum range."""
+    """The sensor measures its maximum range."""
     simulation = Simulation.load(WORLD.replace("ANGLE", "-1.5707963").encode(), physics(), "world", Mode.FAST)
 
     simulation.step(16)

@@ -12,9 +12,9 @@ def policy(planned):
     return planned.network_policy["spec"]
 
 
-def test_a_laptop_needs_no_policy(make_job):
+def test_a_laptop_needs_no_policy(valid_job):
     """Everything is on loopback there, and no pod has its own network."""
-    planned = plan(make_job(), LocalLayout(images=IMAGES, job_directory="/runs/job"))
+    planned = plan(valid_job(), LocalLayout(images=IMAGES, job_directory="/runs/job"))
 
     assert planned.network_policy is None
 
@@ -29,13 +29,13 @@ def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
     assert all(selected.items() <= labels.items() for labels in templates)
 
 
-def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(make_job):
+def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(valid_job):
     """Only pods of the operator have access, not its whole namespace.
 
     ROS and control ports are closed to all.
     """
     layout = ClusterLayout(images=IMAGES, operator_namespace="ops", monitoring_namespace="eyes")
-    (rule,) = plan(make_job(), layout).network_policy["spec"]["ingress"]
+    (rule,) = plan(valid_job(), layout).network_policy["spec"]["ingress"]
 
     assert rule["from"] == [
         {
@@ -82,19 +82,19 @@ def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egr
     assert spec.get("egress") == egress
 
 
-def test_a_job_that_is_made_again_has_a_policy_of_its_own(make_job):
+def test_a_job_that_is_made_again_has_a_policy_of_its_own(valid_job):
     """The old policy is deleted with the old job, whenever that happens."""
     layout = ClusterLayout(images=IMAGES)
     names = {
-        plan(make_job(uid=uid), layout).network_policy["metadata"]["name"] for uid in ("aaaa-1", "bbbb-1")
+        plan(valid_job(uid=uid), layout).network_policy["metadata"]["name"] for uid in ("aaaa-1", "bbbb-1")
     }
 
     assert names == {"job-aaaa-1", "job-bbbb-1"}
 
 
-def test_a_job_without_a_uid_has_no_policy(make_job):
-    """It would have no owner."""
-    job = make_job()
+def test_a_job_without_a_uid_has_no_policy(valid_job):
+    """A policy without the uid would have no owner."""
+    job = valid_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 
     with pytest.raises(PlanError, match=r"^metadata.uid: "):

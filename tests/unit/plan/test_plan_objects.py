@@ -52,9 +52,9 @@ def test_a_claim_that_is_not_retained_goes_with_the_job(in_cluster):
     assert claim["metadata"]["ownerReferences"][0]["kind"] == "TrainingJob"
 
 
-def test_a_job_that_is_made_again_gets_a_new_claim(make_job):
+def test_a_job_that_is_made_again_gets_a_new_claim(valid_job):
     """The uid is in the name, so the run of the predecessor is not continued by accident."""
-    claims = {plan(make_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"}
+    claims = {plan(valid_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"}
 
     assert len(claims) == 2
 
@@ -111,18 +111,18 @@ def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
     assert own["spec"]["suspend"] is True
 
 
-def test_a_job_without_a_uid_has_no_plan(make_job):
+def test_a_job_without_a_uid_has_no_plan(valid_job):
     """Its names and owner references would refer to no object."""
-    job = make_job()
+    job = valid_job()
     nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
 
     with pytest.raises(PlanError, match=r"^metadata.uid: "):
         plan(nobody, LAYOUT)
 
 
-def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(make_job):
+def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(valid_job):
     """Both are on the same claim, each job in its own folder."""
-    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"}, replicas=2)
+    job = valid_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"}, replicas=2)
 
     planned = plan(job, LAYOUT)
 
@@ -130,9 +130,9 @@ def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(
     assert [each["resumeFrom"] for each in told] == [f"/var/lib/palaestra/5a0c/{index}" for index in (0, 1)]
 
 
-def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(make_job):
+def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(valid_job):
     """There is no claim, and nobody would notice for a long time that the training began at step 0."""
-    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
+    job = valid_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
     with pytest.raises(PlanError, match=r"^spec\.storage\.resumeFrom: names a run on a claim .*; remove it"):
@@ -183,12 +183,12 @@ def test_an_initial_policy_in_the_image_needs_no_volume(in_cluster):
     assert "initial-policy" not in [each["name"] for each in mounts]
 
 
-def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(make_job):
+def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(valid_job):
     """Nobody would notice for a long time that the run began with random weights."""
     layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
 
     with pytest.raises(PlanError, match=r"^spec\.trainer\.initialPolicy\.claim: names a claim .*; remove it"):
-        plan(make_job(trainer=INITIAL), layout)
+        plan(valid_job(trainer=INITIAL), layout)
 
 
 def test_the_pod_is_restricted(in_cluster):
@@ -204,9 +204,9 @@ def test_the_pod_is_restricted(in_cluster):
         assert security["capabilities"] == {"drop": ["ALL"]}
 
 
-def test_a_cluster_may_choose_the_user_of_a_pod(make_job):
+def test_a_cluster_may_choose_the_user_of_a_pod(valid_job):
     """OpenShift refuses a user outside the namespace's range; everything else stays restricted."""
-    security = pod(plan(make_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
+    security = pod(plan(valid_job(), ClusterLayout(images=LAYOUT.images, user=None)))["securityContext"]
 
     assert security == {
         "runAsNonRoot": True,
@@ -215,23 +215,23 @@ def test_a_cluster_may_choose_the_user_of_a_pod(make_job):
     }
 
 
-def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
+def test_a_job_s_own_node_label_wins_over_the_installation_s(valid_job):
     """The installation's label is only a default; a user's image may need another kind of node."""
     layout = ClusterLayout(
         images=LAYOUT.images, node_selector={"kubernetes.io/arch": "amd64", "pool": "robots"}
     )
-    job = make_job(scheduling={"nodeSelector": {"kubernetes.io/arch": "arm64"}})
+    job = valid_job(scheduling={"nodeSelector": {"kubernetes.io/arch": "arm64"}})
 
     spec = pod(plan(job, layout))
 
     assert spec["nodeSelector"] == {"kubernetes.io/arch": "arm64", "pool": "robots"}
 
 
-def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(make_job, in_cluster):
+def test_a_pod_has_a_user_namespace_if_the_installation_asks_for_it(valid_job, in_cluster):
     """A process that leaves its container then has no permissions on the node."""
     layout = ClusterLayout(images=LAYOUT.images, host_users=False)
 
-    assert pod(plan(make_job(), layout))["hostUsers"] is False
+    assert pod(plan(valid_job(), layout))["hostUsers"] is False
     assert "hostUsers" not in pod(in_cluster())
 
 
@@ -293,21 +293,21 @@ def claims_of(planned):
     return names
 
 
-def test_no_name_of_a_claim_is_longer_than_a_label(make_job):
+def test_no_name_of_a_claim_is_longer_than_a_label(valid_job):
     """Provisioners copy it into labels and tags of 63 characters.
 
     With 46 characters for the job, the name had 85.
     """
-    names = claims_of(plan(make_job(LONG, replicas=12), LAYOUT))
-    others = claims_of(plan(make_job(LONG, uid="1" * 36, replicas=12), LAYOUT))
+    names = claims_of(plan(valid_job(LONG, replicas=12), LAYOUT))
+    others = claims_of(plan(valid_job(LONG, uid="1" * 36, replicas=12), LAYOUT))
 
     assert max(map(len, names)) <= 63
     assert len({*names, *others}) == 24
     assert names[0].startswith("quadruped-blind-locomotion-rough-terrain-ppo")
 
 
-def test_a_short_name_of_a_claim_has_the_whole_uid(make_job):
+def test_a_short_name_of_a_claim_has_the_whole_uid(valid_job):
     """Existing deployments keep their names."""
-    job = make_job("walk")
+    job = valid_job("walk")
 
     assert claims_of(plan(job, LAYOUT)) == [f"walk-0-{job.metadata.uid}"]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from structlog.testing import capture_logs
 
 from palaestra.api import load
 from palaestra.plan import ClusterLayout, Images, identified, plan
@@ -16,9 +17,12 @@ LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
 
 def read_back(job):
-    """Return the trainer's reading of the training.yaml of a job's first replica."""
+    """Return the trainer's reading of the training.yaml of a job's first replica; it knows every field."""
     planned = plan(identified(job, "uid"), LAYOUT).replicas[0]
-    return parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
+    with capture_logs() as logs:
+        read = parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
+    assert logs == []
+    return read
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
@@ -35,19 +39,19 @@ def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
     assert read.algorithm.hyperparameters == job.spec.trainer.algorithm.hyperparameters
 
 
-def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
+def test_no_evaluation_is_written_as_zero_and_read_as_zero(valid_job):
     """If the section is absent, the trainer uses its own default, which evaluates."""
-    job = make_job(trainer={"evaluation": {"everySteps": 0}})
+    job = valid_job(trainer={"evaluation": {"everySteps": 0}})
 
     read = read_back(job)
 
     assert read.evaluation.every_steps == 0
 
 
-def test_wrappers_and_stacked_frames_are_read_as_they_were_written(make_job):
+def test_wrappers_and_stacked_frames_are_read_as_they_were_written(valid_job):
     """Without them a policy would learn in another environment."""
     wrapper = {"name": "a.b:Own", "options": {"size": 2}}
-    job = make_job(trainer={"environment": {"wrappers": [wrapper], "frameStack": 3}})
+    job = valid_job(trainer={"environment": {"wrappers": [wrapper], "frameStack": 3}})
 
     read = read_back(job).environment
 
@@ -66,40 +70,40 @@ def test_wrappers_and_stacked_frames_are_read_as_they_were_written(make_job):
         ),
     ],
 )
-def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
+def test_what_is_normalized_is_read_as_it_was_written(valid_job, written, read):
     """Only the trainer has defaults for absent fields."""
-    job = make_job(trainer={"algorithm": {"name": "PPO"} | written})
+    job = valid_job(trainer={"algorithm": {"name": "PPO"} | written})
 
     assert read_back(job).algorithm.normalize == read
 
 
-def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_job):
+def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(valid_job):
     """A trainer whose release does not know a field logs it."""
     initial = {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}
 
-    assert read_back(make_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
-    assert read_back(make_job()).initial_policy is None
+    assert read_back(valid_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
+    assert read_back(valid_job()).initial_policy is None
 
 
 @pytest.mark.parametrize("cnn", ["small", None])
-def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
+def test_the_network_for_images_is_read_as_it_was_written(valid_job, cnn):
     """A field that a job leaves out is absent."""
-    job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
+    job = valid_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
 
     assert read_back(job).algorithm.cnn == cnn
 
 
 @pytest.mark.parametrize("callbacks", [None, [{"name": "mine:Bored", "options": {"patience": 3}}]])
-def test_callbacks_are_read_as_they_were_written(make_job, callbacks):
+def test_callbacks_are_read_as_they_were_written(valid_job, callbacks):
     """Their options are free objects. Their keys stay as written, unlike the fields of a TrainingJob."""
-    job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"callbacks": callbacks} if callbacks else {})})
+    job = valid_job(trainer={"algorithm": {"name": "PPO"} | ({"callbacks": callbacks} if callbacks else {})})
 
     read = read_back(job).algorithm.callbacks
 
     assert (None if read is None else [each.model_dump() for each in read]) == callbacks
 
 
-def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
+def test_how_simulators_are_kept_going_is_read_as_it_was_written(valid_job):
     """Memory is written in bytes, because a trainer compares it with the kernel's values."""
     group = {
         "name": "collect",
@@ -110,7 +114,7 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
         "recycle": {"afterResets": 24, "afterMinutes": 90, "aboveMemory": "400Mi"},
     }
 
-    collect, *_, evaluate = read_back(make_job(simulators=[group, EVALUATE])).simulators
+    collect, *_, evaluate = read_back(valid_job(simulators=[group, EVALUATE])).simulators
 
     assert (collect.min_simulators, collect.standby) == (1, True)
     assert collect.recycle == Recycle(after_resets=24, after_minutes=90, above_memory_bytes=400 * 2**20)
@@ -129,16 +133,16 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     ],
     ids=["stub", "mujoco", "webots", "command", "stored job"],
 )
-def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(make_job, group, read):
+def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(valid_job, group, read):
     """Restarts took a fifth of a training; only the simulator of the paper failed at the 25th reset."""
-    job = make_job(simulators=[COLLECT | group, EVALUATE])
+    job = valid_job(simulators=[COLLECT | group, EVALUATE])
 
     assert read_back(job).simulators[0].recycle == read
 
 
-def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
+def test_a_simulator_that_is_never_recycled_has_no_limit(valid_job):
     """Zero resets mean never, in the job and in the file."""
-    read = read_back(make_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
+    read = read_back(valid_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
 
     assert read.simulators[0].recycle is None
 
@@ -154,13 +158,13 @@ def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
         ({"limits": {"nvidia.com/gpu-memory": 1, "gpu.example.com/card": 1}}, "cpu"),
     ],
 )
-def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(make_job, resources, device):
+def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(valid_job, resources, device):
     """Otherwise the GPU would be reserved and paid for, but idle."""
-    assert read_back(make_job(trainer={"resources": resources})).device == device
+    assert read_back(valid_job(trainer={"resources": resources})).device == device
 
 
-def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(make_job):
+def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(valid_job):
     """Its ConfigMap is named after its content, so what a job does not ask for is left out."""
-    planned = plan(identified(make_job(), "uid"), LAYOUT).replicas[0]
+    planned = plan(identified(valid_job(), "uid"), LAYOUT).replicas[0]
 
     assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])

@@ -92,28 +92,28 @@ def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
     assert data(planned)["collect.wbt"] == ARENA
 
 
-def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(make_job):
+def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(valid_job):
     """With parsing for each simulator, thirty replicas of seventeen took fifteen seconds per reconcile."""
     world = {"inline": ARENA}
-    job = make_job(replicas=3, simulators=[group(count=4, world=world), EVALUATE | {"world": world}])
+    job = valid_job(replicas=3, simulators=[group(count=4, world=world), EVALUATE | {"world": world}])
 
     assert calls_of(parse, lambda: plan(job, LAYOUT)) == 1
 
 
-def test_a_world_that_ships_is_not_parsed(make_job):
+def test_a_world_that_ships_is_not_parsed(valid_job):
     """It passes every check in this project's own tests.
 
     Parsing takes most of the time of planning a small job.
     """
-    assert calls_of(parse, lambda: plan(make_job(simulators=[group(), EVALUATE]), LAYOUT)) == 0
+    assert calls_of(parse, lambda: plan(valid_job(simulators=[group(), EVALUATE]), LAYOUT)) == 0
 
 
-def test_only_the_replicas_that_are_asked_for_are_planned(make_job):
+def test_only_the_replicas_that_are_asked_for_are_planned(valid_job):
     """A job with hundred replicas, of which one lacks an object, is planned for that one."""
-    planned = plan(make_job(replicas=3), LAYOUT, replicas=[1])
+    planned = plan(valid_job(replicas=3), LAYOUT, replicas=[1])
 
     assert planned.replicas.keys() == {1}
-    assert planned.replicas[1] == plan(make_job(replicas=3), LAYOUT).replicas[1]
+    assert planned.replicas[1] == plan(valid_job(replicas=3), LAYOUT).replicas[1]
 
 
 def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
@@ -134,10 +134,10 @@ def test_a_file_is_left_to_the_sidecar(in_cluster):
     assert training(planned)["simulators"][0]["world"] == "/worlds/my.wbt"
 
 
-def test_a_config_map_is_given_by_who_can_read_it(make_job):
+def test_a_config_map_is_given_by_who_can_read_it(valid_job):
     """The plan is pure, so the caller reads the cluster."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
-    job = make_job(simulators=[group(world=source), EVALUATE])
+    job = valid_job(simulators=[group(world=source), EVALUATE])
 
     planned = plan(job, LAYOUT, {("worlds", "a.wbt"): ARENA.encode()})
 
@@ -155,18 +155,18 @@ def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
 
 
 def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_created(in_cluster):
-    """A refusal is visible at once, a simulator that cannot start only hours later."""
+    """A refusal is visible at once; that a simulator cannot start may be visible only hours later."""
     twice = '#VRML_SIM R2023b utf8\nRobot { controller "ros" }\nRobot { controller "ros" }\n'
 
     with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
         in_cluster(simulators=[group(), group("evaluate", "Evaluate", world={"inline": twice})])
 
 
-def test_worlds_that_fit_nowhere_are_refused(make_job):
+def test_worlds_that_fit_nowhere_are_refused(valid_job):
     """The message has the remedy."""
     source = {"configMap": {"name": "worlds", "key": "a.wbt"}}
     huge = ARENA.encode() + b"# " + b"x" * MOST_BYTES
-    job = make_job(simulators=[group(world=source), EVALUATE])
+    job = valid_job(simulators=[group(world=source), EVALUATE])
 
     with pytest.raises(PlanError, match=r"put the worlds into the images"):
         plan(job, LAYOUT, {("worlds", "a.wbt"): huge})

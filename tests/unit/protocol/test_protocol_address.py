@@ -16,5 +16,5 @@ def test_an_address_is_written_as_it_is_read(text) -> None:
 )
 def test_what_is_no_address_with_a_port_is_refused(text) -> None:
     """A name could resolve to another machine tomorrow, so names are refused."""
-    with pytest.raises(ValueError, match=r"is no address such as 127\.0\.0\.1:7100$"):
+    with pytest.raises(ValueError, match=r"is not an address such as 127\.0\.0\.1:7100$"):
         Address.parse(text)

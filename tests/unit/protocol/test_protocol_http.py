@@ -219,7 +219,8 @@ def half_open(server, count, host="127.0.0.1"):
         ]
         for connection in kept:
             connection.settimeout(60.0)
-            with contextlib.suppress(OSError):  # another connection may have its slot already
+            # The server may have closed this connection in favor of a newer one.
+            with contextlib.suppress(OSError):
                 connection.sendall(REQUEST[:9])
         yield kept
 

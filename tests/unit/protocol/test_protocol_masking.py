@@ -56,5 +56,5 @@ def test_no_text_that_leaves_a_trainer_has_it(capsys):
 
 @pytest.mark.parametrize("shorten", [lambda text: one_line(text, 200), printable, clipped])
 def test_no_text_that_a_command_prints_or_a_status_keeps_has_it(shorten):
-    """It may come from a program of one's own."""
+    """A password may come from a program of the user."""
     assert shorten(ADDRESS) == masked(ADDRESS)

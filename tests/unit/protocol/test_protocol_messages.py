@@ -79,20 +79,20 @@ def test_no_bytes_break_the_decoder(data) -> None:
     ("changes", "message"),
     [
         ({"state": "happy"}, "state: 'happy' is not one of idle, starting, ready, stopping, failed"),
-        ({"state": 3}, "state: a number is no text"),
+        ({"state": 3}, "state: a number is not text"),
         ({"world": "x" * 5000}, "world: has 5000 characters, not 0 to 4096"),
         ({"detail": "\ud800"}, "detail: holds half a character"),
         ({"pid": 0}, "pid: is not within 1 to 4194304"),
-        ({"pid": True}, "pid: true or false is no integer"),
-        ({"starts": 1.0}, "starts: a number is no integer"),
+        ({"pid": True}, "pid: true or false is not an integer"),
+        ({"starts": 1.0}, "starts: a number is not an integer"),
         ({"faults": -1}, "faults: is not within 0 to 9007199254740992"),
         ({"faults": 10**6000}, "faults: is not within 0 to 9007199254740992"),
         ({"rss_bytes": -1}, "rss_bytes: is not within 0 to 9007199254740992"),
-        ({"robots": {}}, "robots: an object is no list"),
+        ({"robots": {}}, "robots: an object is not a list"),
         ({"robots": [{}] * 33}, "robots: has 33 entries, more than 32"),
-        ({"robots": [7]}, "robots[0]: a number is no object"),
+        ({"robots": [7]}, "robots[0]: a number is not an object"),
         ({"robots": [{"robot": "r", "ros_name": ""}]}, "robots[0].ros_name: has 0 characters, not 1"),
-        ({"left_out": "Drone"}, "left_out: text is no list"),
+        ({"left_out": "Drone"}, "left_out: text is not a list"),
         ({"left_out": ["x" * 201]}, "left_out[0]: has 201 characters, not 0 to 200"),
         ({"left_out": ["x"] * 17}, "left_out: has 17 entries, more than 16"),
         ({"last_exit": {"code": 256}}, "last_exit.code: is not within 0 to 255"),
@@ -158,7 +158,7 @@ def test_an_answer_that_is_too_long_is_not_even_read() -> None:
 
 def test_nesting_without_end_is_refused_as_any_other_nonsense() -> None:
     """A parser whose stack overflows raises no ValueError."""
-    with pytest.raises(ProtocolError, match=r"^body: is no JSON \(RecursionError\)$"):
+    with pytest.raises(ProtocolError, match=r"^body: is not JSON \(RecursionError\)$"):
         decoded(b"[" * 100_000)
 
 
@@ -231,7 +231,7 @@ def test_an_interval_travels_with_its_rate(status) -> None:
     ],
 )
 def test_bounds_of_a_success_rate_are_shares(status, changes, mistake) -> None:
-    """They are copied into a TrainingJob's status, whose schema bounds them."""
+    """The bounds are copied into a TrainingJob's status, whose schema allows only shares."""
     content = status(success_interval=SuccessInterval(low=0.1, high=0.2, episodes=5)).to_json()
     content["success_interval"] |= changes
 
@@ -244,7 +244,7 @@ def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
     """It is copied into a TrainingJob's status, whose schema says date-time."""
     content = status(last_progress=time).to_json()
 
-    with pytest.raises(ProtocolError, match=r"^last_progress: is no time such as 2025-01-31T12:00:00Z$"):
+    with pytest.raises(ProtocolError, match=r"^last_progress: is not a time such as 2025-01-31T12:00:00Z$"):
         TrainerStatus.from_json(content)
 
 
@@ -319,7 +319,7 @@ def test_a_long_log_does_not_drive_out_the_faults() -> None:
     "lines", ["one line", [7], ["x" * 201], ["x"] * 11, ["\ud800"]], ids=["text", "7", "long", "many", "half"]
 )
 def test_a_log_that_nobody_of_ours_wrote_is_refused(lines) -> None:
-    """It becomes part of a TrainingJob's status, which is bounded."""
+    """The log becomes part of a TrainingJob's status, whose size is bounded."""
     content = Termination(step=7, reason="Completed").to_json() | {"log": lines}
 
     with pytest.raises(ProtocolError, match=r"^log"):
@@ -353,11 +353,11 @@ def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"faults": [1]}, r"^faults: a list is no object$"),
+        ({"faults": [1]}, r"^faults: a list is not an object$"),
         ({"faults": {"dead": -1}}, r"^faults\.dead: is not within"),
-        ({"goodput": {"learning": "long"}}, r"^goodput\.learning: text is no number$"),
+        ({"goodput": {"learning": "long"}}, r"^goodput\.learning: text is not a number$"),
         ({"goodput": {"learning": -0.1}}, r"^goodput\.learning: is not within"),
-        ({"steps_lost": 1.5}, r"^steps_lost: a number is no integer$"),
+        ({"steps_lost": 1.5}, r"^steps_lost: a number is not an integer$"),
     ],
 )
 def test_a_table_says_which_of_its_values_is_wrong(status, changes, message) -> None:

@@ -39,5 +39,5 @@ def test_times_are_finite_and_only_a_delay_may_be_nothing(number):
 def test_what_is_no_number_is_said_to_be_none(text):
     """The message quotes the text, so that the user finds it."""
     for read in (whole(), seconds, milliseconds):
-        with pytest.raises(ArgumentTypeError, match=f"^{text!r} is no "):
+        with pytest.raises(ArgumentTypeError, match=f"^{text!r} is not a "):
             read(text)

@@ -41,7 +41,7 @@ def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(
     ],
 )
 def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, tmp_path, name):
-    """These are Palaestra's packages, their own dependencies, those of an extra, and ROS."""
+    """Dependencies are Palaestra's packages, the dependencies of these, those of an extra, and ROS."""
     found = put(f"{name}.py")
 
     assert found == [f"{tmp_path / name}.py: shadows the module {name}, which Palaestra needs; rename it"]

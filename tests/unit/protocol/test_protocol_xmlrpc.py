@@ -42,7 +42,7 @@ def test_what_is_encoded_is_decoded(values):
 
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_document_or_refused(data):
-    """With one error, whatever Python's reader raises."""
+    """One class of error is raised, whatever Python's reader raises."""
     for document in (data, b"<methodCall><methodName>m</methodName><params>" + data):
         with contextlib.suppress(UnreadableDocument):
             decode_request(document)
@@ -103,7 +103,7 @@ def uri(server):
 
 
 def test_a_call_returns_the_value(server):
-    """By our client and by Python's, over one connection."""
+    """Our client and Python's call over one connection."""
     running = server()
 
     assert call(uri(running), PATIENCE_S, "double", 21) == 42
@@ -113,7 +113,7 @@ def test_a_call_returns_the_value(server):
 
 @pytest.mark.parametrize(("method", "given"), [("none", 1), ("double", {}), ("nothing", 0)])
 def test_a_call_that_cannot_be_made_is_a_fault(server, method, given):
-    """The connection and the server go on."""
+    """The connection and the server continue."""
     with xmlrpc.client.ServerProxy(uri(server())) as proxy:
         with pytest.raises(xmlrpc.client.Fault):
             getattr(proxy, method)(given)
@@ -229,7 +229,7 @@ def test_a_call_ends_at_its_deadline_however_slowly_the_answer_comes(peer, piece
     ],
 )
 def test_an_answer_that_is_no_response_is_refused(peer, answer):
-    """With one error."""
+    """One class of error is raised for all such answers."""
     with pytest.raises(UnreadableDocument):
         call(peer([answer]), PATIENCE_S, "m")
 

@@ -44,8 +44,8 @@ FOR_PEOPLE = {
 }
 # These fields are read only for some nodes, such as a light, another type of bumper, a radar or a fluid.
 ELSEWHERE = {
-    "LightSensor.colorFilter", "LightSensor.occlusion",  # the stub refuses lights
-    "TouchSensor.resolution", "GPS.noiseCorrelation",
+    "LightSensor.occlusion",
+    "TouchSensor.resolution",
     "radarCrossSection", "recognitionColors", "contactMaterial", "immersionProperties", "physics",
 }  # fmt: skip
 

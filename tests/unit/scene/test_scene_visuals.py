@@ -160,7 +160,7 @@ def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
     assert thing.mesh.triangles == ((0, 2, 1),)
 
 
-HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # has 3 square meters
+HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # its area is 3 square meters
 
 
 @pytest.mark.parametrize("first", [0, 1, 2])  # first axis

@@ -52,7 +52,7 @@ def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
 
 
 def test_every_line_of_one_of_two_simulators_begins_with_its_mark(passed_on) -> None:
-    """So do the pieces of a long line; with the mark they keep to the maximum length."""
+    """The pieces of a long line begin with the mark too, which counts toward the maximum length."""
     out, last = passed_on(b"one\n" + b"x" * MOST_LINE + b"\ntwo", mark="b: ")
 
     lines = out.splitlines(keepends=True)

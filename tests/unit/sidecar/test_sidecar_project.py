@@ -270,7 +270,7 @@ def test_a_controller_without_a_project_is_named_with_the_remedy(source) -> None
     warning = project.missing_controllers(world, BALL, {})
 
     assert warning == (
-        f"--world: {world}: is in no Webots project, so Webots starts <generic> for controllers that it "
+        f"--world: {world}: is not in a Webots project, so Webots starts <generic> for controllers that it "
         'lacks: "ball" (controller "roll"); put the project into spec.simulators[].image and name its world '
         "in spec.simulators[].world.file"
     )

@@ -79,7 +79,10 @@ def test_a_robot_without_a_name_is_not_listed() -> None:
 
 
 def test_what_lies_beside_a_world_lies_beside_its_copy(source, tmp_path) -> None:
-    """Addresses in a world file are relative to it, and its own folder may be read-only."""
+    """Addresses are relative to the world file, and its folder may be read-only.
+
+    So the copy has links to the neighbours of the file.
+    """
     world = source(NEIGHBOURS)
     for folder, name in [(world.parent / "textures", "a.png"), (world.parents[1] / "protos", "Box.proto")]:
         folder.mkdir()
@@ -136,6 +139,6 @@ def test_a_world_that_does_not_fit_is_not_there_at_all(source, tmp_path) -> None
     """Otherwise the next start would run half of a world."""
     (tmp_path / "work" / "collect-1.wbt").mkdir(parents=True)
 
-    with pytest.raises(SidecarError, match=r"^--work: .*: Is a directory; give a folder with room$"):
+    with pytest.raises(SidecarError, match=r"^--work: .*: Is a directory; give a folder with free space$"):
         world_files.named(source(), tmp_path / "work", IDENTITY, clock=False)
     assert [path.name for path in (tmp_path / "work").iterdir()] == ["collect-1.wbt"]

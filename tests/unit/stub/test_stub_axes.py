@@ -13,7 +13,7 @@ from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse
 from palaestra_sim.world.stand_ins import shipped
 
-LYING = "1 0 0 -1.5707963267948966"  # of a solid that lies along z, in a world whose y axis points up
+LYING = "1 0 0 -1.5707963267948966"  # a solid lies along z, in a world whose y axis points up
 E_PUCK = """E-puck { translation %s rotation %s controller "ros" controllerArgs [ "--name=a" "--synchronize" ]
   turretSlot [ GPS { } ] }"""
 WALL = "Solid { translation %s boundingObject Box { size %s } }"
@@ -115,7 +115,9 @@ def test_what_is_added_stands_in_the_axes_of_the_file():
 
 def test_an_unknown_system_of_axes_is_a_mistake():
     """Webots knows three systems."""
-    with pytest.raises(WorldError, match='coordinateSystem "UP" is none of ENU, NUE, EUN; write one of them'):
+    with pytest.raises(
+        WorldError, match='coordinateSystem "UP" is not one of ENU, NUE, EUN; write one of them'
+    ):
         load('WorldInfo { coordinateSystem "UP" }', leave_out=LeaveOut(everything=True))
 
 

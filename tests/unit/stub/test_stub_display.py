@@ -153,7 +153,7 @@ def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
 
 
 def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
-    """It is mixed by its alpha; otherwise it replaces the pixels, alpha included."""
+    """The picture is mixed by its alpha; otherwise it replaces the pixels, alpha included."""
     robot, picture = painter
     robot.call("screen/fill_rectangle", x=0, y=0, width=8, height=6)
     image = robot.get("screen/image_new", width=1, height=1, data=[0, 0, 0, 51], format=6)
@@ -213,8 +213,8 @@ def test_only_a_camera_that_sees_is_attached(start, world, ros):
 
     assert tuple(robot.call("screen/get_info")) == (8, 6)
     assert robot.get("screen/attach_camera", value="nose") is False
-    with pytest.raises(ServiceFailed, match="lamp is no Camera"):
+    with pytest.raises(ServiceFailed, match="lamp is not a Camera"):
         robot.call("screen/attach_camera", value="lamp")
-    with pytest.raises(ServiceFailed, match="eye sees nothing here"):
+    with pytest.raises(ServiceFailed, match="eye has no image here"):
         robot.call("screen/attach_camera", value="eye")
     assert robot.get("screen/detach_camera") is True

@@ -61,7 +61,7 @@ def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
 
 
 def test_values_of_the_world_file_and_defaults_are_read(robot, field):
-    """They are equal whether the file writes them or not."""
+    """A value is the same whether the file has it or it is the default."""
     get = robot.get
 
     assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"))) == (1.5, 0, 0.001)
@@ -159,7 +159,7 @@ def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position
 
 
 def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
-    """It is not the position at which the robot was placed."""
+    """The field changes as the robot moves."""
     drive(robot, 0.1, 0.0, 0.0)
 
     robot.call("robot/time_step", value=3200)

@@ -31,7 +31,7 @@ def close(values, tolerance=1e-9):
 
 @given(matrix=matrices, vector=vectors)
 def test_a_rotation_keeps_lengths(matrix, vector):
-    """Then every matrix is a rotation."""
+    """If lengths stay the same, every matrix is a rotation."""
     assert math.hypot(*turn(matrix, vector)) == close(math.hypot(*vector))
 
 
@@ -65,7 +65,7 @@ def test_the_axis_stays_where_it_is(rotation):
 def test_both_ways_to_a_quaternion_agree(rotation):
     """One starts from the field's axis and angle, the other from the node's matrix.
 
-    The sign has no meaning.
+    A quaternion and its negative are the same rotation.
     """
     length = math.hypot(*rotation[:3])
     unit = (rotation[0] / length, rotation[1] / length, rotation[2] / length, rotation[3])

@@ -27,7 +27,7 @@ def test_many_places_are_counted() -> None:
 
 
 def test_a_place_has_the_name_of_its_file() -> None:
-    """It may be in a PROTO, and a generated world has lines that its source lacks."""
+    """The place may be in a PROTO, and a generated world has lines that its source lacks."""
     assert list(left_out_lines([error(3), error(3, world="Hall.proto")])) == [
         "the stub simulates no Drone: 1 node left out (my.wbt, line 3)",
         "the stub simulates no Drone: 1 node left out (Hall.proto, line 3)",

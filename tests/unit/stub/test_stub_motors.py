@@ -68,7 +68,7 @@ def test_a_negative_velocity_needs_an_infinite_target(robot):
 
 
 def test_a_motor_tells_what_the_world_file_says(robot):
-    """These are limits and names."""
+    """A motor has limits and a name in the file."""
     assert robot.get("wheel1_joint/get_max_velocity") == pytest.approx(137.46)
     assert robot.get("wheel1_joint/get_acceleration") == -1.0
     assert robot.get("wheel1_joint/get_max_torque") == 10.0

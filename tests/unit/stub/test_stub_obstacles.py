@@ -19,7 +19,7 @@ angles_around = st.lists(st.integers(0, 11), min_size=3, max_size=6, unique=True
 
 @st.composite
 def hulls(draw):
-    """The hull of some points on an ellipse, and of one amid them."""
+    """The hull of some points on an ellipse, and of one between them."""
     x, y, width, length = draw(places), draw(places), draw(sizes), draw(sizes)
     corners = [math.pi * index / 6.0 for index in draw(angles_around)]
     points = [(x + width * math.cos(turn), y + length * math.sin(turn)) for turn in corners]
@@ -41,7 +41,8 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @given(
     place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
 )
-@example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)  # its square has few digits
+# The square of this distance has few digits.
+@example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
     """The contact gives the shortest way out."""
@@ -142,7 +143,7 @@ def test_a_longer_obstacle_does_not_hide_a_nearer_one():
 
 
 def test_a_robot_that_touches_a_hull_is_pushed_off_its_nearest_edge():
-    """A triangle of 2 m by 1 m; the robot is beside its slope, then inside, near its long side."""
+    """A triangle of 2 m by 1 m; the robot is next to its slope, then inside, near its long side."""
     wedge = Hull([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (0.5, 0.3)])
     slope = (1.0 / math.sqrt(5.0), 2.0 / math.sqrt(5.0))
 

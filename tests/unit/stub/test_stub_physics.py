@@ -165,7 +165,7 @@ def test_standing_still_is_exact(build):
 
 
 def test_a_wall_stops_what_drives_straight_into_it(build):
-    """Its rim stops at the wall."""
+    """The rim of the robot stops at the wall."""
     body, go = build([Block(1.05, 0.0, 0.0, (0.1, 4.0))])
 
     go(0.5, 0.0, 0.0, 200)

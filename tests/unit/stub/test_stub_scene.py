@@ -180,7 +180,7 @@ BAD = {
         "Solid { rotation 1 0 0 0.5 boundingObject Box { } }",
         "a Box that neither stands nor lies",
     ),
-    "a slope": ("Solid { rotation 1 0 0 0.5 boundingObject Plane { } }", "a Plane that is no floor"),
+    "a slope": ("Solid { rotation 1 0 0 0.5 boundingObject Plane { } }", "a Plane that is neither a floor"),
     "a dangling USE": ("Solid { boundingObject USE NOTHING }", "USE NOTHING has no DEF before it"),
     "a malformed translation": ("Pose { translation 1 2 }", "Pose.translation is not 3 numbers"),
     "a place beyond all floats": (
@@ -390,7 +390,7 @@ def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_
         ),
         f"my.wbt:7:16: the stub simulates no Cone as a boundingObject; {elsewhere}",
         "my.wbt:9:1: controllerArgs without --name=; generate the world",
-        "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only when it is asked to; add it",
+        "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only on request; add it",
         f"my.wbt:10:18: the stub simulates no Theseus on a robot; {elsewhere}",
         f"my.wbt:10:30: the stub simulates no Minotaur on a robot; {elsewhere}",
     ]
@@ -407,7 +407,7 @@ def test_a_refusal_of_several_things_survives_a_copy(world):
 
 
 def test_a_shape_that_is_used_twice_is_refused_once(world):
-    """It is at one position in the file."""
+    """The shape is at one position in the file."""
     objects = """Solid { boundingObject DEF BALL Cone { } }
       Solid { boundingObject USE BALL }"""
 
@@ -430,7 +430,7 @@ def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
 @pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])
 def test_the_basic_step_is_whole_milliseconds(world, step):
     """The controller uses only the integer part of the value as its divisor."""
-    with pytest.raises(WorldError, match="no whole number of milliseconds"):
+    with pytest.raises(WorldError, match="not a whole number of milliseconds"):
         scene_of(world(info=f"basicTimeStep {step}"))
 
 

@@ -118,7 +118,7 @@ def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
 @pytest.mark.parametrize("duration_ms", [0, -32, 33])
 def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms):
     """Any other value would step another duration than the requested one."""
-    with pytest.raises(ValueError, match="no multiple of the basic step"):
+    with pytest.raises(ValueError, match="not a positive multiple of the basic step"):
         simulation.step(duration_ms)
 
 

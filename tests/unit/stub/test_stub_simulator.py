@@ -43,8 +43,8 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     [
         (('"--name=robotino" ', ""), "controllerArgs without --name=; generate the world"),
         (('"--synchronize"', ""), "controllerArgs without --synchronize"),
-        (('"--synchronize"', '"--synchronize" "--use-sim-time"'), "the stub knows no --use-sim-time"),
-        (('"--synchronize"', '"--synchronize" "--use-ros-control"'), "no --use-ros-control"),
+        (('"--synchronize"', '"--synchronize" "--use-sim-time"'), "the stub does not know --use-sim-time"),
+        (('"--synchronize"', '"--synchronize" "--use-ros-control"'), "does not know --use-ros-control"),
     ],
 )
 def test_arguments_that_the_stub_cannot_follow_are_refused(start, world, simple_robot, change, fact):

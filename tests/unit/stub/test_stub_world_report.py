@@ -73,7 +73,7 @@ def test_devices_without_readings_are_named(check):
     code, lines = check('Robot { controller "ros" children [ Camera { } RangeFinder { } LED { } ] }')
 
     assert code == 0
-    assert lines[1:] == ["devices without readings, whose enable answers failure: 1 Camera, 1 RangeFinder"]
+    assert lines[1:] == ["devices without readings, whose enable returns failure: 1 Camera, 1 RangeFinder"]
 
 
 def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
@@ -107,7 +107,7 @@ def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
     (tmp_path / "my.wbt").symlink_to("/dev/zero")
 
     assert main([str(tmp_path / "my.wbt"), "--check"]) == 2
-    assert capsys.readouterr().err.endswith("my.wbt: is no regular file\n")
+    assert capsys.readouterr().err.endswith("my.wbt: is not a regular file\n")
 
 
 def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
@@ -116,7 +116,7 @@ def test_stand_ins_that_are_no_text_are_refused(check, tmp_path):
     endless.symlink_to("/dev/zero")
     latin.write_bytes("# Stühle".encode("latin-1"))
 
-    for table, fact in ((endless, "is no regular file"), (latin, "this is not UTF-8; save it as UTF-8")):
+    for table, fact in ((endless, "is not a regular file"), (latin, "this is not UTF-8; save it as UTF-8")):
         assert check("", "--stand-ins", str(table)) == (2, [f"palaestra-stub: {table}: {fact}"])
 
 

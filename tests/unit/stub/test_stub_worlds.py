@@ -97,7 +97,7 @@ def test_a_field_that_a_proto_does_not_have_is_ignored_and_named():
 
 
 def test_a_proto_inside_itself_ends():
-    """The files were refused before, but a table of descriptions may still have one."""
+    """Such files are refused earlier, but a table of descriptions may still have such a PROTO."""
     with pytest.raises(WorldError, match="PROTOs are nested more than 20 deep"):
         load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } ] } }")
 
@@ -248,7 +248,7 @@ def test_a_door_that_swings_is_refused():
 
 def test_a_conveyor_belt_is_refused():
     """It would move the objects on it in Webots."""
-    with pytest.raises(WorldError, match="a Track with devices moves what stands on it"):
+    with pytest.raises(WorldError, match="a Track with devices moves the objects on it"):
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 
 
@@ -365,7 +365,7 @@ def drive(simulation, seconds, **speeds):
     ],
 )
 def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
-    """It follows from the radius of the wheels and the distance between them."""
+    """The motion follows from the radius of the wheels and the distance between them."""
     straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
     assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
     assert straight.y == pytest.approx(0.0, abs=1e-6)

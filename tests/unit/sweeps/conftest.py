@@ -9,8 +9,9 @@ import yaml
 
 from palaestra.sweeps.model import Sweep, load
 from palaestra.sweeps.trial import Point, RunFigures, TrialFigures
+from tests.jobs import make_job
 
-JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}, "spec": {}}
+JOB = make_job("j")
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """What `make setup` and `make test` do for somebody who may not install packages of the distribution."""
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -79,3 +80,131 @@ def test_without_root_it_prints_the_one_line_to_type_and_stops(checkout, script,
     assert (done.returncode, done.stderr) == (1, "")
     assert done.stdout.splitlines() == lines
     assert sorted(checkout.rglob("*")) == before
+
+
+UV = """\
+#!/bin/bash
+echo "$*" >>uv.log
+[[ $* == "pip freeze" ]] && cat freeze.txt
+while (($#)); do [[ $1 == -r ]] && cat "$2" >>installed.lock; shift; done
+true
+"""
+LOCK = """\
+uv==0.9.0 \\
+    --hash=sha256:aa
+    # via palaestra
+nvidia-nccl-cu12==2.21.5 ; sys_platform == 'linux' \\
+    --hash=sha256:bb
+    # via torch
+torch==2.6.0 \\
+    --hash=sha256:cc
+triton==3.2.0 ; sys_platform == 'linux' \\
+    --hash=sha256:dd
+types-torch==1.0 \\
+    --hash=sha256:ee
+"""
+SMALL_LOCK = """\
+uv==0.9.0 \\
+    --hash=sha256:aa
+    # via palaestra
+types-torch==1.0 \\
+    --hash=sha256:ee
+"""
+INDEX = "file:///wheels"
+EDITABLE = "pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image"
+
+
+@pytest.fixture
+def set_up(tmp_path):
+    """`set_up(TORCH_INDEX=...)`: what setup.sh prints, and the commands of a uv that installs nothing."""
+    (tmp_path / "tools").mkdir()
+    (tmp_path / ".venv/bin").mkdir(parents=True)
+    shutil.copy(TOOLS / "setup.sh", tmp_path / "tools/setup.sh")
+    shutil.copy(TOOLS.parent / "Makefile", tmp_path / "Makefile")
+    (tmp_path / "requirements.lock").write_text(LOCK)
+    (tmp_path / "freeze.txt").write_text("")
+    for name, text in {"uv": UV, "python": "#!/bin/bash\nfalse\n"}.items():
+        (tmp_path / ".venv/bin" / name).write_text(text)
+        (tmp_path / ".venv/bin" / name).chmod(0o755)
+
+    def run(*words, **variables):
+        for name in ("uv.log", "installed.lock"):
+            (tmp_path / name).unlink(missing_ok=True)
+        done = subprocess.run(
+            words or ["tools/setup.sh"],
+            cwd=tmp_path,
+            env={"PATH": os.environ["PATH"], "HOME": str(tmp_path), **variables},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        log = tmp_path / "uv.log"
+        return done.stdout, log.read_text().splitlines() if log.exists() else []
+
+    return run
+
+
+def test_the_size_of_the_download_is_said_before_it_begins(set_up):
+    """On a slow line 3 GB take an hour, and the page has a smaller PyTorch for machines without a GPU."""
+    printed, commands = set_up()
+
+    assert "3 GB to download" in printed
+    assert "docs/start/laptop.md" in printed
+    assert commands == ["pip install --quiet --require-hashes -r requirements.lock", EDITABLE]
+
+
+def test_with_an_index_pytorch_comes_from_there_and_cuda_is_left_out(set_up, tmp_path):
+    """Nothing else comes from that index, and the rest keeps its hashes."""
+    printed, commands = set_up(TORCH_INDEX=INDEX)
+
+    assert f"torch==2.6.0 from {INDEX} (a build for the processor alone is 0.2 GB)" in printed
+    assert commands == [
+        "pip install --quiet --require-hashes --no-deps -r .venv/without-torch.lock",
+        "pip freeze",
+        f"pip install --quiet --no-deps --index-url {INDEX} torch==2.6.0",
+        EDITABLE,
+    ]
+    assert (tmp_path / "installed.lock").read_text() == SMALL_LOCK
+
+
+def test_the_index_is_kept_and_cuda_is_removed(set_up, tmp_path):
+    """A later `make setup` without the variable must not bring 3 GB back; nor may they stay."""
+    (tmp_path / "freeze.txt").write_text(
+        "nvidia-nccl-cu12==2.21.5\nnumpy==2.0.0\ntorch==2.6.0\ntriton==3.2.0\n"
+    )
+
+    set_up(TORCH_INDEX=INDEX)
+    _, commands = set_up()
+
+    assert "pip uninstall --quiet nvidia-nccl-cu12 triton torch" in commands
+    assert f"pip install --quiet --no-deps --index-url {INDEX} torch==2.6.0" in commands
+
+
+def test_make_installs_again_only_for_another_index(set_up, tmp_path):
+    """The variable may be set for good, and `make run` starts at once."""
+    for package in ("operator", "trainer", "sim_image"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "pyproject.toml").touch()
+    for source in ("palaestra_protocol/ros/definitions.txt", "palaestra_sim/message_package/files.py"):
+        (tmp_path / "sim_image/src" / source).parent.mkdir(parents=True)
+        (tmp_path / "sim_image/src" / source).touch()
+
+    commands = [
+        set_up("make", "setup", *words)[1]
+        for words in ([], [], [f"TORCH_INDEX={INDEX}"], [f"TORCH_INDEX={INDEX}"], [])
+    ]
+
+    assert [len(each) for each in commands] == [2, 0, 4, 0, 0]
+
+
+def test_the_page_names_the_pytorch_of_the_lock():
+    """A person who types the command of the page gets the version that the trainer asks for."""
+    root = TOOLS.parent
+
+    named = re.findall(r"torch==[0-9.]+", (root / "docs/start/laptop.md").read_text())
+
+    assert set(named) == set(
+        re.findall(r"^torch==[0-9.]+", (root / "requirements.lock").read_text(), re.MULTILINE)
+    )

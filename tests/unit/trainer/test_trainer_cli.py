@@ -1,14 +1,18 @@
-"""`palaestra-train` and `palaestra-eval`, as far as they can be tested without a simulator."""
+"""The programs of this package, as far as they can be tested without a simulator."""
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
 
 import pytest
 
 from palaestra_protocol.pod.status import Termination
-from palaestra_trainer import cli
+from palaestra_trainer.cli.compare import compare
+from palaestra_trainer.cli.evaluate import evaluate
+from palaestra_trainer.cli.train import train
+from palaestra_trainer.cli.try_episodes import attempt
 from palaestra_trainer.errors import FaultBudgetSpent, MasterLost, SimulatorHung
 
 WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
@@ -23,8 +27,13 @@ def nothing_given(monkeypatch):
 
 @pytest.mark.parametrize(
     ("program", "codes"),
-    [(cli.train, [0, 2, 75, 80, 81, 82, 1]), (cli.evaluate, [0, 2, 80, 130, 1])],
-    ids=["train", "eval"],
+    [
+        (train, [0, 2, 75, 80, 81, 82, 1]),
+        (evaluate, [0, 2, 80, 130, 1]),
+        (compare, [0, 2, 3, 80, 130, 1]),
+        (attempt, [0, 1, 2, 80, 130]),
+    ],
+    ids=["train", "eval", "compare", "try"],
 )
 def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, capsys):
     """Nobody should have to read the source for them."""
@@ -33,7 +42,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 
     text = capsys.readouterr().out
     assert ended.value.code == 0
-    for word in ("reads:", "writes:", "PALAESTRA_CONFIG"):
+    for word in ("reads:", "writes:", "training.yaml" if program is not train else "PALAESTRA_CONFIG"):
         assert word in text
     _, _, listed = text.partition("exit codes:")
     assert [int(line.split()[0]) for line in listed.split("\n") if line] == codes
@@ -43,7 +52,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
     """The error comes before a simulator is started."""
     with pytest.raises(SystemExit) as ended:
-        cli.evaluate(["run", "--episodes", number])
+        evaluate(["run", "--episodes", number])
 
     assert ended.value.code == 2
     assert "argument --episodes" in capsys.readouterr().err
@@ -65,9 +74,9 @@ def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code
     def cut(*_):
         raise error
 
-    monkeypatch.setattr(cli, "_evaluate", cut)
+    monkeypatch.setattr("palaestra_trainer.cli.evaluate._evaluate", cut)
 
-    ended = cli.evaluate(["run"])
+    ended = evaluate(["run"])
 
     assert ended == code
     assert len(capsys.readouterr().err.splitlines()) == 1
@@ -78,7 +87,7 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
     monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     (tmp_path / "training.yaml").write_text(WRONG)
 
-    code = cli.train(["--config", str(tmp_path / "training.yaml"), "--run", str(tmp_path / "run")])
+    code = train(["--config", str(tmp_path / "training.yaml"), "--run", str(tmp_path / "run")])
 
     text = capsys.readouterr().err
     assert code == 2
@@ -92,9 +101,11 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
 @pytest.mark.parametrize(
     ("program", "arguments", "fact"),
     [
-        (cli.train, [], "PALAESTRA_CONFIG: is not set"),
-        (cli.train, ["--config", "training.yaml"], "training.yaml: cannot be read"),
-        (cli.evaluate, ["run"], "run/training.yaml: cannot be read"),
+        (train, [], "PALAESTRA_CONFIG: is not set"),
+        (train, ["--config", "training.yaml"], "training.yaml: cannot be read"),
+        (evaluate, ["run"], "run: has no training.yaml"),
+        (compare, ["a", "b"], "a: has no training.yaml"),
+        (attempt, ["run"], "run: has no training.yaml"),
     ],
 )
 def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, capsys, monkeypatch, tmp_path):
@@ -112,11 +123,54 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
     """Three seconds are too long for a typing error."""
     (tmp_path / "training.yaml").write_text(WRONG)
     program = (
-        "import sys; from palaestra_trainer import cli\n"
-        f"code = cli.train(['--config', {str(tmp_path / 'training.yaml')!r}])\n"
+        "import sys; from palaestra_trainer.cli.train import train\n"
+        f"code = train(['--config', {str(tmp_path / 'training.yaml')!r}])\n"
         "sys.exit(9 if 'torch' in sys.modules else code)"
     )
 
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=60, check=False)
 
     assert ended.returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "words"),
+    [
+        (evaluate, ["run", "--in", "stub,gazebo"], "'gazebo' is not a simulator; choose of stub, mujoco"),
+        (evaluate, ["run", "--json"], "--json: without --in the output is JSON already; leave it out"),
+        (compare, ["a", "b", "--margin", "5"], "'5' is not between 0 and 1, such as 0.05"),
+        (compare, ["a", "b", "--in", "gazebo"], "argument --in: invalid choice"),
+    ],
+)
+def test_an_option_without_meaning_is_refused_by_its_name(program, arguments, words, capsys):
+    """The remedy is in the line."""
+    with pytest.raises(SystemExit) as ended:
+        program(arguments)
+
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_pod_evaluates_in_its_own_simulators_only(tmp_path, capsys, monkeypatch):
+    """The images of a pod have no other programs."""
+    path = tmp_path / "training.yaml"
+    path.write_text(
+        "job: x\nsteps: 1\nenvironment: {id: A-v0}\n"
+        "simulators: [{name: c-0, group: c, index: 0, role: Collect}]\n"
+    )
+    monkeypatch.setenv("PALAESTRA_CONFIG", str(path))
+
+    code = evaluate([str(tmp_path), "--in", "stub"])
+
+    assert code == 2
+    assert "--in: the simulators are those of the pod; leave it out" in capsys.readouterr().err
+
+
+def test_keys_are_read_from_a_terminal_only(tmp_path, capsys, monkeypatch):
+    """The program would wait for a key forever."""
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+
+    code = attempt([str(tmp_path), "--agent", "keyboard"])
+
+    assert code == 2
+    assert "--agent keyboard: the standard input is not a terminal" in capsys.readouterr().err

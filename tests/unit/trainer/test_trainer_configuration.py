@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from structlog.testing import capture_logs
 
-from palaestra_trainer.configuration import dump, load, parse
+from palaestra_trainer.configuration import dump, load, load_run, parse
 from palaestra_trainer.errors import ConfigurationError
 
 COMPLETE = """
@@ -129,6 +129,14 @@ def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, m
 
     with pytest.raises(ConfigurationError, match=r"none.yaml: cannot be read .* PALAESTRA_CONFIG"):
         load()
+
+
+def test_a_folder_that_is_not_a_run_directory_is_named(tmp_path):
+    """A person who evaluates or compares has typed a folder, and no variable."""
+    with pytest.raises(ConfigurationError, match=r"has no training.yaml; give a run directory") as caught:
+        load_run(tmp_path)
+
+    assert str(caught.value).startswith(f"{tmp_path}: ")
 
 
 def test_without_the_variable_the_remedy_names_it(monkeypatch):

@@ -6,7 +6,7 @@ import sys
 
 IMPORT = """
 import json, sys
-import palaestra_trainer.cli, palaestra_trainer.run.attempt, palaestra_trainer.simulators.connect
+import palaestra_trainer.cli.train, palaestra_trainer.run.attempt, palaestra_trainer.simulators.connect
 imported = sorted(sys.modules)
 """
 USE = """
@@ -36,7 +36,7 @@ def _run(program: str, *arguments: object):
 def test_a_trainer_imports_no_library_before_it_uses_it(tmp_path):
     """pandas, Matplotlib, TensorBoard and rich took 40 % of its start.
 
-    They still work where they are used.
+    The libraries still work where they are used.
     """
     imported, used = _run(IMPORT + USE + "print(json.dumps([imported, used]))", tmp_path)
 

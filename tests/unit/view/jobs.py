@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from palaestra.api import TrainingJob, validate
+from tests.jobs import make_job
 
 NOW = datetime(2026, 1, 31, 13, 0, tzinfo=UTC)
 CREATED = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
@@ -44,7 +45,9 @@ REPLICA: dict[str, Any] = {
 }
 
 
-def make_job(*, name: str = "job", phase: str = "Running", spec: Any = None, **replica: Any) -> TrainingJob:
+def running_job(
+    *, name: str = "job", phase: str = "Running", spec: Any = None, **replica: Any
+) -> TrainingJob:
     """Return a job with one replica; keywords are fields of its status."""
     condition = {
         "type": phase,
@@ -53,19 +56,13 @@ def make_job(*, name: str = "job", phase: str = "Running", spec: Any = None, **r
         "message": "so it is",
         "lastTransitionTime": "2026-01-31T12:59:00Z",
     }
-    return validate(
-        {
-            "apiVersion": "palaestra.dev/v1alpha1",
-            "kind": "TrainingJob",
-            "metadata": {"name": name, "namespace": "lab", "uid": "0d1f", "generation": 1},
-            "spec": spec or {},
-            "status": {
-                "phase": phase,
-                "observedGeneration": 1,
-                "running": "1/1",
-                "startTime": "2026-01-31T12:00:30Z",
-                "conditions": [condition] if phase != "Pending" else [],
-                "replicas": [deepcopy(REPLICA) | replica],
-            },
-        }
-    )
+    status = {
+        "phase": phase,
+        "observedGeneration": 1,
+        "running": "1/1",
+        "startTime": "2026-01-31T12:00:30Z",
+        "conditions": [condition] if phase != "Pending" else [],
+        "replicas": [deepcopy(REPLICA) | replica],
+    }
+    named = {"namespace": "lab", "uid": "0d1f", "generation": 1}
+    return validate(make_job(name, metadata=named, status=status, **(spec or {})))

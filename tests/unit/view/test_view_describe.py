@@ -4,7 +4,7 @@ from datetime import timedelta
 
 from palaestra.client import Event
 from palaestra.view import describe, happened
-from tests.unit.view.jobs import CREATED, NOW, make_job
+from tests.unit.view.jobs import CREATED, NOW, running_job
 
 
 def told(job):
@@ -14,7 +14,7 @@ def told(job):
 
 def test_a_running_job_is_described_from_spec_to_last_attempt():
     """A person reads them in this order."""
-    lines = told(make_job())
+    lines = told(running_job())
 
     assert "Algorithm:     DQN, 50,000 steps, seed 1" in lines
     assert "Step:           12,000 of 50,000 (24%), 50 a second, about 12m40s to go" in lines
@@ -29,15 +29,15 @@ def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none()
     """Without it, a rate of twenty episodes looks as certain as one of a thousand."""
     interval = {"low": 0.91, "high": 0.99, "episodes": 100}
 
-    assert "Success rate:   40% in the last evaluation" in told(make_job())
+    assert "Success rate:   40% in the last evaluation" in told(running_job())
     assert "Success rate:   97% (95% interval 91% to 99%, 100 episodes)" in told(
-        make_job(successRate=0.97, successInterval=interval)
+        running_job(successRate=0.97, successInterval=interval)
     )
 
 
 def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
     """The mark `given up` is more important than its last state."""
-    lines = told(make_job())
+    lines = told(running_job())
 
     assert "collect-0    Collect    ready      3          -         did not answer" in lines
     assert "evaluate-0   Evaluate   given up   0          -         -" in lines
@@ -46,7 +46,7 @@ def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
 def test_what_simulators_leave_out_has_lines_of_its_own():
     """The results of a job mean less if its world was incomplete."""
     line = "collect: the stub simulates no Drone: 1 node left out (line 7)"
-    job = make_job()
+    job = running_job()
     status = job.status.model_copy(update={"left_out": (line,)})
 
     lines = told(job.model_copy(update={"status": status}))
@@ -57,7 +57,7 @@ def test_what_simulators_leave_out_has_lines_of_its_own():
 
 def test_what_is_not_known_is_left_out():
     """A job that no operator has reconciled has a name, but no progress."""
-    lines = told(make_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))
+    lines = told(running_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))
 
     assert not [line for line in lines if line.startswith(("Step", "Time spent", "Last attempt"))]
     assert "none yet" in lines
@@ -65,21 +65,21 @@ def test_what_is_not_known_is_left_out():
 
 def test_a_time_ledger_of_no_seconds_is_left_out():
     """The first poll of a trainer comes before its first whole second."""
-    assert not [line for line in told(make_job(goodput={})) if line.startswith("Time spent")]
+    assert not [line for line in told(running_job(goodput={})) if line.startswith("Time spent")]
 
 
 def test_slow_steps_are_listed_apart_from_faults():
     """People searched for a broken simulator because of `Faults: slow 1`."""
-    both = told(make_job(faults={"dead": 2, "slow": 1}))
+    both = told(running_job(faults={"dead": 2, "slow": 1}))
 
     assert "Faults:         dead 2" in both
     assert "Slow steps:     1 (not faults)" in both
-    assert not [line for line in told(make_job(faults={"slow": 1})) if line.startswith("Faults")]
+    assert not [line for line in told(running_job(faults={"slow": 1})) if line.startswith("Faults")]
 
 
 def test_recycling_is_listed_apart_from_recovering():
-    """It is planned: nothing has to be mended."""
-    lines = told(make_job(goodput={"stepping": 75, "recycling": 25}))
+    """Recycling is planned: nothing has to be repaired."""
+    lines = told(running_job(goodput={"stepping": 75, "recycling": 25}))
 
     assert "Time spent:     stepping 75%, recycling 25%" in lines
 
@@ -87,9 +87,9 @@ def test_recycling_is_listed_apart_from_recovering():
 def test_the_storage_of_the_run_is_shown():
     """It determines what is left when the job is deleted."""
     assert "Storage:       in the pod, deleted with it" in told(
-        make_job(spec={"storage": {"ephemeral": True}})
+        running_job(spec={"storage": {"ephemeral": True}})
     )
-    assert "Storage:       claim mine" in told(make_job(spec={"storage": {"existingClaim": "mine"}}))
+    assert "Storage:       claim mine" in told(running_job(spec={"storage": {"existingClaim": "mine"}}))
 
 
 def test_events_have_an_age_and_a_count():

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from palaestra.view import History, live
 from palaestra.view.history import MOST
-from tests.unit.view.jobs import NOW, make_job
+from tests.unit.view.jobs import NOW, running_job
 
 
 @pytest.fixture
@@ -27,9 +27,9 @@ def draw():
 
 def test_a_line_rises_as_training_goes_on(draw):
     """The height stands for success from 0 to 1."""
-    before = [make_job(step=step, successRate=rate) for step, rate in ((1000, 0.0), (2000, 0.5))]
+    before = [running_job(step=step, successRate=rate) for step, rate in ((1000, 0.0), (2000, 0.5))]
 
-    text = draw(make_job(step=3000, successRate=1.0), *before)
+    text = draw(running_job(step=3000, successRate=1.0), *before)
 
     assert "▁▅█" in text
     assert "100%" in text
@@ -37,9 +37,9 @@ def test_a_line_rises_as_training_goes_on(draw):
 
 def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
     """If the newest end of a line were cut off, the wrong values would be shown."""
-    before = [make_job(step=step, successRate=0.0) for step in range(MOST)]
+    before = [running_job(step=step, successRate=0.0) for step in range(MOST)]
 
-    text = draw(make_job(step=MOST, successRate=1.0), *before)
+    text = draw(running_job(step=MOST, successRate=1.0), *before)
 
     assert "▁" * (MOST - 1) + "█" in text
     assert all(len(line) <= 80 for line in text.splitlines())
@@ -47,7 +47,7 @@ def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
 
 def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
     """The reason of a state must be visible without another command."""
-    text = draw(make_job())
+    text = draw(running_job())
 
     assert "job  Running" in text
     assert "Because: so it is" in text
@@ -57,7 +57,7 @@ def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
 
 def test_a_job_that_nobody_has_seen_is_drawn(draw):
     """People run the command right after `kubectl apply`."""
-    job = make_job(step=None, target=None, simulators=[], lastCheckpoint=None)
+    job = running_job(step=None, target=None, simulators=[], lastCheckpoint=None)
     unseen = job.model_copy(update={"status": type(job.status)()})
 
     assert "not reconciled by an operator yet" in draw(unseen)
@@ -66,8 +66,8 @@ def test_a_job_that_nobody_has_seen_is_drawn(draw):
 def test_a_status_without_news_adds_nothing_to_the_history():
     """Ages change each second, but figures do not."""
     history = History()
-    history.add(make_job().status)
-    history.add(make_job().status)
+    history.add(running_job().status)
+    history.add(running_job().status)
 
     assert len(history.of(0)) == 1
 
@@ -76,7 +76,7 @@ def test_the_history_forgets_what_no_line_has_room_for():
     """A week of watching must not fill the memory."""
     history = History()
     for step in range(MOST + 5):
-        history.add(make_job(step=step).status)
+        history.add(running_job(step=step).status)
 
     assert len(history.of(0)) == MOST
     assert history.of(0)[0].step == 5

@@ -109,7 +109,7 @@ def test_an_error_can_be_taken_apart_and_sent_on() -> None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
-    """Whatever the file is, no other exception may come."""
+    """For any file, the reader may raise no other exception."""
     error = problem(lambda: parse(b"#VRML_SIM R2023b utf8\n" + data))
 
     assert error is None or (error.line >= 1 and error.column >= 1)

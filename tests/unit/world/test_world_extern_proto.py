@@ -107,7 +107,7 @@ def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> Non
     )
 
     assert refusals(result) == {
-        "A": "/project/worlds/B.proto:2:13: B and A are made of each other; remove A from B"
+        "A": "/project/worlds/B.proto:2:13: B and A contain each other; remove A from B"
     }
     assert "A" not in result.local
 
@@ -116,7 +116,7 @@ def test_a_proto_that_is_made_of_itself_is_refused() -> None:
     """The shortest cycle has one file."""
     result = found('EXTERNPROTO "A.proto"', {"/project/worlds/A.proto": proto("A", "A.proto")})
 
-    assert refusals(result)["A"].endswith("A is made of itself; remove A from A")
+    assert refusals(result)["A"].endswith("A contains itself; remove A from A")
 
 
 def test_a_chain_of_files_has_a_bounded_length() -> None:
@@ -175,8 +175,8 @@ def test_a_world_without_a_file_has_no_relative_addresses() -> None:
     error = local_protos(None, parse(source)).refused["Stool"]
 
     assert str(error) == (
-        'world:2:13: "Stool.proto" is relative to the file of the world, and this one has none; '
-        "begin it with webots:// or https://, or give the world as a file"
+        'world:2:13: "Stool.proto" is relative to the file of the world, and this world is not in a file; '
+        "begin the address with webots:// or https://, or give the world as a file"
     )
 
 

@@ -283,7 +283,7 @@ def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> No
     text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
 
     assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [
-        'my.wbt:2:13: "a.proto" is relative to the file of the world, and this one has none',
+        'my.wbt:2:13: "a.proto" is relative to the file of the world, and this world is not in a file',
         "my.wbt:3:57: 5 in controllerArgs is not a string",
         'my.wbt:4:1: a second robot is called "robotino" (2 places, in lines 4, 5)',
     ]
@@ -348,7 +348,7 @@ def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
         pytest.param(
             'EXTERNPROTO "../protos/Lamp.proto"',
             'my.wbt:2:13: "../protos/Lamp.proto" is relative to the file of the world, '
-            "and this one has none; begin it with webots:// or https://, or give the world as a file",
+            "and this world is not in a file; begin the address with webots:// or https://, or give",
             id="a relative PROTO",
         ),
         pytest.param(

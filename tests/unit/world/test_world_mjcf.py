@@ -79,9 +79,12 @@ def test_the_end_of_the_file_name_follows_from_the_content():
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        (b"<mujoco>", "world:1:9: the file is no well-formed XML: "),
+        (b"<mujoco>", "world:1:9: the file is not well-formed XML: "),
         (b"<robot/>", "world:1:1: the root of the file is <robot>; write a model of MuJoCo"),
-        (b"<mujoco/>", "world:1:1: the model has no actuator, so a trainer can move nothing; add <actuator>"),
+        (
+            b"<mujoco/>",
+            "world:1:1: the model has no actuator, so a trainer cannot move anything; add <actuator>",
+        ),
         (
             b'<!DOCTYPE m [<!ENTITY e SYSTEM "file:///etc/passwd">]>\n<mujoco>&e;</mujoco>',
             r"world:1:\d+: the file has a document type .*; remove it",
@@ -92,10 +95,13 @@ def test_the_end_of_the_file_name_follows_from_the_content():
         (with_custom(b'<text name="controllerArgs" data="__name:=x"/>'), "__name:=x in controllerArgs"),
         (
             with_custom(b'<numeric name="basicTimeStep" data="7"/>', b'<option timestep="0.005"/>'),
-            "basicTimeStep 7 is no multiple of the timestep of 0.005 s in whole ms; write 5",
+            "basicTimeStep 7 is not a multiple of the timestep of 0.005 s in whole ms; write 5",
         ),
-        (with_custom(b"", b'<option timestep="x"/>'), "the timestep is no positive number; write seconds"),
-        (with_custom(b'<text name="device:motor/x" data="y"/>'), "'device:motor/x' names no device; write"),
+        (with_custom(b"", b'<option timestep="x"/>'), "the timestep is not a positive number; write seconds"),
+        (
+            with_custom(b'<text name="device:motor/x" data="y"/>'),
+            "'device:motor/x' does not name a device; write",
+        ),
     ],
 )
 def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
@@ -133,7 +139,7 @@ def test_a_path_that_leads_above_the_world_is_fine():
     [("0.00831", "0.008 or 0.009"), ("0.0123", "0.012 or 0.013"), ("1e-09", "1e-05 or 1.0101e-05")],
 )
 def test_a_timestep_that_makes_no_short_step_is_refused_with_those_that_do(timestep, near):
-    """A basic step of two seconds was accepted before, at which no robot could be driven."""
+    """A basic step is whole milliseconds, at most 100, and has a limited number of MuJoCo's steps."""
     with pytest.raises(WorldError, match=f"fits the timestep of {timestep} s; write {near}"):
         check(with_custom(b"", f'<option timestep="{timestep}"/>'.encode()))
 
@@ -163,6 +169,8 @@ GROWING = [
     ('<hfield nrow="100000" ncol="100000"/>', "<hfield> makes 1e+10"),
     ('<texture builtin="flat" width="100000" height="100000"/>', "<texture> makes 1e+10"),
     ('<camera resolution="100000 100000"/>', "<camera> makes 1e+10"),
+    ('<mesh builtin="supersphere" params="100000 1 1"/>', "<mesh> makes 1e+10"),
+    ('<size nuserdata="1000000000"/>', "<size> makes 1e+09"),
 ]
 
 
@@ -185,5 +193,7 @@ def test_files_beside_the_world_need_a_world_with_a_file():
     source = with_custom(b"", b'<asset><mesh file="meshes/arm.obj"/></asset>')
 
     check(source, relative_addresses=True)
-    with pytest.raises(WorldError, match="relative to the file of the world, and this one has none; give"):
+    with pytest.raises(
+        WorldError, match="relative to the file of the world, and this world is not in a file; give"
+    ):
         check(source)

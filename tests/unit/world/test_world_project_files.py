@@ -12,7 +12,7 @@ WORLD = b"#VRML_SIM R2023b utf8\n"
 
 @pytest.fixture
 def project(tmp_path):
-    """Return the folder of a world in a project, with one file beside it and one beside the folder."""
+    """Return the folder of a world in a project, with one file next to it and one next to the folder."""
     folder = tmp_path / "football" / "worlds"
     (folder / "textures").mkdir(parents=True)
     (folder / "textures" / "line.png").write_bytes(b"line")
@@ -53,7 +53,7 @@ def test_an_address_in_a_proto_counts_from_the_file_of_the_proto(project):
 )
 def test_a_file_outside_of_the_project_is_not_read(project, address):
     """A world of a stranger must not read files of the pod."""
-    with pytest.raises(OSError, match=r"outside|no path"):
+    with pytest.raises(OSError, match=r"outside|not a path"):
         read(project, address)
 
 
@@ -68,7 +68,7 @@ def test_the_whole_file_system_is_no_project(project):
 
 
 def test_a_link_that_leads_out_of_the_project_is_not_followed(project, tmp_path):
-    """Neither one to a file, nor one to a folder."""
+    """This holds for links to files and to folders."""
     (project / "textures" / "other.png").symlink_to(tmp_path / "secret.png")
     (project / "up").symlink_to("../..")
 
@@ -82,12 +82,12 @@ def test_what_is_no_regular_file_is_not_read(project):
     os.mkfifo(project / "pipe.png")
 
     for address in ("pipe.png", "textures"):
-        with pytest.raises(OSError, match="no regular file"):
+        with pytest.raises(OSError, match="not a regular file"):
             read(project, address)
 
 
 def test_the_links_of_a_generated_world_lead_to_the_source_project(project, tmp_path):
-    """The sidecar links what is beside the source world; from there, nothing leads on."""
+    """The sidecar links the files next to the source world; from there, nothing leads on."""
     generated = tmp_path / "work" / "project" / "worlds"
     generated.mkdir(parents=True)
     (generated / "textures").symlink_to(project / "textures")

@@ -113,12 +113,18 @@ def test_a_world_still_has_no_is() -> None:
         (declaring("field SFBool 1 TRUE"), "3:14: 1 where the name of a SFBool of Stool should be"),
         (declaring('field SFString{"a" x "b"'), '3:22: "b" where the "{" of x should be'),
         ('PROTO Stool [ field SFString{"a"', '2:29: the "{" of SFString is never closed'),
-        (declaring("field SFVec3f a 0 0"), "3:17: the default of a is no SFVec3f; write 0 0 0"),
-        (declaring("field SFVec3f a [ 0 0 0 ]"), "3:17: the default of a is no SFVec3f"),
-        (declaring("field MFVec2f a [ 0 0 0 ]"), "3:17: the default of a is no MFVec2f; write [ 0 0 ]"),
-        (declaring("field SFBool a 1"), "3:16: the default of a is no SFBool; write TRUE"),
-        (declaring("field SFNode a FALSE"), "3:16: the default of a is no SFNode; write NULL"),
-        (declaring("field MFString a [ 1 ]"), '3:18: the default of a is no MFString; write [ "text" ]'),
+        (declaring("field SFVec3f a 0 0"), "3:17: the default of a is not of type SFVec3f; write 0 0 0"),
+        (declaring("field SFVec3f a [ 0 0 0 ]"), "3:17: the default of a is not of type SFVec3f"),
+        (
+            declaring("field MFVec2f a [ 0 0 0 ]"),
+            "3:17: the default of a is not of type MFVec2f; write [ 0 0 ]",
+        ),
+        (declaring("field SFBool a 1"), "3:16: the default of a is not of type SFBool; write TRUE"),
+        (declaring("field SFNode a FALSE"), "3:16: the default of a is not of type SFNode; write NULL"),
+        (
+            declaring("field MFString a [ 1 ]"),
+            '3:18: the default of a is not of type MFString; write [ "text" ]',
+        ),
         (declaring("field SFBool a IS b"), "3:16: IS outside the body of the PROTO; write the value of a"),
         (declaring("field SFBool a TRUE\nfield SFBool a TRUE"), "4:1: Stool declares the field a twice"),
         (
@@ -185,7 +191,7 @@ def problem(data: bytes) -> WorldError | None:
 
 @given(st.binary())
 def test_arbitrary_bytes_are_a_proto_or_a_world_error(data: bytes) -> None:
-    """Whatever the file is, no other exception may come."""
+    """For any file, the reader may raise no other exception."""
     error = problem(HEADER.encode() + data)
 
     assert error is None or (error.line >= 1 and error.column >= 1)

@@ -16,13 +16,34 @@ from palaestra_sim.world import Node, World, builtin, parse
 
 PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
 ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
+CARS = ("BmwX5",)
 LIDARS = {
     "HokuyoUrg04lx": (240, 667, 0.06, 4.095),
     "HokuyoUrg04lxug01": (240, 667, 0.2, 5.6),
     "HokuyoUtm30lx": (270, 1080, 0.1, 30),
+    "RpLidarA2": (89.954, 800, 0.2, 12),
     "SickLms291": (180, 180, None, 80),
+    "SickS300": (270, 540, None, 30),
+    "VelodynePuck": (360, 3600, 1, 100),
+    "VelodyneVLP-16": (360, 3600, 1, 100),
+    "VelodyneHDL-32E": (90, 4500, 1, 70),
+    "VelodyneHDL-64E": (90, 4500, 0.8, 120),
 }
-PARTS = ("CharacterSkin", "E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS)
+# Layers, the elevation of the highest and of the lowest in degrees, and the noise in meters.
+LAYERS = {
+    "VelodynePuck": (16, 15, -15, 0.03),
+    "VelodyneVLP-16": (16, 15, -15, 0.03),
+    "VelodyneHDL-32E": (32, 0.7, -40.7, 0.02),
+    "VelodyneHDL-64E": (64, 2, -24.8, 0.02),
+}
+# The range in meters by the data sheet, and the volts at its two ends.
+INFRARED = {
+    "SharpGP2D120": ((0.04, 2.72), (0.3, 0.42)),
+    "SharpGP2Y0A02YK0F": ((0.2, 2.51), (1.5, 0.45)),
+    "SharpGP2Y0A41SK0F": ((0.04, 2.72), (0.3, 0.42)),
+    "SharpGP2Y0A710K0F": ((1.0, 2.5), (5.5, 1.37)),
+}
+PARTS = ("CharacterSkin", "E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS, *INFRARED)
 
 COMMON = "translation rotation name controller controllerArgs customData supervisor synchronization"
 FIELDS = {
@@ -34,6 +55,10 @@ FIELDS = {
     "Robotino3": "model window selfCollision topSlot bodySlot cameraSlot middleSlot bottomSlot "
     "infraredSensorModel",
     "TurtleBot3Burger": "extensionSlot",
+    "BmwX5": "color engineSound windshieldWipers frontSpotLights rearMirror leftWingMirror rightWingMirror "
+    "mirrorFar sensorsSlotFront sensorsSlotRear sensorsSlotTop sensorsSlotCenter interior "
+    "dynamicSpeedDisplay indicatorLevers steeringWheel completeInterior shifter "
+    "outerWindowTransparency innerWindowTransparency innerWindowDust window",
 }
 NAMES = {
     "E-puck": "e-puck",
@@ -41,12 +66,16 @@ NAMES = {
     "Pioneer3dx": "Pioneer 3-DX",
     "Robotino3": "Robotino 3",
     "TurtleBot3Burger": "TurtleBot3Burger",
+    "BmwX5": "vehicle",
 }
 # Fields that choose among variants; only the default variant is described.
 WITHOUT_EFFECT = {
     "E-puck": {"version", "kinematic"},
     "Robotino3": {"infraredSensorModel"},
     "CharacterSkin": {"model"},
+    "VelodynePuck": {"version"},
+    "BmwX5": set(FIELDS["BmwX5"].split())
+    - {"window", "sensorsSlotFront", "sensorsSlotRear", "sensorsSlotTop", "sensorsSlotCenter"},
 }
 
 TWO = ("left wheel", "right wheel")
@@ -66,10 +95,20 @@ DEVICES = {
     | {"accelerometer", "compass", "gyro", "inertial unit", "touch sensor"},
     "TurtleBot3Burger": {f"{it} {part}" for it in TWO for part in ("motor", "sensor")}
     | {"accelerometer", "gyro", "compass"},
+    "BmwX5": {f"{it}_{part}" for it in ("left", "right") for part in ("steer", "steer_sensor", "wiper_motor")}
+    | {
+        f"{it}_{end}_{part}"
+        for it in ("left", "right")
+        for end in ("front", "rear")
+        for part in ("sensor", "brake")
+    }
+    | {"left_front_wheel", "right_front_wheel", "wiper_sensor", "engine_speaker"}
+    | {f"{it}_lights" for it in ("front", "antifog", "brake", "rear", "backwards")}
+    | {"right_indicators", "left_indicators"},
 }
 TYPES_OF_DEVICES = {
-    "Accelerometer", "Camera", "Compass", "DistanceSensor", "Emitter", "Gyro", "InertialUnit", "LED", "Lidar",
-    "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Skin", "Speaker", "TouchSensor",
+    "Accelerometer", "Brake", "Camera", "Compass", "DistanceSensor", "Emitter", "Gyro", "InertialUnit", "LED",
+    "Lidar", "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Skin", "Speaker", "TouchSensor",
 }  # fmt: skip
 # Nodes that need no PROTO of Webots and no file of its installation.
 PLAIN = TYPES_OF_DEVICES | {
@@ -78,7 +117,9 @@ PLAIN = TYPES_OF_DEVICES | {
 }  # fmt: skip
 
 _FILE = re.compile(r"PROTO (?P<name>\S+) \[\n(?P<fields>.*?)\n\]\n\{\n(?P<body>.*)\}\n\Z", re.DOTALL)
-_FIELD = re.compile(r"field\s+\w+\s+(?P<name>\w+)\s+(?P<default>[^\n]*?)(?:\s{2}#[^\n]*)?$", re.MULTILINE)
+_FIELD = re.compile(
+    r"field\s+\w+(?:\{[^}]*\})?\s+(?P<name>\w+)\s+(?P<default>[^\n]*?)(?:\s{2}#[^\n]*)?$", re.MULTILINE
+)
 _IS = re.compile(r"\bIS (\w+)")
 
 
@@ -174,27 +215,28 @@ def test_each_description_is_of_the_proto_that_its_file_is_named_after() -> None
     """A world names a PROTO, and its file is found by that name."""
     files = sorted(path.stem for path in PROTOS.glob("*.proto"))
 
-    assert files == sorted(ROBOTS + PARTS)
+    assert files == sorted(ROBOTS + CARS + PARTS)
     assert [described(name).name for name in files] == files
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_world_can_set_every_documented_field(name: str) -> None:
     """No other field is accepted: a misspelled field is an error in Webots too."""
-    assert set(described(name).defaults) == set(COMMON.split()) | set(FIELDS[name].split())
+    common = set(COMMON.split()) - ({"customData"} if name in CARS else set())
+    assert set(described(name).defaults) == common | set(FIELDS[name].split())
 
 
-@pytest.mark.parametrize("name", ROBOTS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
     """The body uses all other fields, so they have the same effect as in Webots."""
     description = described(name)
-    is_lidar = name == "RobotisLds01" or name.startswith("Hokuyo")
-    without = {"enablePhysics"} if is_lidar else WITHOUT_EFFECT.get(name, set())
+    is_light = name in {"RobotisLds01", "SickS300"} or name.startswith(("Hokuyo", "Velodyne"))
+    without = ({"enablePhysics"} if is_light else set()) | WITHOUT_EFFECT.get(name, set())
 
     assert set(description.defaults) - description.used == without
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_robot_has_its_documented_name(name: str) -> None:
     """ROS names are made from it."""
     (robot,) = described(name).body.nodes
@@ -203,7 +245,7 @@ def test_a_robot_has_its_documented_name(name: str) -> None:
     assert robot.text("name") == NAMES[name]
 
 
-@pytest.mark.parametrize("name", ROBOTS + PARTS)
+@pytest.mark.parametrize("name", ROBOTS + CARS + PARTS)
 def test_descriptions_need_no_other_file_and_draw_nothing(name: str) -> None:
     """They are for simulators without Webots' files. Only a lidar is another description."""
     description = described(name)
@@ -237,7 +279,34 @@ def test_a_lidar_has_the_documented_rays(name: str) -> None:
     assert numbers(lidar, "maxRange") == (farthest,)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", LAYERS)
+def test_a_lidar_of_many_layers_looks_up_and_down_as_documented(name: str) -> None:
+    """The tilt moves all layers; the noise is a share of the range."""
+    (lidar,) = described(name).body.nodes
+    layers, highest, lowest, noise_m = LAYERS[name]
+    (tilt,), (high,) = lidar.numbers("tiltAngle") or (0.0,), numbers(lidar, "verticalFieldOfView")
+
+    assert numbers(lidar, "numberOfLayers") == (layers,)
+    assert [math.degrees(tilt + it * high) for it in (0.5, -0.5)] == pytest.approx(
+        [highest, lowest], abs=0.05
+    )
+    assert numbers(lidar, "noise")[0] * LIDARS[name][3] == pytest.approx(noise_m, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", INFRARED)
+def test_an_infra_red_sensor_returns_the_volts_of_its_data_sheet(name: str) -> None:
+    """The farther an object is, the lower is the voltage, also beyond the range."""
+    (sensor,) = described(name).body.nodes
+    table = numbers(sensor, "lookupTable")
+    distances, volts = table[::3], table[1::3]
+
+    assert sensor.text("type") is None
+    assert set(INFRARED[name]) <= set(zip(distances, volts, strict=True))
+    assert sorted(distances) == list(distances)
+    assert sorted(volts, reverse=True) == list(volts)
+
+
+@pytest.mark.parametrize("name", ROBOTS + CARS)
 def test_a_robot_has_the_documented_devices(name: str) -> None:
     """Each occurs once, because programs look them up by name."""
     devices = of_type(described(name).body.walk(), *TYPES_OF_DEVICES)
@@ -340,3 +409,21 @@ def test_the_robotino_is_the_one_of_the_arena() -> None:
     for name, sensor in theirs.items():
         assert numbers(sensor, "lookupTable") == numbers(ours[name], "lookupTable")
         assert numbers(sensor, "translation") == pytest.approx(numbers(ours[name], "translation"), abs=1e-3)
+
+
+def test_the_car_has_the_wheels_that_its_documentation_names() -> None:
+    """A client computes the angles of the front wheels from wheelbase and track."""
+    body = described("BmwX5").body
+    wheels = {
+        wheel.text("name"): wheel
+        for wheel in of_type(body.walk(), "Solid")
+        if (wheel.text("name") or "").endswith("wheel")
+    }
+    hubs = [it for it in of_type(body.walk(), "Solid") if (it.text("name") or "").endswith("hub")]
+    rear = {numbers(wheels[f"rear {it} wheel"], "translation")[1] for it in ("left", "right")}
+
+    assert {numbers(it, "translation") for it in hubs} == {(2.995, 0.814, 0), (2.995, -0.814, 0)}
+    assert rear == {0.814, -0.814}
+    assert {
+        numbers(it, "radius") for wheel in wheels.values() for it in of_type(within(wheel, body), "Cylinder")
+    } == {(0.374,)}

@@ -211,25 +211,28 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[A", "mine.toml: this is no TOML: "),
-        ('flat = "A"', 'mine.toml: flat: this is no list of types; write ["Carpet"], before the first table'),
-        ("drawn = [1]", "mine.toml: drawn: this is no list of types"),
+        ("[A", "mine.toml: this is not TOML: "),
+        (
+            'flat = "A"',
+            'mine.toml: flat: this is not a list of types; write ["Carpet"], before the first table',
+        ),
+        ("drawn = [1]", "mine.toml: drawn: this is not a list of types"),
         ('flat = ["A"]\n[A]\nbox = [1, 1, 1]', "mine.toml: A: it is also in a list; keep one of the two"),
-        ("A = 1", "mine.toml: A: this is no table; write [A] and its shape"),
+        ("A = 1", "mine.toml: A: this is not a table; write [A] and its shape"),
         (
             "[A]",
             "mine.toml: A: shape: it has 0 shapes; write one of box, cylinder, plane, ring, sphere, wall",
         ),
         ("[A]\nbox = [1, 1, 1]\nsphere = 1", "mine.toml: A: shape: it has 2 shapes; write one of"),
-        ("[A]\nsize = 1", "mine.toml: A: size: there is no such key; choose of at, box, cylinder, origin"),
+        ("[A]\nsize = 1", "mine.toml: A: size: it is not a key here; choose from at, box, cylinder, origin"),
         (
             "[A]\nbox = [1, 1]",
-            "mine.toml: A: box: it has no 3 lengths; write them in a list, or the name of a field",
+            "mine.toml: A: box: it does not have 3 lengths; write them in a list, or the name of a field",
         ),
-        ("[A]\nplane = [1, 1, 1]", "mine.toml: A: plane: it has no 2 lengths"),
+        ("[A]\nplane = [1, 1, 1]", "mine.toml: A: plane: it does not have 2 lengths"),
         (
             "[A]\nsphere = true",
-            "mine.toml: A: sphere: True is no length; write a number, the name of a field, or a",
+            "mine.toml: A: sphere: True is not a length; write a number, the name of a field, or a",
         ),
         (
             "[A]\ncylinder = 1",
@@ -245,17 +248,20 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
         ),
         (
             '[A]\nfields = "SFVec2f size 1 1"\nbox = "size"',
-            "mine.toml: A: box: size.z is no number of SFVec2f size; name one, such as size.x",
+            "mine.toml: A: box: size.z is not a number of SFVec2f size; name one, such as size.x",
         ),
         (
             '[A]\nfields = "SFVec3f size 1 1 1"\nsphere = "size"',
-            "mine.toml: A: sphere: size is no number of SFVec3f size; name one, such as size.x",
+            "mine.toml: A: sphere: size is not a number of SFVec3f size; name one, such as size.x",
         ),
         ('[A]\nfields = "SFString s \'\'"\nsphere = "s"', "mine.toml: A: fields: in its line 1: "),
-        ('[A]\nfields = "MFFloat s []"\nsphere = "s"', "mine.toml: A: sphere: s is no number of MFFloat s"),
+        (
+            '[A]\nfields = "MFFloat s []"\nsphere = "s"',
+            "mine.toml: A: sphere: s is not a number of MFFloat s",
+        ),
         (
             "[A]\nfields = 1\nsphere = 1",
-            "mine.toml: A: fields: this is no text; declare fields as SFVec3f size 1 1 1",
+            "mine.toml: A: fields: this is not text; declare fields as SFVec3f size 1 1 1",
         ),
         (
             "[A]\nfields = '''\nSFFloat a 1\nSFFloat b x\n'''\nsphere = 1",
@@ -263,16 +269,16 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
         ),
         (
             '[A]\nsphere = "1 +"',
-            "mine.toml: A: sphere: '1 +' is no formula; write numbers and fields with + - * / ( )",
+            "mine.toml: A: sphere: '1 +' is not a formula; write numbers and fields with + - * / ( )",
         ),
         (
             '[A]\nsphere = "1 % 2"',
-            "mine.toml: A: sphere: '% 2' in '1 % 2' is no part of a formula; write numbers",
+            "mine.toml: A: sphere: '% 2' in '1 % 2' is not part of a formula; write numbers",
         ),
-        ('[A]\nsphere = 1\nat = "0"', "mine.toml: A: at: '0.x' is no formula"),
+        ('[A]\nsphere = 1\nat = "0"', "mine.toml: A: at: '0.x' is not a formula"),
         (
             '[A]\nsphere = 1\norigin = "top"',
-            'mine.toml: A: origin: \'top\' is no origin; write "center", or "base"',
+            'mine.toml: A: origin: \'top\' is not an origin; write "center", or "base"',
         ),
         ('[A]\nsphere = 1\nwhen = "on"', "mine.toml: A: when: A has no field on; declare it in fields"),
         (
@@ -280,7 +286,10 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
             "mine.toml: A: flat: it has a shape too, or is not true; write flat = true alone",
         ),
         ("[A]\ndrawn = true\nsphere = 1", "mine.toml: A: drawn: it has a shape too, or is not true"),
-        ("[A]\nparts = 1", "mine.toml: A: parts: it is no list of tables, or not alone; write [ { box ="),
+        (
+            "[A]\nparts = 1",
+            "mine.toml: A: parts: it is not a list of tables, or not the only key; write [ { box =",
+        ),
         ("[A]\nparts = [ { } ]", "mine.toml: A: parts[0]: it has 0 shapes; write one of"),
         (
             '[A]\nparts = [ { sphere = 1 }, { sphere = "r" } ]',
@@ -288,7 +297,7 @@ def test_a_users_file_is_what_the_manual_shows() -> None:
         ),
         (
             '[A]\nwall = { path = "p", thickness = 1, height = 1 }',
-            "mine.toml: A: wall: its path is no field with a list of points; declare MFVec3f path [ … ]",
+            "mine.toml: A: wall: its path is not a field with a list of points; declare MFVec3f path [ … ]",
         ),
     ],
 )
@@ -318,7 +327,7 @@ def test_a_formula_is_arithmetic_over_fields(text: object, value: float) -> None
 
 @given(st.one_of(st.text(max_size=60), st.text("0.5abx+-*/() ", max_size=300), st.floats(), st.none()))
 def test_any_formula_is_read_or_refused(written: object) -> None:
-    """Whatever a user writes, no other exception may come."""
+    """For any text of a user, the reader may raise no other exception."""
     try:
         formula = parse_formula(written)
     except ValueError as error:

@@ -137,7 +137,12 @@ def test_the_algorithm_is_the_given_one_else_the_files(file, algorithm, name):
         (OFF_POLICY, "ars.yml", {}, "ars cannot be used: ARS learns from whole returns, which rows of"),
         (OFF_POLICY, "mine.yml", {}, "mine.yml: its name is not an algorithm; give one as --algorithm: DQN"),
         (OFF_POLICY, "sac.yml", {"algorithm": "SAK"}, "--algorithm: SAK is not an algorithm; give one as"),
-        ("n_timesteps: 5", "sac.yml", {}, "sac.yml: has the words of one environment and no id; give it as"),
+        (
+            "n_timesteps: 5",
+            "sac.yml",
+            {},
+            "sac.yml: has the hyperparameters of one environment and no id; give it as",
+        ),
         ("a-v1: {gamma: 1}", "sac.yml", {}, "sac.yml: the entry a-v1 has no n_timesteps; add it"),
         ("a-v1: [1]", "sac.yml", {}, "sac.yml: the entry a-v1 is not a mapping"),
         ("- 1", "sac.yml", {}, "sac.yml: has no entries by environment"),

@@ -94,7 +94,7 @@ def test_a_bumper_has_nothing_to_become_nan():
 
 
 def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
-    """The stream stays in step, and the next message is correct."""
+    """The reader still finds the start of the next message, which is correct."""
     sound = message("sensor_msgs/Range", range=1.5)
 
     short = payload(damaged_message("sensor_msgs/Range", sound, WRONG_SHAPE))
@@ -169,7 +169,7 @@ def test_an_answer_cut_short_has_no_value_to_replace(service):
 
 
 def test_a_failure_stays_as_it_is():
-    """Its text is not data."""
+    """The text of a failure is not data, so faults do not corrupt it."""
     codec = service_type("webots_ros/get_float").response
     failure = b"\0" + frame(b"no such node")
 

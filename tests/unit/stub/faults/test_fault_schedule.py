@@ -41,7 +41,7 @@ def test_a_probability_is_a_share_of_the_steps(schedule):
 
 
 def test_probability_0_is_never_and_1_is_always(schedule):
-    """These are the ends of a sweep."""
+    """A sweep over probabilities may include both ends."""
     assert happenings(schedule("crash:probability=0")) == []
     assert happenings(schedule("crash:probability=1")) == list(STEPS)
 

@@ -122,7 +122,7 @@ def test_messages_belong_to_the_step_before_them(course):
 
 
 def test_a_message_can_be_late_and_wrong_at_once(course):
-    """All faults of one message apply."""
+    """All faults that a message meets apply."""
     life = course("late:latency_ms=20 late:latency_ms=30 wrong_value wrong_shape:topic=ir*")
     life.request("robotino", STEP)
 

@@ -100,7 +100,7 @@ def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name
 @pytest.mark.parametrize("name", ["env", "seed", "optimize_memory_usage", "device"])
 def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
     """Otherwise a file could disable the code that keeps invalid rows out."""
-    with pytest.raises(ConfigurationError, match=f"{name}: is no hyperparameter here"):
+    with pytest.raises(ConfigurationError, match=f"{name}: is not a hyperparameter here"):
         check(Algorithm(name="DQN", hyperparameters={name: 1}))
 
 
@@ -142,7 +142,7 @@ def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparamete
 
 
 def test_what_yaml_cannot_say_has_words(make_env):
-    """These are a schedule, a tuple, and classes of PyTorch by name."""
+    """YAML has no schedules, tuples or classes of PyTorch, so a job names them by words."""
     policy = {"net_arch": [8], "activation_fn": "elu", "optimizer_class": "AdamW"}
     words = {"learning_rate": "lin_0.25", "train_freq": [1, "episode"], "policy_kwargs": policy}
     check(Algorithm(name="DQN", hyperparameters=words))
@@ -412,9 +412,9 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
         check(given)
 
     assert str(refused.value).splitlines() == [
-        "algorithm.hyperparameters.n_timesteps: is no hyperparameter here; write trainer.steps",
-        "algorithm.hyperparameters.policy: is no hyperparameter here; write trainer.algorithm.policy",
-        "algorithm.hyperparameters.seed: is no hyperparameter here; write spec.seed",
+        "algorithm.hyperparameters.n_timesteps: is not a hyperparameter here; write trainer.steps",
+        "algorithm.hyperparameters.policy: is not a hyperparameter here; write trainer.algorithm.policy",
+        "algorithm.hyperparameters.seed: is not a hyperparameter here; write spec.seed",
         (
             "algorithm.hyperparameters: has words of RL-Baselines3-Zoo; "
             "`palaestra from-zoo FILE` writes a job from a whole file of RL-Baselines3-Zoo"
@@ -438,17 +438,17 @@ def test_words_of_other_projects_are_refused_with_their_place_here():
         (
             "DQN",
             "optimize_memory_usage",
-            "is no hyperparameter here; a run stores next observations, as with",
+            "is not a hyperparameter here; a run stores next observations, as with",
         ),
         ("REINFORCE", "rollout_buffer_class", "REINFORCE has no such hyperparameter, unlike PPO, A2C, TRPO"),
         ("PPO", "log_std_init", "is an argument of the policy; write it in policy_kwargs.log_std_init"),
         ("PPO", "lr", "PPO has no such hyperparameter; write learning_rate"),
         ("A2C", "cliprange", "A2C has no such hyperparameter; use one of"),
-        ("SAC", "save_freq", "is no hyperparameter here; write trainer.checkpoint.everySteps"),
+        ("SAC", "save_freq", "is not a hyperparameter here; write trainer.checkpoint.everySteps"),
         (
             "TRPO",
             "max_steps",
-            "is no hyperparameter here; write trainer.steps, or trainer.environment.options",
+            "is not a hyperparameter here; write trainer.steps, or trainer.environment.options",
         ),
         ("DQN", "rollout_steps", "DQN has no such hyperparameter; use one of"),
     ],

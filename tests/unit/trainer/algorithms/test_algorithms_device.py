@@ -22,7 +22,8 @@ TINY = {"policy_kwargs": {"net_arch": [8]}}
 OFF_POLICY = TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200}
 ALGORITHMS = {
     "DQN": OFF_POLICY,
-    "SAC": OFF_POLICY | {"use_sde": True},  # its noise is drawn before a boundary, on the device
+    # With use_sde, SAC draws exploration noise on the device before each rollout.
+    "SAC": OFF_POLICY | {"use_sde": True},
     "PPO": TINY | {"n_steps": 16, "batch_size": 8},
     "A2C": TINY,
     "REINFORCE": TINY | {"episodes_per_update": 2},

@@ -80,7 +80,7 @@ def test_a_figure_that_is_no_loss_may_be_unknown(model):
 
 
 def test_very_large_numbers_are_numbers(model):
-    """Their norm is infinite, but each of them is finite."""
+    """The norm of a tensor may be infinite although each of its numbers is finite."""
     made = model("PPO")
     with torch.no_grad():
         for parameter in made.policy.parameters():

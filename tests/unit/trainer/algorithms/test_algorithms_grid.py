@@ -6,6 +6,7 @@ import io
 import json
 import os
 import signal
+import threading
 import zipfile
 
 import numpy as np
@@ -24,6 +25,7 @@ from tools.algorithms import refusal
 pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
+PATIENCE_S = 30.0
 STEPS = 26  # three rollouts of an on-policy algorithm
 # At this step of the first of two simulators, on-policy algorithms are in their second rollout, and
 # off-policy ones already learn.
@@ -88,6 +90,8 @@ def play(make_member, make_configuration, tmp_path):
             first = members[0]
             first.env = first_task(OBSERVATIONS[seen], ACTIONS[acted], deaths, taken, signal_at)
             first.restart = first.env.restart
+            for other in members[1:]:
+                other.env.step = after_restart(first, other.env.step)
             return members
 
         configuration = make_configuration(
@@ -123,6 +127,22 @@ class MaskedInterrupted(Interrupted, MaskedTask):
 
 
 KINDS = {"MaskablePPO": (MaskedTask, MaskedInterrupted)}
+
+
+def after_restart(member, step):
+    """Return the step of another simulator, which first waits for the end of the member's restart.
+
+    Without it, a slow machine takes all steps of the run there before the member is up again.
+    """
+
+    def patient(action):
+        for thread in threading.enumerate():
+            if thread.name == f"restarter-{member.name}":
+                thread.join(PATIENCE_S)
+                assert not thread.is_alive()
+        return step(action)
+
+    return patient
 
 
 def tensors(path):

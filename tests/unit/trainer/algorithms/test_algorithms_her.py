@@ -247,7 +247,7 @@ def test_its_size_is_computed_before_it_exists():
     [
         (
             {"replay_buffer_class": "Her"},
-            "replay_buffer_class: 'Her' is no buffer; write HerReplayBuffer or module:Class",
+            "replay_buffer_class: 'Her' is not a buffer; write HerReplayBuffer or module:Class",
         ),
         ({"replay_buffer_kwargs": {}}, "has no effect without replay_buffer_class"),
         ({"replay_buffer_kwargs": 4}, "replay_buffer_kwargs: 4 is refused; give a mapping"),

@@ -222,8 +222,8 @@ def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp
 @pytest.mark.parametrize(
     ("saved", "wanted", "fact"),
     [
-        ({}, None, "algorithm.normalize is not set, unlike there"),
-        (None, {}, "algorithm.normalize is set, unlike there"),
+        ({}, None, "algorithm.normalize is not set, unlike in the checkpoint"),
+        (None, {}, "algorithm.normalize is set, unlike in the checkpoint"),
         ({"observations": False}, {}, "it normalizes rewards"),
         ({}, {"observations": False}, "it normalizes observations and rewards"),
         ({}, {"clip_observations": 5.0}, "it clips elsewhere"),

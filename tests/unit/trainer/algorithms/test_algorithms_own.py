@@ -222,8 +222,8 @@ REFUSED = [
         "Search is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so rows that a fault",
     ),
     ("HER", "HER cannot be used: HER is a replay buffer; use SAC"),
-    ("my_lab:Doubled", "my_lab:Doubled is no subclass of BaseAlgorithm; name a class that is one"),
-    ("my_lab:no_class", "my_lab:no_class is no subclass of BaseAlgorithm"),
+    ("my_lab:Doubled", "my_lab:Doubled is not a subclass of BaseAlgorithm; name a class that is one"),
+    ("my_lab:no_class", "my_lab:no_class is not a subclass of BaseAlgorithm"),
     ("my_lab:Missing", "my_lab:Missing cannot be imported .* has no attribute 'Missing'"),
     ("no_lab:Any", "no_lab:Any cannot be imported .* install its package in the image, or add its folder"),
 ]
@@ -318,10 +318,10 @@ def test_a_network_that_writes_into_its_input_changes_no_row(lab, make, name, pa
     ("algorithm", "fact"),
     [
         ({"policy": "MlpPolice"}, r"algorithm\.policy: PPO has no policy MlpPolice; did you mean MlpPolicy"),
-        ({"policy": "my_lab:Calm"}, r"algorithm\.policy: my_lab:Calm is no subclass of BasePolicy"),
+        ({"policy": "my_lab:Calm"}, r"algorithm\.policy: my_lab:Calm is not a subclass of BasePolicy"),
         (
             {"hyperparameters": {"policy_kwargs": {"features_extractor_class": "my_lab:Calm"}}},
-            r"policy_kwargs\.features_extractor_class: my_lab:Calm is no subclass of BaseFeaturesExtractor",
+            r"policy_kwargs\.features_extractor_class: my_lab:Calm is not a subclass of BaseFeatures",
         ),
         (
             {"hyperparameters": {"policy_kwargs": {"optimizer_class": "my_lab:Fast"}}},
@@ -367,7 +367,7 @@ SHARES = {1.0: 0.01, 0.75: 0.006, 0.5: 0.002, 0.375: 0.003, 0.2: 0.004, 0.0: 0.0
 
 
 def test_a_schedule_may_have_points(make):
-    """They are joined by straight lines; before the first and after the last the value is constant."""
+    """Straight lines join the points; before the first and after the last point the value is constant."""
     wanted = Algorithm(
         name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS, "clip_range": "lin_0.3"}
     )

@@ -247,7 +247,7 @@ def _refusal(act):
 REFUSED = [
     ("DQN", {"replay_buffer_class": "buffer_lab:Steps"}, "Steps reads the rows after a row"),
     ("DQN", {"replay_buffer_class": "stable_baselines3:HerReplayBuffer"}, "use HerReplayBuffer by its name"),
-    ("DQN", {"replay_buffer_class": "buffer_lab:Greedy"}, "is no subclass of ReplayBuffer"),
+    ("DQN", {"replay_buffer_class": "buffer_lab:Greedy"}, "is not a subclass of ReplayBuffer"),
     ("DQN", {"replay_buffer_class": "buffer_lab:Missing"}, "cannot be imported"),
     ("DQN", {"replay_buffer_class": "Prioritized"}, "write HerReplayBuffer or module:Class"),
     (

@@ -139,7 +139,7 @@ def test_the_memory_restarts_with_the_first_valid_row(model):
 
 
 def test_an_evaluation_keeps_the_memory_of_an_episode(model, make_member):
-    """It lasts from step to step, but not from one episode to the next."""
+    """The memory lasts from step to step, but not from one episode to the next."""
     first, again = (evaluate(policy_of(model), make_member(), [seed]) for seed in (5, 5))
     both = evaluate(policy_of(model), make_member(), [3, 5])
 

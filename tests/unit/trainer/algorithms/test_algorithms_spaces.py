@@ -18,7 +18,6 @@ from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.telemetry.display import Lines
 from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.testing import FakeTask
 
@@ -82,7 +81,7 @@ def play(members, make_configuration, tmp_path):
             return made
 
         simulators = [(entry.name, entry.role) for entry in configuration.simulators]
-        around = run_attempt.AttemptDependencies(make_members=make_members, display=Lines(), environment={})
+        around = run_attempt.AttemptDependencies(make_members=make_members, environment={})
         attempt = run_attempt.Attempt(
             configuration, RunDirectory(tmp_path / "run"), Progress(configuration.steps, simulators), around
         )

@@ -110,7 +110,7 @@ def equal(one, other):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_what_is_saved_is_restored(trained, name):
-    """These are networks, optimizer, counts, statistics and random generators."""
+    """The test compares networks, optimizer, counts, statistics and random generators."""
     before, after = trained(name), trained(name, steps=0)
     before.save()
 
@@ -246,7 +246,7 @@ def test_the_newest_checkpoints_are_kept(trained):
 
 
 def test_checkpoints_beyond_the_step_are_removed(trained):
-    """They are damaged, or the run would have resumed from them; they must not displace good ones."""
+    """They are damaged, otherwise the run would have resumed from them, and must not displace good ones."""
     model = trained()
     for step in (10, 20, 30):
         model.save(step)
@@ -318,7 +318,7 @@ def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"format": 1}', "null", '{"format": 99}'])
 def test_a_manifest_that_is_none_is_damage(trained, content):
-    """Whatever it contains, its digest is missing."""
+    """Its content does not matter, because its digest is missing."""
     model = trained()
     for step in (10, 20):
         model.save(step)
@@ -328,7 +328,7 @@ def test_a_manifest_that_is_none_is_damage(trained, content):
 
 
 def test_every_bit_of_a_manifest_counts(trained):
-    """It has the step from which the run resumes, and no other file has its digest."""
+    """The manifest has the step from which the run resumes, and no other file has its digest."""
     model = trained()
     model.save()
     path = model.path(40) / "manifest.json"
@@ -378,14 +378,14 @@ def test_what_is_left_of_a_buffer_that_has_gone_round_is_in_order(trained):
 
 
 def test_a_checkpoint_of_another_format_is_refused(trained):
-    """Beginning anew would waste what it cost; the release that wrote it can read it."""
+    """A new run would waste the steps of this one; the release that wrote the checkpoint can read it."""
     model = trained()
     model.save(10)
     model.save(20)
     path = model.path(20)
     checkpoint.Manifest(step=20, seed=1, algorithm={}, environment={}, format=2).write(path)
 
-    with pytest.raises(ConfigurationError, match=r"20: is of format 2.* which reads 1; go on with the"):
+    with pytest.raises(ConfigurationError, match=r"20: is of format 2.* which reads 1; continue with the"):
         checkpoint.newest(model.folder)
 
 
@@ -470,7 +470,7 @@ def test_a_file_system_that_renames_no_folders_is_refused_in_a_sentence(trained,
     monkeypatch.setattr(Path, "rename", refuse)
     model = trained()
 
-    with pytest.raises(ConfigurationError, match=r"its file system renames no folders .* use another volume"):
+    with pytest.raises(ConfigurationError, match=r"its file system cannot rename folders .* use another"):
         model.save()
     assert list(model.folder.iterdir()) == []
 
@@ -512,7 +512,7 @@ def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
     ],
 )
 def test_another_run_is_not_continued(trained, make_configuration, changes, field):
-    """Its networks would fit, but have another meaning."""
+    """The networks of another run may fit, but have another meaning."""
     model = trained()
     model.save()
     other = make_configuration(**({"algorithm": model.configuration.algorithm.model_dump()} | changes))

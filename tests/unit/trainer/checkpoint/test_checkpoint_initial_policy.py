@@ -97,7 +97,7 @@ def test_statistics_come_along_where_both_normalize(tmp_path):
 
 @pytest.mark.parametrize(("before", "now"), [(None, Normalize()), (Normalize(), None)])
 def test_a_normalizer_on_one_side_only_is_logged(tmp_path, before, now):
-    """It may be intended, so it is not an error."""
+    """The difference may be intended, so it is not an error."""
     path = saved(model_of(normalize=before), tmp_path / "model.zip")
 
     with structlog.testing.capture_logs() as logs:

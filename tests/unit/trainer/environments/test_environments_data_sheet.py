@@ -123,7 +123,7 @@ def test_the_range_of_proximity_is_on_the_sheet(distance):
 
 
 def test_the_example_chooses_the_movements_that_the_sheet_says():
-    """They are the first five, because a Robotino need not turn."""
+    """The example uses the first five, because a Robotino need not turn."""
     job = yaml.safe_load(EXAMPLE.read_text())
     chosen = job["spec"]["trainer"]["environment"]["options"]["movements"]
 
@@ -139,5 +139,5 @@ def test_the_task_is_on_the_sheet_with_its_numbers(constant):
 
 @pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe", "time_up"])
 def test_options_are_on_the_sheet(word):
-    """They are described where they take effect."""
+    """Each option is described where it takes effect."""
     assert f"`{word}`" in SHEET

@@ -61,7 +61,7 @@ def test_three_targets_are_delivered_before_the_episode_ends(empty):
 
 
 def test_the_mark_moves_to_a_target_far_from_the_last(empty):
-    """Otherwise the next target would not be a task."""
+    """Otherwise the robot would reach the next target without driving."""
     env, scene = empty
     env.reset(seed=4)
     marks, over = [scene.target], False

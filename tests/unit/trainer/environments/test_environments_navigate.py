@@ -140,7 +140,7 @@ def test_the_data_sheet_has_the_actions():
 
 
 def test_the_fake_is_a_robot_with_a_scene():
-    """These are the checks for users' robots."""
+    """The test uses the checks for users' robots."""
     robot, scene = fake_court()
 
     check_robot(robot)

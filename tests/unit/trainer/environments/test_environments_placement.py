@@ -52,7 +52,7 @@ def test_tasks_are_spread_over_the_whole_floor():
     [((0.0, 0.0), math.hypot(0.8, 0.8) - 0.25), ((1.9, 0.0), 0.1), ((0.8, 0.8), -0.25), ((3, 0), -1.0)],
 )
 def test_the_gap_is_to_the_nearest_wall_or_cylinder(place, expected_m):
-    """It is negative inside one, so one comparison shows whether a point is free."""
+    """The gap is negative inside an obstacle, so one comparison shows whether a point is free."""
     assert ARENA.gap(*place) == pytest.approx(expected_m)
 
 
@@ -94,7 +94,7 @@ def test_both_may_be_chosen_even_if_they_are_near():
 
 
 def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
-    """They are for environments with a curriculum."""
+    """These options are for environments with a curriculum."""
     of_a_run = {"training_progress": 0.5, "episode": 7}
 
     tasks = [PLACES.chosen_task(np.random.default_rng(0), chosen) for chosen in ({}, of_a_run)]

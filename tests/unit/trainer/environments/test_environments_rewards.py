@@ -27,7 +27,7 @@ def transition(
 
 
 def test_progress_is_what_was_gained_toward_the_target():
-    """It is in meters, so a complete drive earns its initial distance."""
+    """Progress is in meters, so a complete drive earns the initial distance to the target."""
     assert rewards.progress(transition(1.0, 0.9)) == pytest.approx(0.1)
     assert rewards.progress(transition(0.9, 1.0)) == pytest.approx(-0.1)
 

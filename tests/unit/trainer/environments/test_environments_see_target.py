@@ -148,7 +148,10 @@ def test_a_collision_ends_the_episode(make_env):
 
 @pytest.mark.parametrize(("reward", "end"), [("Dense", (False, True)), ("Sparse", (True, False))])
 def test_time_is_up_after_max_steps(make_env, reward, end):
-    """With Dense, the learner estimates further reward; Sparse has a price for giving up."""
+    """With Dense the episode is truncated, so the learner estimates the rewards that would follow.
+
+    With Sparse it is terminated, because giving up must cost something.
+    """
     steps = play(make_env(max_steps=2, reward=reward), BEFORE_THE_POLE, [STOP, STOP])
 
     assert [step[2:4] for step in steps] == [(False, False), end]

@@ -90,7 +90,7 @@ def test_frames_are_stacked_as_stable_baselines_does(name):
 def test_each_frame_has_the_bounds_of_its_numbers():
     """VecFrameStack of Stable-Baselines3 repeats the bounds of the first number.
 
-    It thus refuses valid observations.
+    Bounds that differ from the numbers' own would refuse valid observations.
     """
     bounds = StackedFrames(Count(), 2).observation_space
 
@@ -149,7 +149,7 @@ def layers(env):
     [
         ({"name": "nowhere:Own"}, "[0].name: nowhere:Own cannot be imported"),
         ({"name": f"{HERE}:None_"}, f"[0].name: {HERE}:None_ cannot be imported"),
-        ({"name": "gymnasium:Env"}, "[0].name: gymnasium:Env is no subclass of Wrapper"),
+        ({"name": "gymnasium:Env"}, "[0].name: gymnasium:Env is not a subclass of Wrapper"),
         (
             {"name": f"{HERE}:TimeLimit"},
             f"[0].options.max_episode_steps: {HERE}:TimeLimit needs this argument",

@@ -108,7 +108,7 @@ def test_a_vector_answers_as_those_of_stable_baselines3(restarters, make, call, 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 @pytest.mark.filterwarnings("ignore:.*render:UserWarning")
 def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mode):
-    """One picture of all, or none."""
+    """`render` returns one picture of all members, or None."""
     env, reference = make(restarters(render_mode)), DummyVecEnv([lambda: wrapped(render_mode)] * MEMBERS)
 
     assert np.array_equal(env.get_images(), reference.get_images())
@@ -117,7 +117,7 @@ def test_a_vector_draws_as_that_of_stable_baselines3(restarters, make, render_mo
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_the_options_of_the_next_reset_reach_the_environments_once(restarters, make):
-    """Beside those that a run gives."""
+    """A program's options are added to those that a run gives."""
     env = make(restarters())
     env.set_options([{"start": index} for index in range(MEMBERS)])
 

@@ -13,7 +13,6 @@ import pytest
 import structlog
 from gymnasium import spaces
 
-from palaestra_trainer.copies import copied
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
@@ -21,6 +20,7 @@ from palaestra_trainer.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.user_code.copies import copied
 
 LENGTH = 3
 STEPS = 8
@@ -178,7 +178,7 @@ def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, pl
 
 
 def test_actions_of_the_training_loop_stay_as_they_are(restarter):
-    """They go into the buffer after the step."""
+    """The actions go into the buffer after the step."""
     given = actions()[0]
     env = SimulatorsVecEnv([restarter(Hostile)], 1)
     env.reset()
@@ -247,7 +247,7 @@ class WithWords(Honest):
 
 
 def test_words_of_an_environment_are_not_taken_for_ours(restarter):
-    """They stay, but for those that only Stable-Baselines3 may say: these are moved, and a line says so."""
+    """Words that only Stable-Baselines3 may use are moved, and the log says so; all others stay."""
     env = SimulatorsVecEnv([restarter(WithWords)], 1)
     env.reset()
     with structlog.testing.capture_logs() as logged:

@@ -142,7 +142,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
 
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
-    """It would wait for ever."""
+    """An evaluation would wait for ever."""
     restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.episodes.seeds import COLLECT, EVALUATE, episode_seed, episode_seeds
+from palaestra_trainer.episodes.seeds import COLLECT, EVALUATE, episode_seed, episode_seeds, fresh_seeds
 
 NUMBERS = st.integers(0, 2**31)
 
@@ -33,6 +33,14 @@ def test_streams_share_no_seed():
 
     assert not many[COLLECT] & many[EVALUATE]
     assert not many[EVALUATE] & many["B"]
+
+
+@given(st.text(), NUMBERS)
+def test_no_run_of_any_job_uses_a_fresh_seed(stream, first):
+    """Seeds of runs have 31 bits, as the first test shows, so a comparison uses none of them by chance."""
+    (seed,) = fresh_seeds(stream, 1, first)
+
+    assert 2**31 <= seed < 2**32
 
 
 def test_simulators_and_runs_play_different_episodes():

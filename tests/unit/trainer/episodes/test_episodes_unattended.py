@@ -32,7 +32,7 @@ def summary(directory):
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directory, name):
-    """It takes longer, but learns as much."""
+    """The run takes longer, but learns as much."""
     code, members = play(pool(name, least=1), {"collect-0": {"steps": range(10, 1000)}})
 
     assert code == 0
@@ -66,7 +66,7 @@ def test_too_few_simulators_end_the_run(play, pool, last_word):
     code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
 
     assert code == 80
-    assert "collect-1: 2 restarts within 600 s did not mend it (dead 2; last: " in last_word().reason
+    assert "collect-1: 2 restarts within 600 s did not repair it (dead 2; last: " in last_word().reason
 
 
 @pytest.mark.parametrize("name", DISCRETE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ import structlog
 from gymnasium import Wrapper, spaces
 from stable_baselines3.common.vec_env import VecEnv
 
+from palaestra_protocol.scene import TargetMarker
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
+from palaestra_trainer.robots.geometry import Pose
+from palaestra_trainer.robots.sight import Sight
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.greenlets import let_others
@@ -80,6 +84,42 @@ def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
     assert infos[0]["episode"]["r"] == pytest.approx(0.8)
     assert infos[0]["episode"]["l"] == 3
     assert rewards[0] == 1.0
+
+
+def test_a_viewer_sees_where_each_member_is_in_its_episode(make_env, make_member):
+    """A term that is not a number is left out: an environment may put anything there."""
+
+    class Terms(Wrapper):
+        def step(self, action):
+            *row, info = self.env.step(action)
+            return *row, info | {"reward_terms": {"progress": 0.5, "why": "far"}}
+
+    member = make_member("collect-0")
+    member.env = Terms(member.env)
+    env = make_env(member, make_member("collect-1"))
+    env.reset()
+    walk(env, 2)
+
+    moments = env.moments()
+
+    assert [(it.episode, it.step) for it in moments.values()] == [(1, 2), (1, 2)]
+    assert moments["collect-0"].rewards == {"progress": 0.5}
+    assert moments["collect-1"].rewards == {"walk": -0.1}
+
+
+def test_a_viewer_sees_the_target_of_a_robot_on_a_floor(make_env, make_member):
+    """A world need not have a mark, and without one a person cannot see where the robot shall go."""
+    located, unplaced = make_member("collect-0"), make_member("collect-1")
+    for member, target in ((located, (1.0, -0.5)), (unplaced, None)):
+        member.sight = partial(
+            Sight, pose=Pose(0.0, 0.0, 0.0), target=target, floor=None, radius_m=0.2, period_s=0.1
+        )
+    env = make_env(located, unplaced, make_member("collect-2"))
+    env.reset()
+
+    targets = [moment.target for moment in env.moments().values()]
+
+    assert targets == [TargetMarker(position=(1.0, -0.5, 0.0), radius_m=0.2), None, None]
 
 
 def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):

@@ -21,7 +21,7 @@ def shares(draw):
     [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (15, 20, 0.5313, 0.8881), (95, 100, 0.8882, 0.9785)],
 )
 def test_bounds_are_those_of_the_literature(successes, episodes, low, high):
-    """Source: binom.test and prop.test(correct=FALSE) of R, by Wilson's method."""
+    """Source: The values are those of binom.test and prop.test(correct=FALSE) in R, by Wilson's method."""
     interval = wilson(successes, episodes)
 
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=1e-4)

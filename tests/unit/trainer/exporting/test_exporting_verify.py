@@ -62,7 +62,7 @@ def test_actions_of_any_range_are_compared_in_their_range(cls, bound):
 
 @pytest.mark.parametrize("cls", [sb3_contrib.TQC, sb3_contrib.RecurrentPPO])
 def test_so_are_those_of_sb3_contrib(cls):
-    """Their actors are other classes, and one has a state."""
+    """The actors of sb3-contrib are other classes, and one has a state."""
     assert compared(policy_of(cls, acted=spaces.Box(-20_000.0, 20_000.0, (3,), np.float32))) <= 1e-5
 
 

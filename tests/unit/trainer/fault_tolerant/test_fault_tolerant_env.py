@@ -156,7 +156,7 @@ def test_a_simulator_that_is_not_mended_in_time_ends_with_a_typed_error(make_env
     """The budget counts restarts, and one that never ends does not count."""
     env, _ = make_env(deadline_s=0.0, resets=[1], held=True)
 
-    with pytest.raises(SimulatorHung, match="not mended within 0 s"):
+    with pytest.raises(SimulatorHung, match="not restarted within 0 s"):
         env.reset()
 
 

@@ -26,7 +26,7 @@ def made(settings):
 
 @given(SET, NAMES, VALUES)
 def test_a_parameter_has_the_value_that_was_set_and_is_gone_once_deleted(settings, name, value):
-    """Whatever was set before, also a value where it needs a namespace."""
+    """The previous values do not matter, even a value where it needs a namespace."""
     parameters = made(settings)
 
     parameters.set(name, value)
@@ -74,7 +74,7 @@ def test_a_search_goes_up_to_the_root_and_only_looks_for_the_first_part():
 
 
 def test_a_root_that_is_no_dictionary_is_refused():
-    """It has to hold all namespaces."""
+    """The root has to hold all namespaces."""
     with pytest.raises(TypeError, match="must be a dictionary"):
         Parameters().set("/", 5)
 

@@ -1,4 +1,4 @@
-"""Who is registered for what; the answers themselves are compared with rosmaster's in tests/contract."""
+"""The registrations of nodes; the responses themselves are compared with rosmaster's in tests/contract."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,7 +54,7 @@ def test_a_service_has_the_address_of_the_node_that_registered_last():
 
 
 def test_a_registration_with_another_address_is_not_removed():
-    """It is that of a newer node."""
+    """The registration is that of a newer node."""
     nodes = Registrations()
     nodes.register(Kind.PUBLISHER, "/t", "/a", "http://new")
 

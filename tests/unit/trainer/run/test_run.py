@@ -99,7 +99,7 @@ def test_faults_are_survived_and_counted(play, job, directory, name):
 
 
 def test_simulators_are_recycled_without_a_fault(play, job, directory):
-    """They report that they are due, between episodes."""
+    """Between episodes, simulators report that they are due."""
     code, members = play(job(), {name: {"recycle_after": 5} for name in ("collect-0", "evaluate-0")})
 
     summary = json.loads(directory.summary.read_text())
@@ -253,7 +253,7 @@ def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, la
 
 
 def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
-    """They are those of Stable-Baselines3, and each reward term by its name."""
+    """The tags are those of Stable-Baselines3, and one for each reward term, with its name."""
     play(job("A2C", steps=600))
 
     events = EventAccumulator(str(directory.tensorboard))

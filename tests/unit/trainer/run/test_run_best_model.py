@@ -14,7 +14,7 @@ from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.run.best_model import best_of
 from palaestra_trainer.run_directory import drop_lines, read_lines
 
-EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # by every evaluation of the runs here
+EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # the seeds of every evaluation of these runs
 GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}
 
 
@@ -152,7 +152,7 @@ def test_a_confirmation_that_was_cut_is_made_up_for(play, job, directory):
 
 
 def test_the_summary_is_that_of_model_zip_also_after_a_resume(play, job, directory):
-    """Its evaluation came after the checkpoint from which the run resumed."""
+    """The best model was evaluated after the checkpoint from which the run resumed."""
     configuration = job(evaluation={"everySteps": 40, "episodes": 4, "confirmEpisodes": 0})
     play(configuration, report=lambda *_: {"is_success": True})
     before = best_of(directory)

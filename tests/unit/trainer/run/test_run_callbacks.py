@@ -131,7 +131,7 @@ def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directo
 def test_a_callback_that_returns_false_ends_training_ordinarily(
     play, with_callbacks, directory, seen, name, kept
 ):
-    """It ends at the rollout boundary before the cut: evaluated, confirmed, saved and finished."""
+    """The run is evaluated, confirmed and saved as of the boundary before the cut rollout."""
     code, _ = play(with_callbacks({"stop_at": 55}, name=name))
 
     assert code == 0
@@ -227,7 +227,7 @@ def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_wo
 
 
 def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
-    """They are not part of the model."""
+    """Callbacks are not part of the model."""
     steps = iter(range(1, 1000))
     play(with_callbacks({}), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
 
@@ -239,11 +239,11 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
 @pytest.mark.parametrize(
     ("name", "options", "fact"),
     [
-        ("Notes", {}, "[0].name: Notes names no class; write it as module:Class"),
+        ("Notes", {}, "[0].name: Notes does not name a class; write it as module:Class"),
         ("nowhere:Notes", {}, "[0].name: nowhere:Notes cannot be imported (ModuleNotFoundError: No module"),
         ("{module}:Note", {}, "{module}:Note cannot be imported (AttributeError"),
-        ("{module}:Plain", {}, "{module}:Plain is no subclass of BaseCallback; name a class"),
-        ("{module}:SEEN", {}, "{module}:SEEN is no subclass of BaseCallback"),
+        ("{module}:Plain", {}, "{module}:Plain is not a subclass of BaseCallback; name a class"),
+        ("{module}:SEEN", {}, "{module}:SEEN is not a subclass of BaseCallback"),
         ("{module}:Unfinished", {}, "{module}:Unfinished has no _on_step; add this method"),
         ("{module}:Notes", {"stopat": 1}, "options.stopat: {module}:Notes has no such argument; did you"),
         ("{module}:Demanding", {}, "options.threshold: {module}:Demanding needs this argument; set it"),

@@ -181,11 +181,11 @@ def test_a_stall_while_a_simulator_is_down_is_that_simulator_s(progress):
     end = stalled(progress)
 
     assert (end.code, end.reason) == (82, "SimulatorHung")
-    assert end.message == "no environment step for 90 s while starting; not up: collect-0"
+    assert end.message == "no environment step for 90 s while starting; not ready: collect-0"
 
 
 def test_a_stall_amid_a_step_is_a_simulator_s_as_well(progress):
-    """It is not known yet which simulator hangs."""
+    """During a step it is not yet known which simulator hangs."""
     with progress.spending(Cause.TRANSPORT):
         end = stalled(progress)
 
@@ -212,7 +212,7 @@ def log(capsys):
 
 
 def test_the_last_ten_lines_of_the_log_are_kept(log, capsys):
-    """They are those of the log, with the newest last."""
+    """The order is that of the log, with the newest line last."""
     for number in range(12):
         log.info("line", number=number)
 

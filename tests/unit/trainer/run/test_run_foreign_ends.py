@@ -179,14 +179,16 @@ def test_nobody_watches_for_steps_while_everything_is_stopped(play):
 
 LIVES_ON = """
 import sys, threading, time
-from palaestra_trainer import cli
+from importlib import import_module
+from palaestra_trainer.cli import program
 from palaestra_trainer.telemetry.logs import configure_logs
 configure_logs()
-program = sys.argv[1]
-setattr(cli, program, lambda: 75)
-cli.LEFT_S = 1.0
+name = sys.argv[1]
+module = import_module("palaestra_trainer.cli." + name)
+setattr(module, name, lambda: 75)
+program.LEFT_S = 1.0
 threading.Thread(target=time.sleep, args=(300,), name="mine").start()
-code = getattr(cli, program + "_and_leave")()
+code = getattr(module, name + "_and_leave")()
 print("ended", flush=True)
 sys.exit(code)
 """

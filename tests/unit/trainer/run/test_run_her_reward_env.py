@@ -70,7 +70,7 @@ def test_a_wrapper_that_changes_rewards_is_refused_and_another_is_not(job):
 
 
 def test_without_a_robot_in_the_job_the_judge_has_a_robotino(job):
-    """It is the robot of the simulators, with all its capabilities."""
+    """A Robotino is then the robot of the simulators, with all its capabilities."""
 
     class Grasp(Reach):
         needs = (Gripper, Scanner)

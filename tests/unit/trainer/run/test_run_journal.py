@@ -26,7 +26,7 @@ def journal(tmp_path, clock):
 
 
 def test_what_came_after_the_checkpoint_is_not_forgotten(journal, progress, clock):
-    """Its time and its faults count, but its steps and episodes are repeated."""
+    """Time and faults after the checkpoint count, but steps and episodes after it are repeated."""
     progress.counters = Counters(episodes=3, goodput={"learning": 10.0})
     saved = progress.counted()
     with progress.spending(Cause.LEARNING):

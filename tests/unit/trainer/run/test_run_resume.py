@@ -144,7 +144,7 @@ def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job,
 
 
 def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directory, last_word):
-    """It was a pod, so the next attempt is the second."""
+    """The attempt had a pod, so the next attempt is the second."""
     code, _ = play(job("DQN"), {"collect-0": {"starts": range(1, 20)}})
 
     assert code == 80
@@ -171,7 +171,7 @@ def test_a_finished_run_that_is_prolonged_is_the_run_that_was_that_long(
 ):
     """Steps 96 and 192 are rollout boundaries of both algorithms.
 
-    It therefore resumes from a state of the long run.
+    A finished run therefore ends in a state that the longer run would also have had.
     """
     algorithm = {"name": name, "hyperparameters": job(name).algorithm.hyperparameters | constant}
     at_once = RunDirectory(tmp_path / "at-once")

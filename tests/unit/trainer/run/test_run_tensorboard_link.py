@@ -79,7 +79,7 @@ def test_replicas_that_start_at_once_are_all_linked(start, volume):
 
 
 def test_a_restart_leaves_the_link_as_it_is(start, volume):
-    """It is made at each start, in case that it was deleted."""
+    """Each start makes the link again, in case it was deleted."""
     start()
     made = os.lstat(volume / "tensorboard/corridor-0d1f3e5a/0")
 

@@ -17,7 +17,7 @@ DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("
 
 
 def test_the_message_tells_flapping_from_an_accident():
-    """It has kinds, window and remedy, because a person reads it hours later."""
+    """The message has kinds of faults, window and remedy, because a person reads it hours later."""
     budget = RestartBudget("collect-0", RestartLimit(restarts=10), clock=lambda: 0.0)
     for fault in [DEAD] * 9 + [HUNG]:
         budget.spend(fault)
@@ -26,7 +26,7 @@ def test_the_message_tells_flapping_from_an_accident():
         budget.spend(DEAD)
 
     assert str(told.value) == (
-        "collect-0: flapping: 10 restarts within 600 s did not mend it "
+        "collect-0: flapping: 10 restarts within 600 s did not repair it "
         "(dead 9, hung 1; last: robotino: closed the connection); "
         "read the simulator's log, or raise restart.limit"
     )

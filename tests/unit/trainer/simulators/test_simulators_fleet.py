@@ -63,7 +63,7 @@ def make_fleet(make_configuration, make_member):
 
 
 def test_all_are_started_and_stopped(make_fleet):
-    """This includes collecting and evaluating simulators."""
+    """The test has collecting and evaluating simulators."""
     fleet, members = make_fleet()
 
     fleet.start()
@@ -112,7 +112,7 @@ def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, st
 
 
 def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_fleet):
-    """Its worlds have been valid before."""
+    """The run has stepped, so its worlds are valid."""
     fleet, members = make_fleet(starts=misfit_starts(1, 2, 3))
 
     fleet.start(stepped=True)
@@ -137,13 +137,13 @@ def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_con
 
 def test_a_simulator_that_refuses_its_variables_twice_is_a_mistake(play, make_configuration, last_word):
     """It ends with exit code 2 each time, and ten restarts would not correct PALAESTRA_STUB_FAULTS."""
-    said = "the simulator ended with code 2; it said last: there is no fault 'exit@step=45'"
+    said = "the simulator ended with code 2; its last line: 'exit@step=45' is not a fault"
     starts = {number: SimulatorRefused("collect-0", said) for number in (1, 2, 3)}
 
     code, members = play(make_configuration(), faults={"collect-0": {"starts": starts}})
 
     assert code == ExitCode.CONFIGURATION
-    assert "there is no fault 'exit@step=45'" in last_word().reason
+    assert "'exit@step=45' is not a fault" in last_word().reason
     assert members["collect-0"].log.count("restart") == 1
 
 

@@ -20,7 +20,6 @@ from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.telemetry import metrics
-from palaestra_trainer.telemetry.display import Lines
 from palaestra_trainer.telemetry.metric_values import Logged
 from palaestra_trainer.telemetry.progress import Progress
 
@@ -148,7 +147,7 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
-    """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
+    """Steps with their time, episodes, and the remaining restarts; simulated time if it is known."""
     restarter = Restarter(make_member(), RestartLimit(restarts=4), progress, clock)
     progress.figures.meters = {"collect-0": restarter.meter}
     restarter.reset(1)
@@ -196,7 +195,6 @@ def train(job, directory, make_member):
         progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
         around = AttemptDependencies(
             make_members=lambda given: [make_member(it.name) for it in given.simulators],
-            display=Lines(),
             environment={},
         )
         end = Attempt(configuration, directory, progress, around).play()
@@ -227,7 +225,7 @@ def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, 
     with socket.create_server(("127.0.0.1", 0)) as taken:
         configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
         progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
-        around = AttemptDependencies(make_members=lambda _: [], display=Lines(), environment={})
+        around = AttemptDependencies(make_members=lambda _: [], environment={})
         end = Attempt(configuration, directory, progress, around).play()
 
     assert "is in use" in end.message

@@ -195,7 +195,7 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
 
 
 def test_time_of_a_checkpoint_that_lacks_a_cause_stays_where_it_was(progress, clock):
-    """A release may add a cause; nobody can tell any more what the one before counted it as."""
+    """A release may add a cause; the cause under which the previous release counted it is unknown."""
     saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
     progress.resumed(40, saved)
     with progress.spending(Cause.RECYCLING):
@@ -296,7 +296,7 @@ def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progres
 
 
 def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
-    """TensorBoard shows them by cause and by kind."""
+    """TensorBoard shows the time by activity, and the faults by kind."""
     clock.now = 2.0
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.slow("collect-0", 0.4)

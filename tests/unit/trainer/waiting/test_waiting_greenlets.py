@@ -28,7 +28,7 @@ def connections():
 
 @given(st.lists(st.integers(0, 4), max_size=5))
 def test_results_come_in_the_order_of_the_works(pauses):
-    """It does not matter how often each task lets the others run."""
+    """The order does not depend on how often each task lets the others run."""
 
     def work(place):
         for _ in range(pauses[place]):
@@ -142,7 +142,7 @@ def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connectio
 
 
 def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connections):
-    """That task knows its deadline, and what the missing response means."""
+    """Only that task has the deadline and can interpret a missing response."""
     told = []
 
     def work(place):
@@ -156,7 +156,7 @@ def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connecti
 
 
 def test_a_wait_of_all_is_nobody_s_turn(connections):
-    """It counts as waiting for simulators and as a part of each waiting step, in any order of requests."""
+    """The time counts as waiting for simulators, and as a part of each step that waits."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 
@@ -216,7 +216,7 @@ def test_of_several_errors_the_first_work_s_is_raised(connections):
 
 
 def test_nothing_of_a_work_outlives_it():
-    """Greenlets are reused; an observation or a traceback that one kept would fill the memory."""
+    """Greenlets are reused. If they kept observations or tracebacks, the memory would fill."""
 
     class Result:
         pass

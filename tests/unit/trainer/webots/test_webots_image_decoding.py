@@ -93,7 +93,7 @@ def test_no_pixel_is_copied(kind):
 
 
 def test_a_camera_may_change_its_size():
-    """Its world was loaded again."""
+    """The size changes if the world was loaded again."""
     read = ImageReading("camera")
     read(color())
 
@@ -116,7 +116,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind):
-    """It is of another type than the topic's."""
+    """Such a message is of another type than the topic's."""
     read, make_message, _ = kind
     sound = make_message()
 

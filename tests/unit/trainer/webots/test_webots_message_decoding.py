@@ -48,7 +48,7 @@ def test_the_reading_is_the_last_number(kind, read):
 
 
 def test_a_frame_id_of_another_length_is_read_too(kind, read):
-    """It may be another robot's, or empty."""
+    """The frame_id may be another robot's, or empty."""
     _, _, value = KINDS[kind]
 
     assert [read(message(kind, value, name)) for name in ("robotino/ir1", "", "r")] == [value] * 3
@@ -67,7 +67,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, read, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind, read):
-    """It is of another type than the topic's."""
+    """Such a message is of another type than the topic's."""
     sound = message(kind, KINDS[kind][2])
 
     with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes, not {len(sound)}"):

@@ -2,8 +2,9 @@
 
 import pytest
 
-from palaestra.api.reasons import ROWS, WAITING
-from palaestra.operator.waiting_metric import waits
+from palaestra.api.reason_texts import ROWS
+from palaestra.api.reasons import WAITING
+from palaestra.operator.caches import waits
 
 
 def status(*replicas):

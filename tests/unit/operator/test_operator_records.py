@@ -5,8 +5,7 @@ from datetime import UTC, datetime
 import pytest
 
 from palaestra.decide import Decision, ReconcileRecord
-from palaestra.operator.controller import now
-from palaestra.operator.reconcile_state import ReconcileRecords
+from palaestra.operator.controller import ReconcileRecords, now
 from palaestra.operator.status_writer import StatusWriter
 
 KEY = ("default", "job")

@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from palaestra.api.crd import schema
-from palaestra.api.schema_diff import lacks
+from palaestra.operator.crd_check import lacks
 
 OURS = schema()
 

@@ -1,0 +1,125 @@
+"""What the chart installs around training: TensorBoard, notebooks, alerts, dashboards and scraping."""
+
+import json
+import re
+
+import pytest
+import yaml
+
+from palaestra_trainer.run.tensorboard_link import FOLDER
+from tests.chart.helm import CHART, objects
+from tests.chart.modes import MODES, merged
+
+
+def pods(objects):
+    """Return the spec of every pod, by the name of the object that creates it."""
+    return {
+        each["metadata"]["name"]: each["spec"]["template"]["spec"]
+        if each["kind"] == "Deployment"
+        else each["spec"]
+        for each in objects
+        if each["kind"] in {"Deployment", "Pod"}
+    }
+
+
+def test_what_has_no_login_is_reached_by_nobody(one):
+    """`kubectl port-forward` still works: it comes from the node, which no policy blocks."""
+    for name in ("palaestra-tensorboard", "palaestra-jupyter"):
+        policy = one("offline", "NetworkPolicy", name)["spec"]
+        assert "Ingress" in policy["policyTypes"]
+        assert "ingress" not in policy
+
+
+def test_tensorboard_changes_no_run(one):
+    """TensorBoard only reads the volumes to which trainings write."""
+    pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
+    mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
+
+    assert mounts["runs"]["readOnly"] is True
+    assert pod["volumes"][0]["persistentVolumeClaim"] == {"claimName": "runs", "readOnly": True}
+
+
+@pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
+def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
+    """TensorBoard follows links, so with the whole claim it would show each run twice, once by a UID."""
+    made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
+
+    [server] = pods(made)["palaestra-tensorboard"]["containers"]
+    assert server["command"][1] == f"--logdir={shown}"
+
+
+def test_the_token_of_the_notebooks_is_in_no_object(one):
+    """It stays in its Secret, which is mounted as a file; the server gets only the path."""
+    pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
+    [server] = pod["containers"]
+
+    environment = {each["name"]: each["value"] for each in server["env"]}
+    [folder] = [mount["mountPath"] for mount in server["volumeMounts"] if mount["name"] == "token"]
+    [volume] = [each["secret"] for each in pod["volumes"] if each["name"] == "token"]
+    assert volume["secretName"] == "notebooks"
+    assert [f"{folder}/{item['path']}" for item in volume["items"]] == [environment["JUPYTER_TOKEN_FILE"]]
+    assert environment.keys() == {"JUPYTER_TOKEN_FILE"}
+
+
+def test_the_alerts_are_those_of_the_file(one):
+    """The program promtool checks that file."""
+    rules_of_file = yaml.safe_load((CHART / "alerts.yaml").read_text())
+
+    assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
+
+
+def test_runbooks_are_links_if_a_value_has_the_address():
+    """The address depends on where the project's files are hosted."""
+    address = "https://git.example.com/palaestra/blob/main"
+    rule = {"enabled": True, "runbooks": address}
+
+    made = objects({"monitoring": {"prometheusRule": rule}})
+
+    (groups,) = (each["spec"]["groups"] for each in made if each["kind"] == "PrometheusRule")
+    links = [each["annotations"]["runbook_url"] for group in groups for each in group["rules"]]
+    assert all(link.startswith(f"{address}/docs/howto/alerts.md#") for link in links)
+    assert links
+
+
+def test_every_dashboard_is_mounted_as_it_is(made):
+    """Byte for byte, with the label that Grafana's sidecar looks for."""
+    found = {
+        name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
+        for each in made("monitored")
+        if each["kind"] == "ConfigMap" and each["metadata"]["name"] != "palaestra-trial"
+        for name, text in each["data"].items()
+    }
+
+    assert found == {
+        path.name: (json.loads(path.read_text()), "1") for path in (CHART / "dashboards").glob("*.json")
+    }
+
+
+def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
+    """The plan sets the names of the ports."""
+    [endpoint] = one("monitored", "PodMonitor", "palaestra-training")["spec"]["podMetricsEndpoints"]
+    [keep] = [each for each in endpoint["relabelings"] if each.get("action") == "keep"]
+
+    assert re.fullmatch(keep["regex"], "metrics")
+    assert re.fullmatch(keep["regex"], "sim-31")
+    assert not re.fullmatch(keep["regex"], "ros")
+
+
+def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
+    """The program of a job's author serves these metrics and could give Prometheus a million series."""
+    bounded = one("monitored", "PodMonitor", "palaestra-training")["spec"]
+    [none] = [
+        each
+        for each in objects(
+            {
+                "monitoring": {
+                    "podMonitor": {"enabled": True, "sampleLimit": 0, "labelLimit": 0, "bodySizeLimit": 0}
+                }
+            }
+        )
+        if each["kind"] == "PodMonitor"
+    ]
+
+    limits = {name: bounded.get(name) for name in ("sampleLimit", "labelLimit", "bodySizeLimit")}
+    assert limits == {"sampleLimit": 2000, "labelLimit": 32, "bodySizeLimit": "1MB"}
+    assert not limits.keys() & none["spec"].keys()

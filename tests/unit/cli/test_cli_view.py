@@ -1,0 +1,58 @@
+"""`palaestra view` refuses what it cannot show, in one sentence, before it opens a page."""
+
+import pytest
+import yaml
+
+from palaestra.cli import main, view_process
+from palaestra_protocol.http import Address, Server
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Yield the folder of a run whose sidecar is of an older release."""
+    server = Server(Address("127.0.0.1", 0), {}, name="test")
+    server.start()
+    content = {
+        "statusAddress": "127.0.0.1:9",
+        "simulators": [{"name": "collect-0", "control": f"http://{server.address}"}],
+    }
+    (tmp_path / "training.yaml").write_text(yaml.safe_dump(content))
+    yield str(tmp_path)
+    server.close()
+
+
+def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monkeypatch, capsys):
+    """Viser is optional, because a pod or a server needs no page."""
+    monkeypatch.setattr(view_process, "find_spec", lambda _name: None)
+
+    assert main(["view", run]) == 2
+    assert capsys.readouterr().err == (
+        "viser is not installed, which a view needs; install it: pip install 'palaestra[view]'\n"
+    )
+
+
+def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
+    """The names are those of the job's groups."""
+    assert main(["view", run, "--simulator", "collect-7"]) == 2
+    assert capsys.readouterr().out == "--simulator collect-7: the run has collect-0\n"
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
+    """A name without a slash would be that of a job in a cluster."""
+    assert main(["view", str(tmp_path)]) == 2
+    assert "is not a run directory, which has training.yaml" in capsys.readouterr().err
+
+
+def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(tmp_path, capsys):
+    """A person who mistypes a folder would otherwise read about a kubeconfig only."""
+    empty = tmp_path / "kubeconfig"
+    empty.touch()
+
+    assert main(["view", "rums", "--kubeconfig", str(empty)]) == 2
+    assert capsys.readouterr().out.startswith("rums: is not a folder here")
+
+
+def test_a_simulator_that_shows_nothing_opens_no_page(run, capsys):
+    """The sentence is the sidecar's own."""
+    assert main(["view", run]) == 1
+    assert capsys.readouterr().out.startswith("collect-0: path: is not one of")

@@ -1,0 +1,150 @@
+"""A LightSensor measures the irradiance of all lights by the formulas of Webots' manual."""
+
+import math
+
+import numpy as np
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.scene.tree.field_types import FieldType
+from tests.values.frames import frame
+from tests.values.standing import MOUNT, POSES
+from tests.values.worlds import SETTINGS, STEP_MS, cached, device, enable, move, robot
+
+FILTER = np.array([0.9, 0.5, 0.1])
+COLOR = np.array([1.0, 0.4, 0.2])
+COLORED = "color 1 0.4 0.2"
+PLACE = np.array([0.5, 2.0, 1.5])  # where the lights are, in the axes of the file
+TURNED = frame((1.0, -2.0, 0.5), (0.2, 0.9, -0.4), 1.3)  # the Pose that some of them are in
+DOWN = np.array([0.3, -0.2, -1.0])
+CUT_RAD, BEAM_RAD = 1.2, 0.2
+SENSOR = f"""LightSensor {{ name "NAME" {MOUNT.fields} colorFilter {" ".join(map(str, FILTER))}
+  lookupTable [ 0 0 0, 100 100 0 ] }}"""
+
+
+def facing(sensor, way):
+    """Return the cosine of the angle between a sensor's x axis and a direction; 0 behind it."""
+    return max(0.0, float(sensor.rotation[:, 0] @ way) / np.linalg.norm(way))
+
+
+def directional(sensor, _setting):
+    """Light from far away; the ambient part comes from everywhere."""
+    return COLOR * (0.25 + 3.0 * facing(sensor, -DOWN))
+
+
+def point(sensor, _setting):
+    """Light in all directions that does not weaken, which is the default."""
+    return np.ones(3) * (0.5 + 2.0 * facing(sensor, PLACE - sensor.position))
+
+
+def weakening(sensor, _setting):
+    """Its location is in a frame; with an attenuation there is no ambient light."""
+    way = TURNED @ PLACE - sensor.position
+    far = np.linalg.norm(way)
+    return COLOR * 4.0 * facing(sensor, way) / (0.1 + 0.2 * far + 0.3 * far**2)
+
+
+def spot(sensor, _setting):
+    """A cone, whose light decreases from the beam to the edge."""
+    way = PLACE - sensor.position
+    off = math.acos(-DOWN @ way / np.linalg.norm(DOWN) / np.linalg.norm(way))
+    share = np.clip((CUT_RAD - off) / (CUT_RAD - BEAM_RAD), 0.0, 1.0)
+    return np.ones(3) * 5.0 * share * facing(sensor, way)
+
+
+def mountains(sensor, setting):
+    """The light of a PROTO, from the south-east and above; each export of such a world has these numbers."""
+    return np.ones(3) * (1.0 + 2.7 * 0.5 * facing(sensor, setting.axes @ [-0.55, 0.6, 1.0]))
+
+
+def dark(_sensor, _setting):
+    """A light that is switched off."""
+    return np.zeros(3)
+
+
+def words(vector):
+    """Return the numbers as a world file has them."""
+    return " ".join(map(repr, map(float, vector)))
+
+
+LIGHTS = {
+    directional: f"""DirectionalLight {{
+      ambientIntensity 0.25 intensity 3 {COLORED} direction {words(DOWN)} }}""",
+    point: f"PointLight {{ ambientIntensity 0.5 intensity 2 location {words(PLACE)} }}",
+    weakening: f"""Pose {{ {TURNED.fields} children [ PointLight {{ ambientIntensity 1 intensity 4 {COLORED}
+      attenuation 0.1 0.2 0.3 location {words(PLACE)} }} ] }}""",
+    spot: f"""SpotLight {{ intensity 5 location {words(PLACE)} direction {words(DOWN)}
+      cutOffAngle {CUT_RAD} beamWidth {BEAM_RAD} }}""",
+    mountains: "TexturedBackgroundLight { luminosity 0.5 }",
+    dark: "DEF LAMP PointLight { on FALSE }",
+}
+WORLDS = {it.__name__: (it,) for it in LIGHTS} | {"all": tuple(LIGHTS)}
+
+
+@cached
+def simulation_of(setting, name):
+    """Return a simulation of some lights, and of a robot with a sensor."""
+    lights = "\n".join(LIGHTS[it] for it in WORLDS[name])
+    simulation = setting.load(lights + robot(SENSOR.replace("NAME", "eye")))
+    enable(simulation)
+    return simulation
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_light_sensor_adds_what_each_light_contributes(setting, name):
+    """An e-puck that looks for the light, or fears it, learns the same in each simulator."""
+    simulation = simulation_of(setting, name)
+    for pose in POSES:
+        move(simulation, "R", setting.put(pose))
+        simulation.step(STEP_MS)
+        sensor = setting.put(pose) @ MOUNT
+        colors = sum(light(sensor, setting) for light in WORLDS[name])
+
+        assert device(simulation, "eye").value == pytest.approx(FILTER @ colors / 3.0, rel=1e-6), pose
+
+
+def test_a_light_that_a_supervisor_switches_on_is_seen():
+    """Its fields count as they are at each step."""
+    simulation = SETTINGS[0].load(LIGHTS[dark] + robot(SENSOR.replace("NAME", "eye")))
+    enable(simulation)
+    simulation.step(STEP_MS)
+    before = device(simulation, "eye").value
+
+    lamp = simulation.tree.of_def("LAMP")
+    simulation.tree.field_of(lamp, "ambientIntensity", simulation).set(FieldType.FLOAT, 0, 0.5)
+    simulation.tree.field_of(lamp, "on", simulation).set(FieldType.BOOL, 0, True)
+    simulation.step(STEP_MS)
+
+    assert before == 0.0
+    assert device(simulation, "eye").value >= 0.5 * FILTER.sum() / 3.0
+
+
+def test_a_light_that_a_supervisor_adds_is_seen():
+    """It is gone after a reset, which removes it."""
+    simulation = SETTINGS[0].load("DEF G Group { }" + robot(SENSOR.replace("NAME", "eye")))
+    enable(simulation)
+    place = simulation.tree.field_of(simulation.tree.of_def("G"), "children", simulation)
+    values = []
+    for change in (lambda: None, lambda: simulation.add(LIGHTS[point], place, 0), simulation.reset):
+        change()
+        simulation.step(STEP_MS)
+        values.append(device(simulation, "eye").value)
+
+    assert values[0] == values[2] == 0.0
+    assert values[1] >= 0.5 * FILTER.sum() / 3.0
+
+
+@pytest.mark.parametrize(
+    ("world", "fields", "fact"),
+    [
+        ("FloorLight { }", "", "a FloorLight, whose light is not known"),
+        ("CeilingLight { }", "", "a CeilingLight, whose light is not known"),
+        ('TexturedBackgroundLight { texture "dusk" }', "", "the texture dusk, whose light is not known"),
+        ("PointLight { }", "occlusion TRUE", "a light sensor that sees shadows"),
+    ],
+)
+def test_what_a_light_sensor_cannot_measure_is_refused(world, fields, fact):
+    """A dark reading would be a wrong number without a word."""
+    with pytest.raises(WorldError, match=fact):
+        SETTINGS[0].load(world + robot(SENSOR.replace("NAME", f'eye" {fields} model "')))

@@ -1,0 +1,50 @@
+"""A message with a field that 0.1.0 does not have."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import pytest
+
+from palaestra_protocol.fields import ProtocolError
+from palaestra_protocol.messages import AddedLater, JsonMessage, Number, Text, Whole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class First(JsonMessage):
+    """The message of the first release."""
+
+    step: Annotated[int, Whole()]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Later(JsonMessage):
+    """The same message with fields that a later release added."""
+
+    step: Annotated[int, Whole()]
+    loss: Annotated[float | None, AddedLater(Number(0.0))] = None
+    note: Annotated[str | None, AddedLater(Text(5))] = None
+
+
+def test_an_added_field_is_absent_unless_it_is_set() -> None:
+    """A record that uses nothing new has the fields of the first release."""
+    assert Later(step=7).to_json() == First(step=7).to_json() == {"step": 7}
+
+
+def test_an_added_field_that_is_set_is_written_within_its_bounds_and_read_back() -> None:
+    """It has the same kinds as any other field."""
+    content = Later(step=7, loss=0.5, note="too long").to_json()
+
+    assert content == {"step": 7, "loss": 0.5, "note": "too l"}
+    assert Later.from_json(content) == Later(step=7, loss=0.5, note="too l")
+
+
+def test_both_releases_read_each_other() -> None:
+    """Images of one job may be of different releases."""
+    assert First.from_json(Later(step=7, loss=0.5).to_json()) == First(step=7)
+    assert Later.from_json(First(step=7).to_json()) == Later(step=7)
+
+
+def test_an_added_field_with_a_wrong_value_is_refused() -> None:
+    """It may be absent, but not wrong."""
+    with pytest.raises(ProtocolError, match=r"^loss: is not within 0 to inf$"):
+        Later.from_json({"step": 7, "loss": -1})

@@ -1,0 +1,115 @@
+"""A scene and its states as data: what is written is read back, and nothing unbounded is read."""
+
+import contextlib
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_protocol import scene as protocol
+from palaestra_protocol.fields import ProtocolError
+from palaestra_protocol.scene import (
+    SceneState,
+    ShapeKind,
+    TargetMarker,
+    Triangles,
+    VisibleNode,
+    VisibleScene,
+    VisualShape,
+)
+
+BOX = VisualShape(kind=ShapeKind.BOX, size=(0.1, 0.2, 0.3), color=(1.0, 0.5, 0.0, 1.0))
+FLOOR = VisibleNode(name="world", shapes=(VisualShape(kind=ShapeKind.PLANE, size=(4.0, 4.0, 0.0)),))
+ROBOT = VisibleNode(name="robot", moves=True, robot=True, shapes=(BOX,))
+WEDGE = Triangles(
+    points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), triangles=((0, 1, 2),)
+)
+ARENA = VisibleScene(world="arena.wbt", revision=3, nodes=(FLOOR, ROBOT), meshes=(WEDGE,))
+DRIVEN = SceneState(
+    time_s=1.5,
+    revision=3,
+    poses={"robot": (1.0, -2.0, 0.1, 0.70711, 0.0, 0.0, 0.70711)},
+    joints={"wheel0": 3.25},
+    target=TargetMarker(position=(1.0, 1.0, 0.0), radius_m=0.3),
+    episode=7,
+    step=12,
+    rewards={"progress": 0.02},
+)
+anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=9), inner, max_size=4),
+)
+
+
+def through_json(message):
+    """Return a message as its reader gets it."""
+    return type(message).from_json(json.loads(json.dumps(message.to_json(), allow_nan=False)))
+
+
+@pytest.mark.parametrize("message", [ARENA, DRIVEN, SceneState(time_s=0.0)], ids=["scene", "state", "bare"])
+def test_what_is_written_is_read_back(message) -> None:
+    """A viewer gets the world that the simulator has, to a hundredth of a millimeter."""
+    assert through_json(message) == message
+
+
+@pytest.mark.parametrize("message", [ARENA, DRIVEN], ids=["scene", "state"])
+@given(data=st.data())
+def test_a_wrong_part_breaks_no_reader(message, data) -> None:
+    """A pod may send anything, and a reader may raise only one kind of error."""
+    content = message.to_json()
+    name = data.draw(st.sampled_from(sorted(content)))
+    content[name] = data.draw(anything)
+
+    with contextlib.suppress(ProtocolError):
+        json.dumps(type(message).from_json(content).to_json(), allow_nan=False)
+
+
+@given(content=anything)
+def test_no_json_at_all_breaks_a_reader(content) -> None:
+    """The sender may be any program."""
+    for kind in (VisibleScene, SceneState):
+        with contextlib.suppress(ProtocolError):
+            kind.from_json(content)
+
+
+def test_a_number_that_is_not_finite_is_written_as_none() -> None:
+    """JSON has no NaN, and one bad joint must not hide the others."""
+    sick = SceneState(time_s=0.0, joints={"bad": math.nan, "good": 1.0}, rewards={"bad": math.inf})
+
+    assert through_json(sick).joints == {"good": 1.0}
+    assert through_json(sick).rewards == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"nodes": [FLOOR.to_json()] * 2}, "body.nodes: two have the same name"),
+        ({"meshes": [{"points": [0.0], "triangles": []}]}, "meshes[0]: points or triangles are not in"),
+        ({"meshes": [{"points": [0.0] * 3, "triangles": [0, 0, 1]}]}, "meshes[0].triangles: names a point"),
+        ({"sky": [0.0, 0.0, 2.0]}, "sky: is not 3 numbers from 0 to 1"),
+        (
+            {"nodes": [FLOOR.to_json() | {"shapes": [BOX.to_json() | {"kind": "mesh", "mesh": 1}]}]},
+            "body.nodes: a shape names a mesh",
+        ),
+        ({"nodes": [ROBOT.to_json() | {"pose": [0.0]}]}, "nodes[0].pose: is not 7 numbers"),
+    ],
+)
+def test_a_refusal_names_the_field_and_the_fact(changes, message) -> None:
+    """The reader of the message has written the sender, and does not know this program."""
+    with pytest.raises(ProtocolError) as refusal:
+        VisibleScene.from_json(ARENA.to_json() | changes)
+
+    assert str(refusal.value).startswith(message)
+
+
+def test_too_much_is_refused() -> None:
+    """A viewer of a foreign pod keeps its memory."""
+    state = DRIVEN.to_json() | {"rewards": {f"term {i}": 0.0 for i in range(protocol.MOST_TERMS + 1)}}
+    with pytest.raises(ProtocolError, match="rewards: has more than"):
+        SceneState.from_json(state)
+
+    long = {"points": [0.0] * 3 * (protocol.MOST_POINTS // 2 + 1), "triangles": []}
+    with pytest.raises(ProtocolError, match="more than"):
+        VisibleScene.from_json(ARENA.to_json() | {"meshes": [long, long]})

@@ -1,0 +1,46 @@
+"""The count of other people's worlds: which are counted, and what of them."""
+
+import pytest
+
+from tools.worlds.__main__ import main
+
+WORLD = """#VRML_SIM R2023b utf8
+WorldInfo { }
+Robot { name "r" controller "CONTROLLER" controllerArgs [ ] children [ PARTS ] }
+"""
+ARM = "HingeJoint { device [ RotationalMotor { } PositionSensor { } ] endPoint Solid { } }"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return the folder of a project with worlds."""
+    (tmp_path / "worlds").mkdir()
+    return tmp_path
+
+
+def count(folder, capsys):
+    """Return the last line of the count with the stub."""
+    code = main([str(folder), "--simulator", "palaestra-stub"])
+    return code, capsys.readouterr().out.splitlines()
+
+
+def test_robots_get_the_controller_ros_and_equal_worlds_count_once(folder, capsys):
+    """A robot that keeps a motor and a sensor can be trained; a part of a world is not a world."""
+    worlds = {
+        "arm.wbt": WORLD.replace("CONTROLLER", "mine").replace("PARTS", ARM),
+        "arm again.wbt": WORLD.replace("CONTROLLER", "mine").replace("PARTS", ARM),
+        "bare.wbt": WORLD.replace("CONTROLLER", "<extern>").replace("PARTS", "Mystery { }"),
+        "part.wbt": "Solid { }",
+    }
+    for name, text in worlds.items():
+        (folder / "worlds" / name).write_text(text)
+
+    code, lines = count(folder, capsys)
+
+    assert code == 0
+    assert lines[-1] == (
+        "palaestra-stub: 1 of 2 worlds start as they are, 2 with --leave-out all; "
+        "1 of these keep a robot with a motor and a sensor"
+    )
+    assert "   1 the stub simulates no Mystery on a robot" in lines[-2]
+    assert sorted(path.name for path in (folder / "worlds").iterdir()) == sorted(worlds)

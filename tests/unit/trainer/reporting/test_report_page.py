@@ -1,0 +1,258 @@
+"""A report is one page that anyone can open: bounded, and safe whatever a run is called."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.reporting import page as pages
+from palaestra_trainer.reporting.charts import ticks
+from palaestra_trainer.reporting.elements import element, own_code
+from palaestra_trainer.reporting.page import MOST_BYTES, page
+from palaestra_trainer.reporting.run_data import Evaluated, Replay, ReportedFault, RunData
+
+REFERENCES = re.compile(
+    r"\b(src|href|srcset|action|data|poster|xlink:href)\s*=|url\(|@import|import\s*\(|fetch\("
+)
+
+texts = st.text(st.characters(), max_size=30) | st.sampled_from(
+    ["</script><script>alert(1)</script>", '"><img src=https://example.com/x>', "<!--", "&amp;", "\x00\ud800"]
+)
+numbers = st.floats(-1e15, 1e15)
+steps = st.floats(0, 1e12)
+shares = st.floats(0, 1)
+
+
+@st.composite
+def replays(draw):
+    """Draw a recorded episode."""
+    pose = st.tuples(numbers, numbers, numbers)
+    corner = st.none() | st.tuples(numbers, numbers)
+    return Replay(
+        title=draw(texts),
+        facts=draw(texts),
+        poses=tuple(draw(st.lists(pose, max_size=5))),
+        frame_s=draw(st.floats(1e-3, 1e3)),
+        targets=tuple(draw(st.lists(st.tuples(st.integers(0, 9), numbers, numbers), max_size=2))),
+        low=draw(corner),
+        high=draw(corner),
+        outlines=tuple(draw(st.lists(st.tuples(*[numbers] * 6), max_size=2))),
+    )
+
+
+@st.composite
+def runs(draw):
+    """Draw a run of which every text may be any text, and every number any that a reader lets through."""
+    named = st.dictionaries(texts, texts, max_size=3)
+    evaluated = st.builds(
+        Evaluated,
+        step=steps,
+        success_rate=st.none() | shares,
+        low=st.none() | shares,
+        high=st.none() | shares,
+        returns=st.lists(numbers, max_size=3).map(tuple),
+        mean_length=st.none() | numbers,
+    )
+    fault = st.builds(
+        ReportedFault,
+        time=texts,
+        step=steps,
+        simulator=texts,
+        kind=texts,
+        fact=texts,
+        seconds=st.none() | numbers,
+    )
+    points = st.lists(st.tuples(steps, numbers), max_size=5).map(tuple)
+    return RunData(
+        name=draw(texts),
+        ended=draw(texts),
+        end=draw(texts),
+        figures=draw(named),
+        asked=draw(named),
+        versions=draw(named),
+        evaluations=tuple(draw(st.lists(evaluated, max_size=4))),
+        confirmations=tuple(draw(st.lists(evaluated, max_size=2))),
+        curves=draw(st.dictionaries(texts, points, max_size=3)),
+        faults=tuple(draw(st.lists(fault, max_size=3))),
+        fault_count=draw(st.integers(0, 9)),
+        goodput=draw(st.dictionaries(texts, st.floats(0, 1e9), max_size=3)),
+        checkpoints=tuple(draw(st.lists(st.tuples(texts, texts, texts), max_size=2))),
+        attempts=tuple(draw(st.lists(st.tuples(texts, texts), max_size=2))),
+        replays=tuple(draw(st.lists(replays(), max_size=2))),
+        replayed=draw(texts),
+        repeat=tuple(draw(st.lists(st.tuples(texts, texts), max_size=2))),
+        files=draw(named),
+    )
+
+
+class Elements(HTMLParser):
+    """The names of the elements of a page, and their attributes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.names: list[str] = []
+        self.attributes: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        """Remember an element."""
+        self.names.append(tag)
+        self.attributes += [name for name, _ in attrs]
+
+
+def elements_of(text):
+    """Return the elements of a page."""
+    found = Elements()
+    found.feed(text)
+    return found
+
+
+@cache
+def large_parts():
+    """Return more of everything than a page shows."""
+    long = "a message with characters that take more bytes escaped: <&>\"' " * 20
+    evaluated = tuple(
+        Evaluated(step=step, success_rate=0.5, low=0.4, high=0.6, returns=(0.1, 0.2), mean_length=30.0)
+        for step in range(300)
+    )
+    poses = tuple((0.001 * step, 0.002 * step, 0.1) for step in range(2000))
+    replay = Replay(title="best", facts=long, poses=poses, frame_s=0.1)
+    fault = ReportedFault(time="now", step=1, simulator=long, kind="dead", fact=long, seconds=1.5)
+    names = {f"{index} {long}": long for index in range(50)}
+    points = tuple((step, step) for step in range(300))
+    return RunData(
+        name=long,
+        figures=names,
+        asked=names,
+        evaluations=evaluated,
+        confirmations=evaluated,
+        curves=dict.fromkeys(names, points),
+        faults=(fault,) * 400,
+        fault_count=5000,
+        checkpoints=((long, long, long),) * 500,
+        replays=(replay,) * 5,
+        files={"job.yaml": long * 10_000},
+    )
+
+
+def large_run(number):
+    """Return a large run with a name and a seed of its own."""
+    parts = large_parts()
+    asked = {name: f"{number} {value}" for name, value in parts.asked.items()}
+    return replace(parts, name=f"{number} {parts.name}", asked=asked)
+
+
+@given(st.lists(runs(), min_size=1, max_size=2))
+def test_no_text_of_a_run_becomes_an_element_or_a_reference(drawn):
+    """A report is opened from a mail: the name of a job, or the message of a fault, must not run as code.
+
+    It must not tell anyone either that it was opened.
+    """
+    text = page(drawn)
+
+    found = elements_of(text)
+    assert not {"link", "img", "iframe", "object", "embed", "form", "base", "audio", "video"} & {*found.names}
+    assert found.names.count("script") <= 1 + sum(len(run.replays) for run in drawn)
+    assert found.names.count("style") == 1
+    assert not {"src", "href", "srcset", "action", "poster", "data"} & {*found.attributes}
+    assert not [name for name in found.attributes if name.startswith("on")]
+    text.encode()  # no surrogate is left
+
+
+def test_style_and_script_refer_to_nothing_outside_the_page():
+    """Their text is not escaped, so the test above does not see it."""
+    text = page([RunData(name="empty")])
+
+    assert "http:" not in text
+    assert "https:" not in text
+    assert not REFERENCES.search(text)
+    assert "default-src 'none'" in html.unescape(text)
+
+
+@pytest.mark.parametrize("number", [1, 3, 200])
+def test_a_page_is_bounded_however_large_the_runs_are(number):
+    """It is mailed; details are left out before the page grows too large."""
+    text = page([large_run(index) for index in range(number)])
+
+    assert len(text.encode()) <= MOST_BYTES
+    assert "0 a message" in text
+
+
+def test_details_are_left_out_in_the_order_of_their_size():
+    """The comparison of runs is what a page of many is for, so it is always there."""
+    few, many = page([large_run(1), large_run(2)]), page([large_run(index) for index in range(100)])
+
+    assert few.count('<details class="run">') == 2
+    assert "Differences" in few
+    assert "Differences" in many
+    assert "100 runs side by side" in many
+
+
+def test_a_page_that_cannot_be_small_enough_is_refused():
+    """A caller may ask for any size."""
+    with pytest.raises(ValueError, match="give fewer runs"):
+        page([RunData(name="one"), RunData(name="two")], most_bytes=100)
+
+
+def test_only_so_many_runs_are_shown():
+    """A table of thousands of columns is of no use."""
+    text = page([RunData(name=f"run {index}") for index in range(pages.MOST_RUNS + 1)])
+
+    assert f"The first {pages.MOST_RUNS} are shown." in text
+
+
+def test_everything_about_a_run_is_on_its_page():
+    """A part that is missing by mistake would be noticed only by a person."""
+    run = RunData(
+        name="arena / 0",
+        ended="failed",
+        end="Diverged: a loss is NaN",
+        figures={"success rate": "96%"},
+        asked={"algorithm.name": "DQN"},
+        versions={"torch": "2.6"},
+        evaluations=(Evaluated(step=100, success_rate=0.5, low=0.3, high=0.7, returns=(1.0, 2.0)),),
+        faults=(
+            ReportedFault(time="noon", step=50, simulator="collect-0", kind="dead", fact="gone", seconds=0.5),
+        ),
+        fault_count=1,
+        goodput={"learning": 30.0, "stepping": 10.0},
+        checkpoints=(("100", "1.00 MB", "noon"),),
+        attempts=(("noon", "new run"),),
+        replays=(Replay(title="best", facts="reached", poses=((0, 0, 0), (1, 1, 1)), frame_s=0.2),),
+        replayed="the confirmation of step 100",
+        repeat=(("Train it again:", "palaestra run job.yaml"),),
+        files={"job.yaml": "kind: TrainingJob"},
+    )
+
+    text = page([run])
+
+    for part in (
+        *("arena / 0", "failed", "a loss is NaN", "96%", "DQN", "2.6", "evaluations: 50 % at step 100"),
+        *("collect-0", "gone", "0.5", "75.0%", "1.00 MB", "new run", "the confirmation of step 100"),
+        *("palaestra run job.yaml", "kind: TrainingJob", '<figure class="replay">'),
+    ):
+        assert part in text, part
+
+
+def test_text_is_escaped_where_an_element_is_made():
+    """No other module can forget it."""
+    assert element("p", "<b>", title='"') == '<p title="&quot;">&lt;b&gt;</p>'
+    with pytest.raises(ValueError, match="would end it"):
+        own_code("script", "'</script>'")
+
+
+@given(numbers, numbers)
+def test_ticks_are_few_and_inside_their_axis(first, second):
+    """Labels that overlap cannot be read."""
+    low, high = sorted((first, second))
+
+    found = ticks(low, high)
+
+    assert 0 < len(found) <= 7 or not found
+    assert all(low <= value <= high for value in found)

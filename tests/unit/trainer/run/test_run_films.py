@@ -1,0 +1,89 @@
+"""TensorBoard shows recorded episodes of the best policy from above."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from itertools import count
+
+import pytest
+from PIL import Image
+from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
+from tensorboard.util.img_mime_type_detector import from_bytes
+
+from palaestra_trainer.reporting.film import MOST_BYTES
+from palaestra_trainer.robots.geometry import Pose
+from palaestra_trainer.robots.sight import Sight
+from palaestra_trainer.run_directory import read_lines
+
+EVALUATION = {"everySteps": 40, "episodes": 4, "confirmEpisodes": 4}
+
+
+def shown(directory):
+    """Return the films that TensorBoard reads, by name and step."""
+    [path] = directory.tensorboard.iterdir()
+    return {
+        (value.tag, event.step): value.tensor.string_val[2]  # after width and height
+        for event in EventFileLoader(str(path)).Load()
+        for value in event.summary.value
+        if value.metadata.plugin_data.plugin_name == "images"
+    }
+
+
+@pytest.fixture
+def located(make_member):
+    """Make members whose robots drive on a floor."""
+
+    def make(*arguments, **options):
+        member = make_member(*arguments, **options)
+        walked = count()
+        member.sight = lambda: Sight(
+            pose=Pose(next(walked) % 10 / 5, 0.0, 0.0),
+            target=(2.0, 0.0),
+            floor=None,
+            radius_m=0.2,
+            period_s=0.1,
+        )
+        return member
+
+    return make
+
+
+class TestRobotsOnAFloor:
+    """Members tell where their robots are."""
+
+    @pytest.fixture
+    def make_member(self, located):
+        """Replace the members of `play`."""
+        return located
+
+    def test_each_new_best_policy_is_shown_at_its_step(self, play, job, directory):
+        """A person sees what the robot has learned since, without another program.
+
+        The last pictures are those of the confirmation.
+        """
+        play(job(evaluation=EVALUATION))
+
+        films = shown(directory)
+        steps = sorted({step for _, step in films})
+        evaluated = [line["step"] for line in read_lines(directory.evaluations)]
+        assert steps[0] == evaluated[0]
+        assert steps[-1] == 100
+        assert ("episodes/best", 100) in films
+
+    def test_a_film_is_a_small_gif_that_moves(self, play, job, directory):
+        """A browser shows a GIF as it is; TensorBoard loads ten of each name."""
+        play(job(evaluation=EVALUATION))
+
+        films = shown(directory)
+        assert films
+        for film in films.values():
+            assert from_bytes(film) == "image/gif"
+            assert len(film) < MOST_BYTES
+            assert Image.open(BytesIO(film)).n_frames > 1
+
+
+def test_a_run_without_recordings_shows_no_film(play, job, directory):
+    """Robots that stand on no floor have no picture from above."""
+    play(job(evaluation=EVALUATION))
+
+    assert shown(directory) == {}
