@@ -18,7 +18,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from palaestra_trainer import make_env, make_sb3_vec_env, report
-from palaestra_trainer.configuration import load
+from palaestra_trainer.job.configuration import load
 
 job = load()  # the file in PALAESTRA_CONFIG: the TrainingJob, resolved for this replica
 run = Path(os.environ["PALAESTRA_RUN"])  # files in this folder outlive the pod

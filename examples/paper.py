@@ -9,8 +9,8 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from palaestra_trainer import make_env
-from palaestra_trainer.launching.master import ensure_master
 from palaestra_trainer.webots import Webots
+from palaestra_trainer.webots.launching.master import ensure_master
 
 STEPS = 200
 supervisor_ros_node_name, world_path = "robotino", "arena"  # a world that ships, or a path

@@ -18,7 +18,7 @@ from torch import nn
 from torch.distributions import Categorical
 
 from palaestra_trainer import make_vec_env, report
-from palaestra_trainer.configuration import load
+from palaestra_trainer.job.configuration import load
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--environment", help="id of the environment; by default that of the job")

@@ -18,7 +18,7 @@ from skrl.trainers.torch import SequentialTrainer
 from torch import nn
 
 from palaestra_trainer import make_vec_env, report
-from palaestra_trainer.configuration import load
+from palaestra_trainer.job.configuration import load
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--environment", help="id of the environment; by default that of the job")

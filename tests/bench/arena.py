@@ -2,10 +2,10 @@
 
 from contextlib import contextmanager
 
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 
 @contextmanager

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.launching.master import ensure_master
 from palaestra_trainer.ros import RosService, RosSubscriber
+from palaestra_trainer.webots.launching.master import ensure_master
 from tests.bench.sizes import scaled
 
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"

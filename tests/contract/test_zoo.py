@@ -10,7 +10,7 @@ from palaestra.zoo.expressions import SHORT
 from palaestra_protocol.foreign_words import ELSEWHERE
 from palaestra_trainer.algorithms.hyperparameters import CLASSES
 from palaestra_trainer.algorithms.make_model import check
-from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.job.configuration import Algorithm
 
 FILE = """\
 default:

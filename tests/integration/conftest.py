@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from palaestra.cluster import Api, connect
-from palaestra_trainer.launching.master import ensure_master
+from palaestra_trainer.webots.launching.master import ensure_master
 from tests.control_plane import shared
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place

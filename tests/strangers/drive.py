@@ -7,9 +7,9 @@ import math
 import sys
 
 from palaestra_trainer import report
-from palaestra_trainer.configuration import load
-from palaestra_trainer.launching.sidecar import Sidecar
+from palaestra_trainer.job.configuration import load
 from palaestra_trainer.webots import DistanceSensor, Motor, Stepper, Webots
+from palaestra_trainer.webots.launching.sidecar import Sidecar
 
 PERIOD_MS = 64
 NEAR = 100.0  # a value in the lookup table of ps0 and ps7

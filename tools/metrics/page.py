@@ -10,7 +10,7 @@ from palaestra.api.generated_sections import between_marks
 from palaestra.operator import metric_definitions as operator
 from palaestra_protocol.metrics import Family, Label, MetricType
 from palaestra_sim.sidecar import metric_definitions as sidecar
-from palaestra_trainer import metric_definitions as trainer
+from palaestra_trainer.run.telemetry import metric_definitions as trainer
 
 PAGE = "docs/reference/metrics.md"
 SERIES = "<!-- generated: how many series -->"

@@ -48,7 +48,7 @@ sys.exit(2)
 """
 START = """\
 import os, pathlib, yaml
-from palaestra_trainer.launching.sidecar import Sidecar
+from palaestra_trainer.webots.launching.sidecar import Sidecar
 config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text())
 for simulator in config["simulators"]:
     sidecar = Sidecar(simulator["control"], simulator["name"])

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 DEADLINE_S = 60.0  # the work takes moments, but the machine may be busy
 STUB = Path(sys.executable).with_name("palaestra-stub")

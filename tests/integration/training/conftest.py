@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 import yaml
 
-from palaestra_trainer.configuration import load
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.job.configuration import load
 from palaestra_trainer.run import attempt as run_attempt
-from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.telemetry.logs import configure_logs
+from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 PROGRAM = Path(__file__).with_name("fakes.py")
 ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate"}

@@ -16,13 +16,13 @@ import pytest
 from palaestra.local.ports import LOOPBACK, HeldPorts
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
-from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.interface import NullWatcher
 from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
 from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.webots.launching.sidecar import Sidecar
 from tests.waiting import eventually
 
 STAND = np.zeros(1, dtype=np.int64)

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots import JointMotor, Mode, MujocoActuator, MujocoSensor, Webots
 from palaestra_trainer.webots.devices import PositionSensor
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 STEP_MS = 40
 EXAMPLE = Path(__file__).parents[3] / "manifests/examples/cartpole-mjcf.yaml"

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
-from palaestra_trainer.launching.subprocesses import drain, end_child, first_line, start_child
 from palaestra_trainer.webots import Webots
+from palaestra_trainer.webots.launching.subprocesses import drain, end_child, first_line, start_child
 
 PATIENCE_S = 60.0
 CHATTERBOX = """
@@ -71,7 +71,7 @@ def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tm
     del master
     code = (
         "import sys\n"
-        "from palaestra_trainer.launching.local_simulator import ProcessLauncher\n"
+        "from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher\n"
         "launcher = ProcessLauncher('arena', suffix='_2')\n"
         "print(launcher.state().world, flush=True)\n"
         "sys.stdin.read()\n"

@@ -9,10 +9,10 @@ import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Mode
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 from tests.waiting import eventually
 
 STAND = np.zeros(1, dtype=np.int64)

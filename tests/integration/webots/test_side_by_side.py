@@ -13,13 +13,13 @@ import pytest
 
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
-from palaestra_trainer.launching.ros_name_locks import Reservation
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master
 from palaestra_trainer.webots import Attached, Webots
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.webots.launching.ros_name_locks import Reservation
 
 START = Pose(0.0, 0.0, 0.0)
 DEADLINE_S = 60.0
@@ -106,7 +106,7 @@ def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
 def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, name):
     """Two notebooks that start at the same time must not get the same name."""
     code = (
-        "from palaestra_trainer.launching.ros_name_locks import Reservation\n"
+        "from palaestra_trainer.webots.launching.ros_name_locks import Reservation\n"
         "held = Reservation()\n"
         f"print(held.take([{name!r}]), flush=True)\n"
         "input()\n"

@@ -12,14 +12,14 @@ import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_protocol.control import SidecarState
-from palaestra_trainer.configuration import Recycle
+from palaestra_trainer.job.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter, settle
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 from tests.waiting import eventually
 
 PATIENCE_S = 60.0

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import PERIOD_MS, SimulatedScene
 from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 STEPS = 20
 START = Pose(0.9, 0.3, 0.2)  # close enough to the wall ahead to reach it

@@ -10,13 +10,13 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_sim.ros import Loop, RosNode
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.simulators.restarter import Restarter, await_one
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.device_check import require_devices
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 DEADLINE_S = 60.0
 ARENA = builtin("arena")

@@ -4,7 +4,7 @@ import pytest
 import structlog
 
 from palaestra.local.readable_log import readable
-from palaestra_trainer.telemetry.logs import configure_logs
+from palaestra_trainer.run.telemetry.logs import configure_logs
 
 HEAD = "2026-11-27T17:23:06.142184Z "
 

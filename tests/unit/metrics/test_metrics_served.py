@@ -16,9 +16,9 @@ from prometheus_client.parser import text_string_to_metric_families
 from palaestra.operator import metric_definitions as of_operator
 from palaestra.operator.metrics import Metrics
 from palaestra_protocol.metrics import MetricType
-from palaestra_trainer import metric_definitions as of_trainer
-from palaestra_trainer.telemetry.metrics import registry
-from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.run.telemetry import metric_definitions as of_trainer
+from palaestra_trainer.run.telemetry.metrics import registry
+from palaestra_trainer.run.telemetry.progress import Progress
 
 
 def operator():

@@ -5,7 +5,7 @@ import yaml
 
 from palaestra.plan.training import RunAddresses
 from palaestra_protocol.fields import ProtocolError
-from palaestra_trainer.configuration import dump, parse
+from palaestra_trainer.job.configuration import dump, parse
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from palaestra.api.text import one_line, printable
 from palaestra_protocol.fields import clipped
 from palaestra_protocol.masking import masked
 from palaestra_protocol.pod.status import FaultRecord, Termination
-from palaestra_trainer.telemetry import logs
+from palaestra_trainer.run.telemetry import logs
 
 ADDRESS = "http://alice:S3CR@ET@127.0.0.1:5000/api?to=a@b"
 SECRET = "S3CR"

@@ -8,8 +8,8 @@ settle_imports()
 
 from typing import TYPE_CHECKING, Any
 
-from palaestra_trainer.compiler import defer_compiler
-from palaestra_trainer.deferred import defer_unused_imports
+from palaestra_trainer.deferred_imports.compiler import defer_compiler
+from palaestra_trainer.deferred_imports.sb3 import defer_unused_imports
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -117,7 +117,7 @@ def report(*, step: int, success_rate: float | None = None) -> None:
 
 
 def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> EnvGroup:
-    from palaestra_trainer.configuration import Environment
+    from palaestra_trainer.job.configuration import Environment
     from palaestra_trainer.errors import ConfigurationError
     from palaestra_trainer.fault_tolerant.make import make_players
     from palaestra_trainer.simulators.entry_point import role_of

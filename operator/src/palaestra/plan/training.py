@@ -1,6 +1,6 @@
 """training.yaml: the job's settings for one replica, as its trainer reads them.
 
-The trainer's `palaestra_trainer.configuration` declares all fields. On a laptop the command line reads the
+The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop the command line reads the
 addresses of a run, and nothing else, from the file; `RunAddresses` is next to the code that writes them.
 """
 

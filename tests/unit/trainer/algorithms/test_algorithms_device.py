@@ -11,10 +11,10 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from structlog.testing import capture_logs
 
-from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
-from palaestra_trainer.checkpoint.rng import Generators
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run import checkpoint
+from palaestra_trainer.run.checkpoint.rng import Generators
 from palaestra_trainer.run.evaluate import measure
 from palaestra_trainer.simulators.restarter import Restarter
 

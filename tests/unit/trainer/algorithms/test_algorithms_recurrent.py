@@ -16,7 +16,7 @@ from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
     ValidRecurrentRolloutBuffer,
 )
-from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.restarter import Restarter

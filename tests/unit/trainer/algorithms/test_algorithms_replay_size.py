@@ -9,7 +9,7 @@ from stable_baselines3.common.buffers import BaseBuffer
 
 from palaestra_trainer.algorithms.buffers import ValidDictReplayBuffer, ValidReplayBuffer
 from palaestra_trainer.algorithms.replay_size import ReplaySize, replay_size
-from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
 SUPPORTED = {name: space for name, space in OBSERVATIONS.items() if name != "Tuple"}

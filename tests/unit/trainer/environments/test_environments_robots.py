@@ -6,7 +6,7 @@ import gymnasium
 import pytest
 
 from palaestra.api.fields import ROBOTS
-from palaestra_trainer.configuration import Environment
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
 from palaestra_trainer.robots import Joints, RobotAbc, SceneWrapper

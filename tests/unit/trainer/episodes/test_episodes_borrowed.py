@@ -20,7 +20,7 @@ from palaestra_trainer.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.user_code.copies import copied
+from palaestra_trainer.job.user_code.copies import copied
 
 LENGTH = 3
 STEPS = 8

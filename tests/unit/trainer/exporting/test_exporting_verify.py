@@ -15,7 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, CombinedExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from palaestra_trainer.configuration import Environment
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting import onnx_file, safetensors_file, verify
 from palaestra_trainer.exporting.policy_module import PolicyModule

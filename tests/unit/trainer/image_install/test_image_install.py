@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_trainer.image_install import main
+from palaestra_trainer.cli.image_install import main
 
 PROJECT = """
 [project]

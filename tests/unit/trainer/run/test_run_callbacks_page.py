@@ -10,7 +10,7 @@ import yaml
 
 from palaestra.api import load
 from palaestra.plan import ClusterLayout, Images, identified, plan
-from palaestra_trainer.configuration import parse
+from palaestra_trainer.job.configuration import parse
 from tests.pages import blocks
 
 PAGE = (Path(__file__).parents[4] / "docs/howto/callbacks.md").read_text()

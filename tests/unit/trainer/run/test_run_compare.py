@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from palaestra_trainer.configuration import dump
+from palaestra_trainer.job.configuration import dump
 from palaestra_trainer.episodes.paired_difference import Pairs, Verdict
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.compare import (
@@ -19,7 +19,7 @@ from palaestra_trainer.run.compare import (
     notes,
     sentence_of,
 )
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.waiting.signals import Interrupted
 
 RULES = Rules()

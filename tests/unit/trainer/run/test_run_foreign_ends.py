@@ -17,7 +17,7 @@ from gymnasium import spaces
 from stable_baselines3.common.callbacks import BaseCallback
 
 from palaestra_trainer.run import attempt
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.waiting.exit import leave_after
 
 AT_STEP = 5
@@ -181,7 +181,7 @@ LIVES_ON = """
 import sys, threading, time
 from importlib import import_module
 from palaestra_trainer.cli import program
-from palaestra_trainer.telemetry.logs import configure_logs
+from palaestra_trainer.run.telemetry.logs import configure_logs
 configure_logs()
 name = sys.argv[1]
 module = import_module("palaestra_trainer.cli." + name)

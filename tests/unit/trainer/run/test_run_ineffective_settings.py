@@ -10,7 +10,7 @@ import structlog
 from gymnasium.wrappers import NormalizeObservation, NormalizeReward
 
 from palaestra_trainer.run import attempt
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 
 STEPS = 40
 SMALL = {"policy_kwargs": {"net_arch": [4]}}

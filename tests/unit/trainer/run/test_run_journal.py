@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer import checkpoint
 from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.journal import Journal
-from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
 
 KILLED = ZeroDivisionError("as good as a kill")
 

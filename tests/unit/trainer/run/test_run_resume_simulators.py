@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import structlog
 
-from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.resume import rejoin
 from palaestra_trainer.simulators.restarter import Restarter
 

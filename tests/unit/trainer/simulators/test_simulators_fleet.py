@@ -12,7 +12,7 @@ import pytest
 import structlog
 
 from palaestra_protocol.pod.status import ExitCode
-from palaestra_trainer.configuration import parse
+from palaestra_trainer.job.configuration import parse
 from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,

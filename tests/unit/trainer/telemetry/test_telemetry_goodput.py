@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.telemetry.goodput import GoodputLedger, trained_share
+from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.telemetry.goodput import GoodputLedger, trained_share
-from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.waiting.wait_time import count_wait, waited_s
 
 

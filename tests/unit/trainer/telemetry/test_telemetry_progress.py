@@ -13,8 +13,8 @@ import pytest
 from palaestra_protocol.pod.status import Cause, TrainerStatus
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
-from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.status_server import status_server
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry.status_server import status_server
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 from structlog.testing import capture_logs
 
 from palaestra_protocol.pod.status import SimulatorStatus, TrainerStatus
-from palaestra_trainer.telemetry.progress_log import ProgressLog
+from palaestra_trainer.run.telemetry.progress_log import ProgressLog
 
 STATUS = TrainerStatus(
     step=50,

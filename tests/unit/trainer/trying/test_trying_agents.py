@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
+from palaestra_trainer.cli.trying.agents import EndEpisode, EndTry, Random, Zero, names_of_actions, zero_of
+from palaestra_trainer.cli.trying.keyboard import Keyboard
+from palaestra_trainer.cli.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, decode, keys_of, legend
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.geometry import Movement
-from palaestra_trainer.trying.agents import EndEpisode, EndTry, Random, Zero, names_of_actions, zero_of
-from palaestra_trainer.trying.keyboard import Keyboard
-from palaestra_trainer.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, decode, keys_of, legend
 from palaestra_trainer.waiting.signals import Interrupted, go_on
 
 MASKED = (spaces.Discrete(4, start=2), spaces.MultiDiscrete([2, 3]), spaces.MultiBinary(3))

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
+from palaestra_trainer.cli.trying import episodes
+from palaestra_trainer.cli.trying.agents import EndEpisode, Random, Zero
+from palaestra_trainer.cli.trying.problems import Problems
+from palaestra_trainer.cli.trying.report import as_json, line_of, summary
+from palaestra_trainer.cli.trying.step_times import StepTimes
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.trying import episodes
-from palaestra_trainer.trying.agents import EndEpisode, Random, Zero
-from palaestra_trainer.trying.problems import Problems
-from palaestra_trainer.trying.report import as_json, line_of, summary
-from palaestra_trainer.trying.step_times import StepTimes
 from palaestra_trainer.waiting.signals import Interrupted, go_on
 
 

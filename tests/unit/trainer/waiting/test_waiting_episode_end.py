@@ -12,8 +12,8 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
-from palaestra_trainer.waiting import episode_end
-from palaestra_trainer.waiting.episode_end import SAY_EVERY_S, EpisodeEnd
+from palaestra_trainer.environments import episode_end
+from palaestra_trainer.environments.episode_end import SAY_EVERY_S, EpisodeEnd
 
 
 class Endless(FakeTask):

@@ -21,7 +21,7 @@ from stable_baselines3.common.buffers import (
 )
 
 from palaestra_trainer.algorithms.observations import by_name, part
-from palaestra_trainer.infos import is_valid
+from palaestra_trainer.environments.infos import is_valid
 
 
 def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:

@@ -12,7 +12,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.user_code.kwargs import named, takes_any
+from palaestra_trainer.job.user_code.kwargs import named, takes_any
 
 Configurable = type[BaseAlgorithm] | type[BasePolicy]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import structlog
 import torch
 
-from palaestra_trainer.configuration import Device
+from palaestra_trainer.job.configuration import Device
 
 log = structlog.get_logger(__name__)
 

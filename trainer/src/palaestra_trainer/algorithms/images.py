@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage, unwrap_v
 from palaestra_trainer.algorithms.observations import Observations
 from palaestra_trainer.algorithms.small_cnn import SmallCnn
 from palaestra_trainer.algorithms.space_compat import images_in
-from palaestra_trainer.configuration import Cnn
+from palaestra_trainer.job.configuration import Cnn
 
 
 def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from stable_baselines3.common.noise import (
 )
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.configuration import nearest
+from palaestra_trainer.job.configuration import nearest
 
 KINDS: Mapping[str, type[NormalActionNoise | OrnsteinUhlenbeckActionNoise]] = {
     "normal": NormalActionNoise,

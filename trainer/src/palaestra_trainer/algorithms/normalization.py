@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.observations import Observations, by_name, part
 from palaestra_trainer.algorithms.space_compat import scalable
-from palaestra_trainer.configuration import Normalize
+from palaestra_trainer.job.configuration import Normalize
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class ValidNormalize(VecNormalize):
     """VecNormalize for rows of which some may be invalid.
 
     Args:
-        venv: marks the invalid rows of a step or a reset (`palaestra_trainer.infos`).
+        venv: marks the invalid rows of a step or a reset (`palaestra_trainer.environments.infos`).
         wanted: the values to normalize, and the limits to which they are clipped.
         gamma: discount of the return; its deviation scales the rewards.
     """

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 
 from palaestra_trainer.errors import ConfigurationError, fact_of
-from palaestra_trainer.user_code import imports
+from palaestra_trainer.job.user_code import imports
 
 _TRIED = (1.0, 0.5, 0.0)  # remaining shares of the steps
 

@@ -26,9 +26,9 @@ from palaestra_trainer.algorithms import buffer_options, noise
 from palaestra_trainer.algorithms.constructor_params import parameters
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.valid_rows import with_valid_rows
-from palaestra_trainer.configuration import nearest
+from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.user_code import imports
+from palaestra_trainer.job.user_code import imports
 
 # A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some, and
 # others are checked elsewhere. Buffers for valid rows cannot support the rest, because they store rows of

@@ -27,7 +27,7 @@ from stable_baselines3.common.utils import obs_as_tensor, safe_mean
 
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.episodes import Batch, EpisodeRecorder
-from palaestra_trainer.waiting.episode_end import EpisodeEnd
+from palaestra_trainer.environments.episode_end import EpisodeEnd
 
 
 class REINFORCE(BaseAlgorithm):

@@ -16,7 +16,7 @@ from stable_baselines3.common.preprocessing import get_action_dim, get_obs_shape
 
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.space_compat import KINDS
-from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.job.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize
 _REWARD_DONE_TIMEOUT = 3 * _FLOAT

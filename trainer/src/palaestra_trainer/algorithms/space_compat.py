@@ -15,9 +15,9 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 
 from palaestra_trainer.algorithms.registry import RegisteredAlgorithm, entry_of
-from palaestra_trainer.configuration import Algorithm, Cnn, nearest
+from palaestra_trainer.job.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.user_code import imports
+from palaestra_trainer.job.user_code import imports
 
 KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
 # The convolutions of each network need at least this number of pixels per side.

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from palaestra_protocol.foreign_words import ELSEWHERE, FROM_ZOO, OF_ZOO
 from palaestra_trainer.algorithms.registry import ALGORITHMS, RegisteredAlgorithm
-from palaestra_trainer.configuration import nearest
+from palaestra_trainer.job.configuration import nearest
 
 # The least similarity to a known word. Those of gama and num_steps are greater; those of n_timesteps and
 # n_epochs to n_steps are less.

@@ -19,11 +19,11 @@ from palaestra_protocol.linux import require_linux
 from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
-from palaestra_trainer.configuration import CONFIG_VARIABLE, load, load_run
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, load, load_run
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.simulators.drivers import DRIVERS
-from palaestra_trainer.telemetry.logs import configure_logs
 
 EVAL = f"""\
 Evaluate the model.zip of a run directory, on episodes with seeds from a stream that training did not use.

@@ -16,7 +16,7 @@ import_without("rich", "structlog")
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run
 from palaestra_trainer.errors import TrainerError
-from palaestra_trainer.telemetry.logs import configure_logs
+from palaestra_trainer.run.telemetry.logs import configure_logs
 
 EXPORT = """\
 Write the best policy of a run as one file for other programs.

@@ -21,15 +21,15 @@ from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
-from palaestra_trainer.configuration import Configuration, load_run
+from palaestra_trainer.job.configuration import Configuration, load_run
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.telemetry.logs import configure_logs
+from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.waiting.signals import Interruption
 
 if TYPE_CHECKING:
+    from palaestra_trainer.cli.trying.agents import Agent
     from palaestra_trainer.episodes.evaluation import Episode
     from palaestra_trainer.simulators.restarter import Restarter
-    from palaestra_trainer.trying.agents import Agent
 
 AGENTS = ("zero", "random", "keyboard")
 SEEDS = "try"
@@ -86,11 +86,11 @@ def _attempt(chosen: argparse.Namespace, interruption: Interruption) -> int:
             "run it in a terminal, or use --agent random"
         )
     with without_collections():
+        from palaestra_trainer.cli.trying import episodes, report
         from palaestra_trainer.episodes.seeds import episode_seeds
         from palaestra_trainer.simulators.connect import connect_here
         from palaestra_trainer.simulators.fleet import Fleet
         from palaestra_trainer.simulators.interface import NullWatcher
-        from palaestra_trainer.trying import episodes, report
 
     configuration = _alone(load_run(chosen.run))
     fleet = Fleet(configuration, connect_here(configuration, run=chosen.run), NullWatcher())
@@ -121,7 +121,7 @@ def _agent(
     chosen: argparse.Namespace, restarter: Restarter, seed: int, interruption: Interruption
 ) -> Iterator[tuple[Agent, list[str]]]:
     """Yield the agent, with lines for the person who is one."""
-    from palaestra_trainer.trying import agents, keyboard, keymap
+    from palaestra_trainer.cli.trying import agents, keyboard, keymap
 
     env = restarter.member.env
     if chosen.agent == "keyboard":

@@ -28,7 +28,7 @@ from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.waiting.at_once import at_once
-from palaestra_trainer.waiting.episode_end import EpisodeEnd
+from palaestra_trainer.environments.episode_end import EpisodeEnd
 from palaestra_trainer.waiting.signals import Check, go_on
 
 

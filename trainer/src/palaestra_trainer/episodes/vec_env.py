@@ -24,10 +24,10 @@ from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
 from palaestra_trainer.episodes.collector import CollectedRow, Collector
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.errors import fact_of
-from palaestra_trainer.infos import is_valid
+from palaestra_trainer.environments.infos import is_valid
 from palaestra_trainer.simulators.interface import Environment
 from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
-from palaestra_trainer.user_code.copies import copied
+from palaestra_trainer.job.user_code.copies import copied
 from palaestra_trainer.waiting.greenlets import take_turns
 from palaestra_trainer.waiting.signals import Check, go_on
 

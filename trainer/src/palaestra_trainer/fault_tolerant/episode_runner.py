@@ -1,7 +1,7 @@
 """One member that plays episodes for a training loop that cannot handle faults.
 
 Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
-reward 0 and `sim_fault` (`palaestra_trainer.infos`). The member is restarted in the background, and the next
+reward 0 and `sim_fault` (`palaestra_trainer.environments.infos`). The member is restarted in the background, and the next
 episode begins when it is up.
 """
 
@@ -14,10 +14,10 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.seeding import np_random
 
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.infos import OURS, of_environment
+from palaestra_trainer.environments.infos import OURS, of_environment
 from palaestra_trainer.simulators.interface import Environment, Step
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.user_code.copies import copied
+from palaestra_trainer.job.user_code.copies import copied
 
 
 class StepResult(NamedTuple):

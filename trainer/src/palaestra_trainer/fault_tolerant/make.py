@@ -11,7 +11,7 @@ from uuid import uuid4
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.configuration import (
+from palaestra_trainer.job.configuration import (
     CONFIG_VARIABLE,
     Configuration,
     Environment,
@@ -21,8 +21,8 @@ from palaestra_trainer.configuration import (
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.fault_tolerant.episode_runner import StepResult
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.run.custom_program import ProgramReport, reported
+from palaestra_trainer.run.telemetry.progress_sources import follow
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.configured import require_driver
 from palaestra_trainer.simulators.connect import connect_members, robot_of, simulator_at
@@ -35,7 +35,7 @@ from palaestra_trainer.simulators.notebook_simulator import (
     offered_simulator,
 )
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.telemetry.progress_sources import follow
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 
 def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:

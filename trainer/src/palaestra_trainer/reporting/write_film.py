@@ -13,7 +13,7 @@ from palaestra_trainer.reporting.film import animated, pictures
 from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Replay
 from palaestra_trainer.reporting.tolerant_files import json_file
-from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
 VIDEO_PX: Final = 720
 _LEAST_HZ, _MOST_HZ = 1, 60

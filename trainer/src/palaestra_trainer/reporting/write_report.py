@@ -12,7 +12,7 @@ import structlog
 
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.read_run import read_run
-from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
 log = structlog.get_logger(__name__)
 

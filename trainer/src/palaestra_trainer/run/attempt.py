@@ -19,18 +19,19 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
 from palaestra_protocol.pod.status import Cause, ExitCode
-from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer import algorithms
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
-from palaestra_trainer.checkpoint import SavedCheckpoint
-from palaestra_trainer.configuration import Configuration, dump
+from palaestra_trainer.job.configuration import Configuration, dump
 from palaestra_trainer.environments.env_checker import refuse_statistics
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import Enough, forget_after
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
+from palaestra_trainer.run.checkpoint import SavedCheckpoint
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.directory_check import inspect
 from palaestra_trainer.run.end_record import write_end
@@ -39,19 +40,19 @@ from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.logger import CurvesLogger, hide_points
 from palaestra_trainer.run.resume import rejoin
 from palaestra_trainer.run.summary import finished, last_word_of, summarise, write_summary
+from palaestra_trainer.run.telemetry.fault_log import FaultLog
+from palaestra_trainer.run.telemetry.metrics import constants
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry.progress_sources import follow
+from palaestra_trainer.run.telemetry.status_server import status_server
 from palaestra_trainer.run.tensorboard_link import link_curves
 from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.training_callback import Resumed, TrainingCallback
 from palaestra_trainer.run.versions import versions
 from palaestra_trainer.run.watchdog import Watchdog, stalled
-from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.interface import Member
-from palaestra_trainer.telemetry.fault_log import FaultLog
-from palaestra_trainer.telemetry.metrics import constants
-from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.progress_sources import follow
-from palaestra_trainer.telemetry.status_server import status_server
 from palaestra_trainer.waiting.exit import leave_after
 from palaestra_trainer.waiting.signals import Interruption
 

@@ -21,16 +21,17 @@ import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer import algorithms
 from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_all
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.logger import CurvesLogger
 from palaestra_trainer.run.replays import films_of, keep_replays
-from palaestra_trainer.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
+from palaestra_trainer.run.telemetry.progress import Progress
+from palaestra_trainer.job.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
 from palaestra_trainer.simulators.fleet import resting, running
-from palaestra_trainer.telemetry.progress import Progress
 
 log = structlog.get_logger(__name__)
 

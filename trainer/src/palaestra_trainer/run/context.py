@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.run.telemetry.progress import Progress
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.simulators.fleet import Fleet
-from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.waiting.signals import Interruption
 
 

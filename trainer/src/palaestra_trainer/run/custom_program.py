@@ -17,12 +17,12 @@ from typing import Any
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import Cause, Termination
-from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
-from palaestra_trainer.infos import ours
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
+from palaestra_trainer.environments.infos import ours
+from palaestra_trainer.run.telemetry.metrics import constants
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry.status_server import status_server
 from palaestra_trainer.run.termination import write_last_word
-from palaestra_trainer.telemetry.metrics import constants
-from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.status_server import status_server
 
 _lock = threading.Lock()
 _EVALUATING_S = 60.0  # no step of an environment takes longer

@@ -11,14 +11,15 @@ from typing import Any
 import structlog
 
 from palaestra_protocol.pod.enums import ExitCode, Role
-from palaestra_trainer import algorithms, checkpoint
-from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer import algorithms
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.episodes.evaluation import ActingPolicy, evaluate_on_all
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import NullWatcher

@@ -12,7 +12,7 @@ from typing import Any
 
 import gymnasium
 
-from palaestra_trainer.configuration import DEFAULT_ROBOT, Configuration
+from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.episodes.vec_env import COMPUTE_REWARD
 from palaestra_trainer.errors import ConfigurationError

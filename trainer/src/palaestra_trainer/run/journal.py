@@ -15,7 +15,7 @@ from pathlib import Path
 
 import structlog
 
-from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
 
 log = structlog.get_logger(__name__)
 

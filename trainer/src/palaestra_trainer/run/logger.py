@@ -8,8 +8,8 @@ from pathlib import Path
 
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from palaestra_trainer.telemetry.metric_values import Logged
-from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.run.telemetry.metric_values import Logged
+from palaestra_trainer.run.telemetry.progress import Progress
 
 _RGB = 3  # Summary.Image.colorspace; source: tensorflow/core/framework/summary.proto
 

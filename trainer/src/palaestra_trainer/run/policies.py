@@ -14,14 +14,14 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
-from palaestra_trainer.checkpoint.tensors import NORMALIZE
-from palaestra_trainer.configuration import Configuration, Environment, load
+from palaestra_trainer.job.configuration import Configuration, Environment, load
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.run.byte_code import refuse_another_python
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
+from palaestra_trainer.job.run_directory import RunDirectory
 
 
 class Scale(NamedTuple):

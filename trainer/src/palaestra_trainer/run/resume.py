@@ -13,9 +13,9 @@ import numpy as np
 import structlog
 
 from palaestra_trainer.algorithms.observations import Observations, equal_rows
-from palaestra_trainer.checkpoint import TrainingState
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.checkpoint import TrainingState
 
 log = structlog.get_logger(__name__)
 

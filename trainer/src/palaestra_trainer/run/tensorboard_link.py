@@ -16,8 +16,8 @@ from contextlib import ExitStack, suppress
 
 import structlog
 
-from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.job.run_directory import RunDirectory
 
 log = structlog.get_logger(__name__)
 

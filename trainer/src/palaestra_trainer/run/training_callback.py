@@ -17,15 +17,15 @@ import structlog
 from stable_baselines3.common.callbacks import BaseCallback
 
 from palaestra_protocol.pod.status import Cause
-from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.divergence import Learner
-from palaestra_trainer.checkpoint import SavedCheckpoint, Tensors, TrainingState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import Selection, last_evaluated
+from palaestra_trainer.run.checkpoint import SavedCheckpoint, Tensors, TrainingState
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.journal import Journal
-from palaestra_trainer.telemetry.progress_log import ProgressLog
+from palaestra_trainer.run.telemetry.progress_log import ProgressLog
 from palaestra_trainer.waiting import shutdown_deadline
 
 log = structlog.get_logger(__name__)

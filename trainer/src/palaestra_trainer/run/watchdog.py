@@ -16,8 +16,8 @@ from typing import Self
 import structlog
 
 from palaestra_protocol.pod.status import ExitCode
+from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.run.termination import End
-from palaestra_trainer.telemetry.progress import Progress
 
 log = structlog.get_logger(__name__)
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.launching.locks import FileLock
+from palaestra_trainer.webots.launching.locks import FileLock
 
 
 class Allocation(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from palaestra_trainer.simulators.interface import Environment
-from palaestra_trainer.user_code.copies import copied
+from palaestra_trainer.job.user_code.copies import copied
 
 
 class Attributes:

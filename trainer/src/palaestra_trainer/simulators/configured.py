@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
-from palaestra_trainer.configuration import (
+from palaestra_trainer.job.configuration import (
     CONFIG_VARIABLE,
     DEFAULT_ROBOT,
     Configuration,
@@ -21,8 +21,6 @@ from palaestra_trainer.configuration import (
 )
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
-from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.ros import ensure_node
@@ -32,6 +30,8 @@ from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.facade import open_facades
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
+from palaestra_trainer.webots.launching.sidecar import Sidecar
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:

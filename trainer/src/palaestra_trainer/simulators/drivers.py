@@ -6,7 +6,7 @@ import importlib.util
 import shutil
 from pathlib import Path
 
-from palaestra_trainer.configuration import SimulatorConfiguration
+from palaestra_trainer.job.configuration import SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 
 DRIVERS = ("stub", "mujoco", "webots")

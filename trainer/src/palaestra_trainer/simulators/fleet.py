@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 import structlog
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.interface import Member, Watcher

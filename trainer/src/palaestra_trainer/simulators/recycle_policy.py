@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from palaestra_trainer.configuration import Recycle
+from palaestra_trainer.job.configuration import Recycle
 
 ASK_MEMORY_EVERY_S = 1.0  # the sidecar adds it up over all processes of the simulator
 

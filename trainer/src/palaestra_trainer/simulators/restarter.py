@@ -36,7 +36,7 @@ from palaestra_trainer.simulators.finite_check import check_observation, check_r
 from palaestra_trainer.simulators.interface import Member, NullWatcher, Step, Watcher
 from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
-from palaestra_trainer.user_code.copies import copied
+from palaestra_trainer.job.user_code.copies import copied
 from palaestra_trainer.waiting.greenlets import away_s, let_others
 from palaestra_trainer.waiting.signals import Check, go_on
 

@@ -11,9 +11,8 @@ from typing import Any
 import gymnasium
 
 from palaestra_protocol.control import RobotName
-from palaestra_trainer.configuration import Recycle
+from palaestra_trainer.job.configuration import Recycle
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
-from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.sight import Sight
@@ -21,6 +20,7 @@ from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.recycle_policy import RecyclePolicy
 from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.facade import open_facades
+from palaestra_trainer.webots.launching.sidecar import Sidecar
 
 _POLL_S = 0.1
 

@@ -6,7 +6,7 @@ from collections import deque
 from typing import Protocol, runtime_checkable
 
 from palaestra_protocol.metrics import Tally
-from palaestra_trainer import metric_definitions
+from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.simulators.budget import RestartBudget
 from palaestra_trainer.simulators.interface import Member
 

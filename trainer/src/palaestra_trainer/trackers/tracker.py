@@ -17,7 +17,7 @@ import yaml
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import KVWriter
 
-from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
 TENSORBOARD = "tensorboard"  # a record with this name in its exclusions is not for TensorBoard
 

@@ -10,7 +10,7 @@ import structlog
 import wandb
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run, title_of
 
 log = structlog.get_logger(__name__)

@@ -20,9 +20,9 @@ from palaestra_trainer.errors import (
     SimulatorRefused,
     TrainerError,
 )
-from palaestra_trainer.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.facade_registry import FacadeRegistry
+from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 

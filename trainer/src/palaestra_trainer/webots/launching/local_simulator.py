@@ -13,10 +13,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.launching.master import ensure_master
-from palaestra_trainer.launching.ros_name_locks import Reservation
-from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.launching.subprocesses import drain, end_child, first_line, start_child
+from palaestra_trainer.webots.launching.master import ensure_master
+from palaestra_trainer.webots.launching.ros_name_locks import Reservation
+from palaestra_trainer.webots.launching.sidecar import Sidecar
+from palaestra_trainer.webots.launching.subprocesses import drain, end_child, first_line, start_child
 
 _END_S = 20.0
 _MOST_BESIDE = 100

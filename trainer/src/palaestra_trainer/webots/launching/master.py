@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 from palaestra_trainer.errors import MasterLost
-from palaestra_trainer.launching.subprocesses import first_line, start_child
 from palaestra_trainer.ros import Master
+from palaestra_trainer.webots.launching.subprocesses import first_line, start_child
 
 
 def ensure_master() -> None:

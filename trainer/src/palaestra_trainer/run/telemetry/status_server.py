@@ -13,8 +13,8 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 from palaestra_protocol.http import Address, Response, Server, json_response, probe_response
 from palaestra_protocol.metrics import Family, Values
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.telemetry import metrics
-from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.run.telemetry import metrics
+from palaestra_trainer.run.telemetry.progress import Progress
 
 
 def status_server(

@@ -1,4 +1,4 @@
-"""Definitions of all metrics of a trainer, by name; `palaestra_trainer.telemetry.metrics` reads the values.
+"""Definitions of all metrics of a trainer, by name; `palaestra_trainer.run.telemetry.metrics` reads the values.
 
 Metrics of the run continue in the next attempt, because its checkpoints keep them. Metrics of its simulators
 begin at 0 in each attempt. Prometheus adds the labels of job and replica when it scrapes.

@@ -23,9 +23,9 @@ from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.algorithms.observations import Observations, by_name, from_names
 from palaestra_trainer.algorithms.rollout_state import beside
-from palaestra_trainer.checkpoint import recurrent_state
-from palaestra_trainer.checkpoint.rng import Generators
 from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.run.checkpoint import recurrent_state
+from palaestra_trainer.run.checkpoint.rng import Generators
 
 STATE = "state.json"
 ARRAYS = "state.npz"

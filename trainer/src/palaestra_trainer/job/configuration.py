@@ -30,7 +30,7 @@ from pydantic_core import ErrorDetails
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.job.run_directory import RunDirectory
 
 log = structlog.get_logger(__name__)
 

@@ -11,7 +11,7 @@ from typing import Any
 from stable_baselines3.common.logger import KVWriter
 
 from palaestra_protocol.metrics import Tally
-from palaestra_trainer import metric_definitions
+from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.episodes.evaluation import EvaluationResult
 from palaestra_trainer.simulators.stats import SimulatorStats
 

@@ -19,8 +19,8 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms.normalization import normalizer_of
-from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
 
 log = structlog.get_logger(__name__)
 

@@ -11,8 +11,8 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from palaestra_trainer.launching.locks import FileLock, refusal
 from palaestra_trainer.ros import Master
+from palaestra_trainer.webots.launching.locks import FileLock, refusal
 
 TEMPORARY = "TMPDIR"  # the environment variable that names the folder for temporary files
 

@@ -14,7 +14,7 @@ from typing import Any
 import structlog
 
 from palaestra_protocol.pod.status import FaultRecord
-from palaestra_trainer.run_directory import append_line
+from palaestra_trainer.job.run_directory import append_line
 
 log = structlog.get_logger(__name__)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.errors import ConfigurationError
 
 MANIFEST = "manifest.json"

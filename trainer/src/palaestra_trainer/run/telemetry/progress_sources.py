@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.simulators.interface import Member, ReportsLeftOut, Spared
-from palaestra_trainer.telemetry.progress import Progress
 
 
 def follow(progress: Progress, members: Iterable[Member]) -> None:

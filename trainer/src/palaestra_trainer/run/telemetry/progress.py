@@ -28,11 +28,11 @@ from palaestra_protocol.pod.status import (
 from palaestra_protocol.scene import SceneState
 from palaestra_trainer.episodes.evaluation import EvaluationResult
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.infos import extra_steps
-from palaestra_trainer.telemetry.fault_log import FaultLog
-from palaestra_trainer.telemetry.goodput import GoodputLedger
-from palaestra_trainer.telemetry.metric_values import EPISODES_IN_MEAN, MetricValues
-from palaestra_trainer.telemetry.simulator_status import AskLeftOut, AskStandby, SimulatorStatuses
+from palaestra_trainer.environments.infos import extra_steps
+from palaestra_trainer.run.telemetry.fault_log import FaultLog
+from palaestra_trainer.run.telemetry.goodput import GoodputLedger
+from palaestra_trainer.run.telemetry.metric_values import EPISODES_IN_MEAN, MetricValues
+from palaestra_trainer.run.telemetry.simulator_status import AskLeftOut, AskStandby, SimulatorStatuses
 
 SPEED_WINDOW_S = 30.0
 PHASES: Mapping[Cause, str] = MappingProxyType(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
-from palaestra_trainer.metric_definitions import RECYCLED
+from palaestra_trainer.run.telemetry.metric_definitions import RECYCLED
 
 FLAPPING_S = 600.0  # a simulator counts as flapping for this time after the last call of `flaps`
 AskStandby = Callable[[], str | None]

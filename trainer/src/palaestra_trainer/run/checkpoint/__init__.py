@@ -7,11 +7,11 @@ Loading does not unpickle: the model is rebuilt from the configuration, tensors 
 and the rest is JSON and plain arrays. docs/decisions/0008-exact-resume.md explains exact resumes.
 """
 
-from palaestra_trainer.checkpoint.initial_policy import begin_from
-from palaestra_trainer.checkpoint.manifest import Manifest, SavedCheckpoint, describe, refuse_another_run
-from palaestra_trainer.checkpoint.state import TrainingState
-from palaestra_trainer.checkpoint.store import Saver, newest, restore, tidy
-from palaestra_trainer.checkpoint.tensors import Tensors, load_tensors, save_tensors
+from palaestra_trainer.run.checkpoint.initial_policy import begin_from
+from palaestra_trainer.run.checkpoint.manifest import Manifest, SavedCheckpoint, describe, refuse_another_run
+from palaestra_trainer.run.checkpoint.state import TrainingState
+from palaestra_trainer.run.checkpoint.store import Saver, newest, restore, tidy
+from palaestra_trainer.run.checkpoint.tensors import Tensors, load_tensors, save_tensors
 
 __all__ = [
     "Manifest",

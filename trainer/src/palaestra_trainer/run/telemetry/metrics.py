@@ -18,10 +18,10 @@ from prometheus_client.registry import Collector
 
 from palaestra_protocol.metrics import Family, Values
 from palaestra_protocol.pod.status import SimulatorStatus, SuccessInterval, TrainerStatus
-from palaestra_trainer import metric_definitions
-from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.telemetry.metric_values import MetricValues
-from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.run.telemetry import metric_definitions
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.run.telemetry.metric_values import MetricValues
+from palaestra_trainer.run.telemetry.progress import Counters, Progress
 
 # Each value of the label, with the name under which Stable-Baselines3 logs it.
 LOSSES = MappingProxyType({name: f"train/{name}" for name in metric_definitions.LOSSES})
