@@ -20,8 +20,8 @@ from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.view.describe import describe
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 from palaestra_trainer.job import configuration as trainer
-from palaestra_trainer.run import checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run import checkpoint
 
 OLD = Path(__file__).parents[1] / "fixtures" / "0.1.0"
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"

@@ -7,8 +7,8 @@ tests/unit/trainer/algorithms/test_algorithms_grid.py trains in every cell that 
 from palaestra.api.generated_sections import between_marks
 from palaestra_trainer.algorithms import ALGORITHMS
 from palaestra_trainer.algorithms.space_compat import policy_of_spaces
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 
 PAGE = "docs/reference/algorithms.md"

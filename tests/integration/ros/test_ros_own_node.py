@@ -135,7 +135,7 @@ UNTIL_KILLED = """
 import time
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.ros.node import node_uri
-from palaestra_trainer.waiting.signals import Interruption
+from palaestra_trainer.run.signals import Interruption
 ensure_node()
 print(node_uri(), flush=True)
 with {} as interruption:

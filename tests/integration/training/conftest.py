@@ -14,9 +14,9 @@ import pytest
 import yaml
 
 from palaestra_trainer.job.configuration import load
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run.telemetry.logs import configure_logs
-from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 PROGRAM = Path(__file__).with_name("fakes.py")

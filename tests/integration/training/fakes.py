@@ -17,12 +17,12 @@ from typing import Any
 import gymnasium
 
 import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
-from palaestra_trainer.job.configuration import Configuration, load
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.job.configuration import Configuration, load
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt
 from palaestra_trainer.run.telemetry.logs import configure_logs
-from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.testing import fake_arena, fake_seeing
 
 

@@ -15,13 +15,13 @@ import torch
 from stable_baselines3.common.save_util import load_from_zip_file
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
-from palaestra_trainer.job.configuration import load
 from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.job.configuration import load
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.run.telemetry.progress import Progress
-from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.waiting import shutdown_deadline
 
 SMALL = {"policy_kwargs": {"net_arch": [16]}}

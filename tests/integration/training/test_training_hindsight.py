@@ -11,9 +11,9 @@ import pytest
 
 from palaestra_trainer import load_policy
 from palaestra_trainer.job.configuration import load
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt as run_attempt
 from palaestra_trainer.run import checkpoint
-from palaestra_trainer.job.run_directory import RunDirectory
 
 GOALS = {"id": "MoveToTargetGoalEnv-v0", "reward": "Sparse", "options": {"max_steps": 30}}
 HINDSIGHT = {

@@ -5,14 +5,14 @@ import sys
 
 ASKED_DURING_IMPORTS = """
 import os, signal
-from palaestra_trainer.waiting.signals import leaving_when_asked
+from palaestra_trainer.run.signals import leaving_when_asked
 with leaving_when_asked():
     os.kill(os.getpid(), signal.SIGTERM)
 """
 
 ASKED_AT_EXIT = """
 import atexit, os, signal
-from palaestra_trainer.waiting.signals import leaving_when_asked
+from palaestra_trainer.run.signals import leaving_when_asked
 atexit.register(os.kill, os.getpid(), signal.SIGTERM)
 with leaving_when_asked():
     pass

@@ -10,11 +10,11 @@ import pytest
 from palaestra_trainer import load_policy
 from palaestra_trainer.algorithms import make_model, policy_of, small_cnn
 from palaestra_trainer.algorithms.saved_hyperparameters import begun_with
-from palaestra_trainer.job.configuration import load
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run.checkpoint import load_tensors
+from palaestra_trainer.job.configuration import load
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.checkpoint import load_tensors
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import fake_arena, fake_seeing
 

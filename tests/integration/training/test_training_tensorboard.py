@@ -13,8 +13,8 @@ import pytest
 from torch.utils.tensorboard.writer import SummaryWriter
 
 from palaestra_trainer.job.configuration import parse
-from palaestra_trainer.run.tensorboard_link import FOLDER, link_curves
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.tensorboard_link import FOLDER, link_curves
 from tests.waiting import eventually
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"

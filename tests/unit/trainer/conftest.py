@@ -14,10 +14,10 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_protocol.pod.status import Termination
-from palaestra_trainer.job.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
-from palaestra_trainer.run import attempt
+from palaestra_trainer.job.configuration import Configuration, parse
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run import attempt
 
 PATIENCE_S = 20.0
 GOAL = 3

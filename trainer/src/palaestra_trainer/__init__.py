@@ -117,14 +117,6 @@ def report(*, step: int, success_rate: float | None = None) -> None:
 
 
 def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> EnvGroup:
-    from palaestra_trainer.job.configuration import Environment
-    from palaestra_trainer.errors import ConfigurationError
     from palaestra_trainer.fault_tolerant.make import make_players
-    from palaestra_trainer.simulators.entry_point import role_of
 
-    if environment is None and options:
-        raise ConfigurationError(
-            f"environment: options were given without it ({', '.join(options)}); name the environment too"
-        )
-    wanted = None if environment is None else Environment(id=environment, options=options)
-    return make_players(wanted, number, role_of(role))
+    return make_players(environment, number, role, options)

@@ -4,7 +4,7 @@ TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
-├── Interrupted          a signal asked the run to end (waiting.signals)      exit 75
+├── Interrupted          a signal asked the run to end (run.signals)          exit 75
 ├── Enough               the wanted success rate is reached (run.best_model)  exit 0
 ├── CallbackFailed       a callback of the job raised an error               exit 1
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80

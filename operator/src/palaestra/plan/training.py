@@ -1,7 +1,7 @@
 """training.yaml: the job's settings for one replica, as its trainer reads them.
 
-The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop the command line reads the
-addresses of a run, and nothing else, from the file; `RunAddresses` is next to the code that writes them.
+The trainer's `palaestra_trainer.job.configuration` declares all fields. On a laptop the command line reads
+only the addresses of a run from the file; `RunAddresses` is next to the code that writes them.
 """
 
 from collections.abc import Mapping

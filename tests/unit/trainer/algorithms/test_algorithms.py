@@ -14,9 +14,9 @@ from torch import nn, optim
 from palaestra_protocol.foreign_words import ELSEWHERE, OF_ZOO
 from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, buffer_options, check, make_model
 from palaestra_trainer.algorithms.registry import OURS
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.simulators.restarter import Restarter
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}

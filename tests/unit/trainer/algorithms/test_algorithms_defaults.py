@@ -13,11 +13,11 @@ import stable_baselines3 as sb3
 
 from palaestra_trainer.algorithms import ALGORITHMS
 from palaestra_trainer.algorithms.make_model import resolve
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.seeds import EVALUATE
+from palaestra_trainer.job.configuration import Algorithm
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.evaluate import measure
-from palaestra_trainer.job.run_directory import RunDirectory
 
 SB3 = {"DQN": sb3.DQN, "SAC": sb3.SAC, "PPO": sb3.PPO, "A2C": sb3.A2C}
 ARENA = "MoveToTargetEnv-v0"

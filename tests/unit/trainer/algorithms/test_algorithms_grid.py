@@ -16,8 +16,8 @@ import torch
 from palaestra.api.fields import ALGORITHMS as NAMES
 from palaestra_trainer import load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
-from palaestra_trainer.run import attempt, checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.run import attempt, checkpoint
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
 from tools.algorithms import refusal

@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from palaestra_trainer.algorithms import check
 from palaestra_trainer.algorithms.her import ValidHerReplayBuffer, refuse_other_observations
 from palaestra_trainer.algorithms.replay_size import replay_size
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.environments import MoveToTargetGoalEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.testing import fake_arena
 
 GOAL = spaces.Box(-100.0, 100.0, (1,), np.float32)

@@ -15,11 +15,11 @@ from stable_baselines3.common.torch_layers import FlattenExtractor, NatureCNN
 
 from palaestra_trainer.algorithms import make_model
 from palaestra_trainer.algorithms.small_cnn import SmallCnn
-from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run import attempt, checkpoint
+from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.run import attempt, checkpoint
 from palaestra_trainer.simulators.restarter import Restarter
 
 ROWS, COLUMNS = 36, 48

@@ -15,9 +15,9 @@ from palaestra_trainer.algorithms.constructor_params import types
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.hyperparameters import policy_class
 from palaestra_trainer.algorithms.registry import entry_of
-from palaestra_trainer.job.configuration import Algorithm
-from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.environments.infos import OURS
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.run.attempt import use_threads
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS

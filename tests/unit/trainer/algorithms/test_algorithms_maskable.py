@@ -17,15 +17,15 @@ from sb3_contrib.common.maskable.buffers import MaskableRolloutBuffer
 from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.algorithms import check, make_model, policy_of
 from palaestra_trainer.algorithms.maskable import ValidMaskableDictRolloutBuffer, ValidMaskableRolloutBuffer
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.environments.masks import allows
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, SimulatorHung
+from palaestra_trainer.job.configuration import Algorithm
+from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.run import attempt
 from palaestra_trainer.run.evaluate import measure
-from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS

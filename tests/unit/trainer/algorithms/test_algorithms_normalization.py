@@ -13,11 +13,11 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from palaestra_trainer.algorithms import make_model, policy_of
 from palaestra_trainer.algorithms.normalization import ValidNormalize
-from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.seeds import EVALUATE
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.evaluate import measure
 from palaestra_trainer.simulators.restarter import Restarter

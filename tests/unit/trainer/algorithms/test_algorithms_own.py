@@ -11,9 +11,9 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_trainer.algorithms import ALGORITHMS, check, make_model
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.simulators.restarter import Restarter
 
 LAB = '''

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from palaestra_trainer.algorithms import check, make_model
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.simulators.restarter import Restarter
 from tests.tables import for_each

@@ -16,9 +16,9 @@ from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
     ValidRecurrentRolloutBuffer,
 )
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.simulators.restarter import Restarter
 
 NUMBER = spaces.Box(-1e6, 1e6, (1,), np.float32)

@@ -13,8 +13,8 @@ from torch import nn
 
 from palaestra_trainer.algorithms import ALGORITHMS, make_model
 from palaestra_trainer.algorithms.rollout_state import BESIDE, RolloutState, beside
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS

@@ -15,8 +15,8 @@ import zipfile
 import pytest
 
 from palaestra_trainer.algorithms import ALGORITHMS, make_model, small_cnn
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask, MaskedTask

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.environments.contract import mismatch
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.testing import fake_arena
 
 NAME = "Hall-v0"

@@ -6,9 +6,9 @@ import gymnasium
 import pytest
 
 from palaestra.api.fields import ROBOTS
-from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.robots import Joints, RobotAbc, SceneWrapper
 from palaestra_trainer.robots.differential import DifferentialDrive, TurtleBot3Burger
 from palaestra_trainer.robots.joints import JointRobot

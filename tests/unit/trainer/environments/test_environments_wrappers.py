@@ -10,11 +10,11 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack
 
-from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.environments.env_checker import refuse_statistics
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.wrappers import StackedFrames, wrapped
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.testing import fake_arena
 
 NAME = "Count-v0"

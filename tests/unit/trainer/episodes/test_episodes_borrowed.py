@@ -13,6 +13,7 @@ import pytest
 import structlog
 from gymnasium import spaces
 
+from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.fault_tolerant.env import FaultTolerantEnv
@@ -20,7 +21,6 @@ from palaestra_trainer.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.fault_tolerant.sb3_vec_env import FaultTolerantVecEnv
 from palaestra_trainer.fault_tolerant.vector_env import FaultTolerantVectorEnv
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.job.user_code.copies import copied
 
 LENGTH = 3
 STEPS = 8

@@ -6,10 +6,10 @@ import pytest
 
 from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
+from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.interface import NullWatcher
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.waiting.signals import Interrupted
 
 
 class Losses(NullWatcher):

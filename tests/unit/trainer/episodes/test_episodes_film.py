@@ -6,11 +6,11 @@ import pytest
 
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.film import MOST_FRAMES, Filming
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.layout import FloorLayout, Obstacle
 from palaestra_trainer.robots.sight import Sight
 from palaestra_trainer.run.replays import chosen, keep_replays
-from palaestra_trainer.job.run_directory import RunDirectory
 
 FLOOR = FloorLayout(
     low=(-2.0, -2.0),

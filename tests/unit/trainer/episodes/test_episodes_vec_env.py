@@ -19,10 +19,10 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.sight import Sight
+from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.waiting.greenlets import let_others
-from palaestra_trainer.waiting.signals import Interrupted
 
 RIGHT, LEFT = 1, 0
 

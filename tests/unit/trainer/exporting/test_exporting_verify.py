@@ -15,11 +15,11 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, CombinedExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.exporting import onnx_file, safetensors_file, verify
 from palaestra_trainer.exporting.policy_module import PolicyModule
 from palaestra_trainer.exporting.sample_observations import drawn
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.run.policies import Scale, TrainedPolicy
 from palaestra_trainer.testing import MaskedTask
 

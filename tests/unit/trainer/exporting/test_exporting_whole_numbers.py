@@ -12,8 +12,8 @@ from gymnasium import spaces
 
 from palaestra_trainer import exporting, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
-from palaestra_trainer.run import attempt
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.run import attempt
 from palaestra_trainer.testing import FakeTask, MaskedTask
 from palaestra_trainer.testing.fake_task import ACTIONS
 

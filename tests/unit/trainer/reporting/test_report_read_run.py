@@ -10,11 +10,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.plain_values import flat, number, numbers, without_values_of_env
 from palaestra_trainer.reporting.read_run import read_run
 from palaestra_trainer.reporting.write_report import report_end, write_report
-from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines
 
 FILES = (
     *("attempts.jsonl", "confirmations.jsonl", "end.json", "evaluations.jsonl", "faults.jsonl"),

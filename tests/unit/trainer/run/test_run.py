@@ -13,9 +13,9 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, MasterLost
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 from palaestra_trainer.run import attempt, checkpoint
 from palaestra_trainer.run.evaluate import measure
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 
 
 @pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])

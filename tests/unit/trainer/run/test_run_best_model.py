@@ -10,9 +10,9 @@ from stable_baselines3.common.save_util import load_from_zip_file
 from torch import equal
 
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
+from palaestra_trainer.job.run_directory import drop_lines, read_lines
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import best_of
-from palaestra_trainer.job.run_directory import drop_lines, read_lines
 
 EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # the seeds of every evaluation of these runs
 GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}

@@ -10,11 +10,11 @@ import textwrap
 
 import pytest
 
-from palaestra_trainer.job.configuration import Callback
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Callback
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.callbacks import make_callbacks
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines
 
 SB3 = "stable_baselines3.common.callbacks"
 MODULE = """

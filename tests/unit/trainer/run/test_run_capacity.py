@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import pytest
 
 from palaestra_trainer.algorithms.replay_size import ReplaySize
-from palaestra_trainer.job.configuration import Checkpoint
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Checkpoint
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import attempt
 from palaestra_trainer.run.capacity import (
     RESERVE_BYTES,
@@ -18,7 +19,6 @@ from palaestra_trainer.run.capacity import (
     capacity_now,
     refuse_what_does_not_fit,
 )
-from palaestra_trainer.job.run_directory import RunDirectory
 
 GB = 10**9
 IMAGES = ReplaySize(rows=1_000_000, row_bytes=18_452)

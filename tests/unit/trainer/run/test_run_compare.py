@@ -6,9 +6,10 @@ import itertools
 
 import pytest
 
-from palaestra_trainer.job.configuration import dump
 from palaestra_trainer.episodes.paired_difference import Pairs, Verdict
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import dump
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.compare import (
     Comparison,
     Rules,
@@ -19,8 +20,7 @@ from palaestra_trainer.run.compare import (
     notes,
     sentence_of,
 )
-from palaestra_trainer.job.run_directory import RunDirectory
-from palaestra_trainer.waiting.signals import Interrupted
+from palaestra_trainer.run.signals import Interrupted
 
 RULES = Rules()
 SHORT = {"steps": 300, "evaluation": {"everySteps": 0}}

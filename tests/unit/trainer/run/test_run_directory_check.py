@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run import checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory, append_line
+from palaestra_trainer.run import checkpoint
 from tests.unit.trainer.run.test_run_resume import signal_after
 
 

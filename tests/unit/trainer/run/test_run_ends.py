@@ -21,11 +21,11 @@ from palaestra_trainer.errors import (
     SimulatorDead,
     SimulatorHung,
 )
+from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs, last_lines
 from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.run.termination import end_of, write_last_word
 from palaestra_trainer.run.watchdog import Watchdog, stalled
-from palaestra_trainer.waiting.signals import Interrupted, Interruption
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ from PIL import Image
 from tensorboard.backend.event_processing.event_file_loader import EventFileLoader
 from tensorboard.util.img_mime_type_detector import from_bytes
 
+from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.reporting.film import MOST_BYTES
 from palaestra_trainer.robots.geometry import Pose
 from palaestra_trainer.robots.sight import Sight
-from palaestra_trainer.job.run_directory import read_lines
 
 EVALUATION = {"everySteps": 40, "episodes": 4, "confirmEpisodes": 4}
 

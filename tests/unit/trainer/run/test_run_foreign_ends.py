@@ -16,8 +16,8 @@ import pytest
 from gymnasium import spaces
 from stable_baselines3.common.callbacks import BaseCallback
 
-from palaestra_trainer.run import attempt
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run import attempt
 from palaestra_trainer.waiting.exit import leave_after
 
 AT_STEP = 5

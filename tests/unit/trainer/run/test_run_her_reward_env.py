@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.job.configuration import Configuration, Environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
+from palaestra_trainer.job.configuration import Configuration, Environment
 from palaestra_trainer.robots import Gripper, Scanner
 from palaestra_trainer.run.her_reward_env import make_judge
 from palaestra_trainer.webots.facade import open_facades

@@ -9,8 +9,8 @@ import pytest
 import structlog
 from gymnasium.wrappers import NormalizeObservation, NormalizeReward
 
-from palaestra_trainer.run import attempt
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run import attempt
 
 STEPS = 40
 SMALL = {"policy_kwargs": {"net_arch": [4]}}

@@ -9,8 +9,8 @@ import signal
 import pytest
 from stable_baselines3.common.save_util import load_from_zip_file
 
-from palaestra_trainer.run import checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory, read_lines
+from palaestra_trainer.run import checkpoint
 
 
 def signal_after(steps, number=signal.SIGTERM):

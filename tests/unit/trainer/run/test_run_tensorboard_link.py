@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from structlog.testing import capture_logs
 
-from palaestra_trainer.run.tensorboard_link import link_curves
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.tensorboard_link import link_curves
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 OTHER = "9b8c7d6e-7c2b-4d68-9a40-c3b2a1908f7e"

@@ -10,8 +10,8 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from palaestra_trainer.job.configuration import parse
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import parse
 from palaestra_trainer.simulators.allocation import allocate
 from tests.failing import failing
 

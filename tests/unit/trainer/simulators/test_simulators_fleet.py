@@ -12,7 +12,6 @@ import pytest
 import structlog
 
 from palaestra_protocol.pod.status import ExitCode
-from palaestra_trainer.job.configuration import parse
 from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,
@@ -22,11 +21,12 @@ from palaestra_trainer.errors import (
     WorldMisfit,
     WrongData,
 )
+from palaestra_trainer.job.configuration import parse
+from palaestra_trainer.run.signals import Interrupted, Interruption
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.fleet import Fleet, resting
 from palaestra_trainer.simulators.interface import NullWatcher
 from palaestra_trainer.simulators.restarter import Restarter, await_one
-from palaestra_trainer.waiting.signals import Interrupted, Interruption
 
 DEADLINE_S = 5.0
 

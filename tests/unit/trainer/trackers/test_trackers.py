@@ -14,8 +14,8 @@ import pytest
 from structlog.testing import capture_logs
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from palaestra_trainer.job.configuration import Callback
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Callback
 from palaestra_trainer.run import callbacks
 from palaestra_trainer.run.callbacks import make_callbacks
 from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run, title_of

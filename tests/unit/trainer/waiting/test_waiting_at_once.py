@@ -6,8 +6,9 @@ import threading
 
 import pytest
 
+from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.waiting.at_once import at_once
-from palaestra_trainer.waiting.signals import Interrupted, go_on
+from palaestra_trainer.waiting.check import go_on
 
 PATIENCE_S = 20.0
 

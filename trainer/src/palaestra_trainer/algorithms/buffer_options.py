@@ -15,8 +15,8 @@ from stable_baselines3.common.buffers import BaseBuffer, ReplayBuffer, RolloutBu
 from palaestra_trainer.algorithms import her, own_buffers
 from palaestra_trainer.algorithms.constructor_params import parameters
 from palaestra_trainer.algorithms.hyperparameters import FIELD
-from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
 

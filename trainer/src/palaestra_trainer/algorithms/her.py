@@ -22,9 +22,9 @@ from palaestra_trainer.algorithms.buffers import (
     Positions,
     ValidDictReplayBuffer,
 )
-from palaestra_trainer.job.configuration import Algorithm, nearest
-from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.environments.infos import is_valid
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm, nearest
 
 log = structlog.get_logger(__name__)
 

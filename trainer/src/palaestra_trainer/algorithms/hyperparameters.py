@@ -21,8 +21,8 @@ from torch import nn, optim
 from palaestra_trainer.algorithms.constructor_params import types
 from palaestra_trainer.algorithms.own_schedules import own_schedule
 from palaestra_trainer.algorithms.schedules import schedule_of
-from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
 FIELD = "algorithm.hyperparameters"

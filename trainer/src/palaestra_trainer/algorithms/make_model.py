@@ -21,8 +21,8 @@ from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.registry import ARENA_ENVIRONMENTS, RegisteredAlgorithm, entry_of
 from palaestra_trainer.algorithms.space_compat import named_policy, policy_of_spaces
-from palaestra_trainer.job.configuration import Algorithm, Device
 from palaestra_trainer.errors import ConfigurationError, fact_of
+from palaestra_trainer.job.configuration import Algorithm, Device
 
 
 def check(algorithm: Algorithm) -> RegisteredAlgorithm:

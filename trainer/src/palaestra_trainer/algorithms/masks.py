@@ -9,9 +9,9 @@ from sb3_contrib import MaskablePPO
 
 from palaestra_trainer.algorithms.normalization import Normalized
 from palaestra_trainer.algorithms.registry import entry_of
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 
 
 def is_masked(algorithm: Algorithm) -> bool:

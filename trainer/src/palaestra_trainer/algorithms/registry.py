@@ -26,8 +26,8 @@ from palaestra_trainer.algorithms import buffer_options, noise
 from palaestra_trainer.algorithms.constructor_params import parameters
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.valid_rows import with_valid_rows
-from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.job.user_code import imports
 
 # A job cannot set these arguments of the classes as plain hyperparameters. The training loop sets some, and

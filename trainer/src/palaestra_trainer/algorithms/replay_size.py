@@ -15,7 +15,7 @@ from gymnasium import spaces
 from stable_baselines3.common.preprocessing import get_action_dim, get_obs_shape
 
 from palaestra_trainer.algorithms import her
-from palaestra_trainer.algorithms.space_compat import KINDS
+from palaestra_trainer.environments.space_flaws import KINDS
 from palaestra_trainer.job.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize

@@ -8,18 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 
 from palaestra_trainer.algorithms.registry import RegisteredAlgorithm, entry_of
-from palaestra_trainer.job.configuration import Algorithm, Cnn, nearest
+from palaestra_trainer.environments.space_flaws import KINDS, flaws_of_action, flaws_of_observation
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.job.user_code import imports
 
-KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
 # The convolutions of each network need at least this number of pixels per side.
 SMALLEST: Mapping[Cnn | None, int] = {None: 36, "small": 20}
 
@@ -44,7 +43,7 @@ def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.S
     Raises:
         ConfigurationError: one line for each reason.
     """
-    if lines := [*_about_observations(seen), *_about_actions(algorithm.name, acted)]:
+    if lines := [*flaws_of_observation(seen), *_about_actions(algorithm.name, acted)]:
         raise ConfigurationError("\n".join(lines))
 
 
@@ -87,31 +86,6 @@ def scalable(space: spaces.Space[Any]) -> list[str] | bool:
     return isinstance(space, spaces.Box) and not is_image_space(space)
 
 
-def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse spaces that every algorithm of Stable-Baselines3 would misread, or does not support.
-
-    Raises:
-        ConfigurationError: one line for each reason.
-    """
-    if lines := [*_about_observations(seen), *_flaws_of_action(acted)]:
-        raise ConfigurationError("\n".join(lines))
-
-
-def _about_observations(seen: spaces.Space[Any]) -> Iterator[str]:
-    parts = seen.spaces if isinstance(seen, spaces.Dict) else {"": seen}
-    if not parts:
-        yield "environment.id: its observation is a Dict without parts; add one"
-    for key, part in parts.items():
-        what = f"environment.id: its {f'observation {key}'.rstrip()}"
-        if not isinstance(part, KINDS):
-            yield (
-                f"{what} is a {type(part).__name__}, which no policy takes; use Box, Discrete, MultiDiscrete "
-                "or MultiBinary, or a Dict of these"
-            )
-        elif flaw := _flaw(part):
-            yield f"{what} {flaw}"
-
-
 def _about_actions(name: str, acted: spaces.Space[Any]) -> Iterator[str]:
     known = entry_of(name).actions or KINDS
     if not isinstance(acted, known):
@@ -119,39 +93,7 @@ def _about_actions(name: str, acted: spaces.Space[Any]) -> Iterator[str]:
         fact = f"{name} needs {kinds} actions, not {type(acted).__name__}"
         yield f"algorithm.name: {fact}; use another algorithm"
     else:
-        yield from _flaws_of_action(acted)
-
-
-def _flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
-    if flaw := _flaw(acted) or _flaw_of_bounds(acted):
-        yield f"environment.id: its action {flaw}"
-
-
-def _flaw(part: spaces.Space[Any]) -> str:
-    """Return the reason why Stable-Baselines3 would misread a space, and the remedy; "" if it would not."""
-    if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
-        start = np.asarray(part.start).tolist()
-        return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
-    if isinstance(part, spaces.MultiBinary) and len(part.shape) > 1:
-        return f"is a MultiBinary of shape {part.shape}; flatten it"
-    if isinstance(part, spaces.Box) and not part.shape:
-        return "is a single number of shape (); give it the shape (1,)"
-    return ""
-
-
-def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
-    """Return the reason why a Box cannot be an action space, and the remedy; "" if it can."""
-    if not isinstance(acted, spaces.Box):
-        return ""
-    if not np.issubdtype(acted.dtype, np.floating):
-        return f"is a Box of {acted.dtype}, and algorithms send fractions; use float32, or MultiDiscrete"
-    if not acted.is_bounded():
-        return "has no bounds; give its Box a finite low and high"
-    with np.errstate(over="ignore"):
-        narrow = np.isfinite(acted.high - acted.low).all()
-    return (
-        "" if narrow else f"has bounds of which {acted.dtype} cannot hold the difference; give narrower ones"
-    )
+        yield from flaws_of_action(acted)
 
 
 def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:

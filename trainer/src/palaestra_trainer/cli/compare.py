@@ -19,9 +19,9 @@ from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
 from palaestra_trainer.errors import TrainerError
+from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.simulators.drivers import DRIVERS
-from palaestra_trainer.waiting.signals import Interruption
 
 if TYPE_CHECKING:
     from palaestra_trainer.run.compare import Comparison, Rules

@@ -19,10 +19,10 @@ from palaestra_protocol.linux import require_linux
 from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
-from palaestra_trainer.job.configuration import CONFIG_VARIABLE, load, load_run
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, load, load_run
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.telemetry.logs import configure_logs
 from palaestra_trainer.simulators.drivers import DRIVERS
 
 EVAL = f"""\

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from palaestra_protocol.pod.enums import ExitCode
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.write_film import write_film
 from palaestra_trainer.reporting.write_report import write_report
-from palaestra_trainer.job.run_directory import RunDirectory
 
 REPORT = """\
 Write the report of a run, or of several runs side by side, as one HTML file of at most 2.5 MB. It refers to

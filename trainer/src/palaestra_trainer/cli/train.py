@@ -13,11 +13,11 @@ import_without("rich", "structlog")
 
 from palaestra_protocol.linux import require_linux
 from palaestra_trainer.cli.program import leaving, parser, refuse
-from palaestra_trainer.job.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.run.telemetry.logs import configure_logs
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.job.run_directory import RUN_VARIABLE, RunDirectory
-from palaestra_trainer.waiting.signals import end_undisturbed, leaving_when_asked
+from palaestra_trainer.run.signals import end_undisturbed, leaving_when_asked
+from palaestra_trainer.run.telemetry.logs import configure_logs
 
 EXIT_CODES = """\
 exit codes:

@@ -21,10 +21,10 @@ from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.cli.program import leaving, parser, refuse_without_run, write_line
-from palaestra_trainer.job.configuration import Configuration, load_run
 from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.job.configuration import Configuration, load_run
+from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.telemetry.logs import configure_logs
-from palaestra_trainer.waiting.signals import Interruption
 
 if TYPE_CHECKING:
     from palaestra_trainer.cli.trying.agents import Agent

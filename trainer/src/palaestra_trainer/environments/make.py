@@ -17,14 +17,14 @@ from gymnasium.envs.registration import (
     parse_env_id,
 )
 
-from palaestra_trainer.job.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.environments import wrappers
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
-from palaestra_trainer.robots.base import RobotAbc, Scene
-from palaestra_trainer.robots.capabilities import require
+from palaestra_trainer.job.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.job.user_code import imports
 from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
+from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.capabilities import require
 
 _OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
 

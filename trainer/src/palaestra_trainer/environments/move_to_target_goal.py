@@ -16,11 +16,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from palaestra_trainer.environments.infos import OURS
 from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
 from palaestra_trainer.environments.observation import UNIT_M
 from palaestra_trainer.environments.options import GoalOptions, time_up_terminates
 from palaestra_trainer.environments.rewards import EpisodeOutcome
-from palaestra_trainer.environments.infos import OURS
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
 Numbers = NDArray[np.float32]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from palaestra_trainer.environments.infos import OURS
 from palaestra_trainer.environments.options import Episodes, time_up_terminates
 from palaestra_trainer.environments.rewards import EpisodeOutcome, Transition, reward_terms
-from palaestra_trainer.environments.infos import OURS
 
 Result = tuple[float, bool, bool, dict[str, Any]]
 

@@ -13,8 +13,8 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
+from palaestra_trainer.job.configuration import Environment
 from palaestra_trainer.job.user_code import imports
 from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 

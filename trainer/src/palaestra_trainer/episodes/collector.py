@@ -6,8 +6,8 @@ It converts gymnasium's step into the row that Stable-Baselines3 expects: reset 
 It converts a fault into invalid rows (`valid` is False), so that the other members need not wait for the
 broken one. The row of the fault ends the episode (done, truncated, `sim_fault`). In the rows after it
 `recovering` is True. The last recovering row has `done=True` and the first observation of the next episode.
-After a member was given up, `recovering` is False, and no last row follows. `palaestra_trainer.environments.infos`
-describes these keys.
+After a member was given up, `recovering` is False, and no last row follows.
+`palaestra_trainer.environments.infos` describes these keys.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
 from palaestra_protocol.scene import MOST_TERMS, SceneState, TargetMarker
+from palaestra_trainer.environments.copies import copied
+from palaestra_trainer.environments.infos import HIDDEN, OURS, TRUNCATED, of_environment
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.reset_options import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
-from palaestra_trainer.environments.infos import HIDDEN, OURS, TRUNCATED, of_environment
 from palaestra_trainer.simulators.interface import Environment, Located, Step
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.job.user_code.copies import copied
-from palaestra_trainer.waiting.signals import Check, go_on
+from palaestra_trainer.waiting.check import Check, go_on
 
 log = structlog.get_logger(__name__)
 

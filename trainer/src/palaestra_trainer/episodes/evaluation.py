@@ -21,6 +21,7 @@ import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
 from palaestra_trainer.algorithms import predict_allowed, takes_masks
+from palaestra_trainer.environments.episode_end import EpisodeEnd
 from palaestra_trainer.episodes.film import MOST_FILMS, Film, Filming
 from palaestra_trainer.episodes.reset_options import EVALUATING, reset_options
 from palaestra_trainer.episodes.wilson import wilson
@@ -28,8 +29,7 @@ from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.waiting.at_once import at_once
-from palaestra_trainer.environments.episode_end import EpisodeEnd
-from palaestra_trainer.waiting.signals import Check, go_on
+from palaestra_trainer.waiting.check import Check, go_on
 
 
 class ActingPolicy(Protocol):

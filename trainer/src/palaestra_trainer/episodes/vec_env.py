@@ -19,17 +19,17 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_protocol.scene import SceneState
+from palaestra_trainer.environments.copies import copied
+from palaestra_trainer.environments.infos import is_valid
 from palaestra_trainer.environments.masks import ACTION_MASKS, gives_masks
-from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
 from palaestra_trainer.episodes.collector import CollectedRow, Collector
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.errors import fact_of
-from palaestra_trainer.environments.infos import is_valid
+from palaestra_trainer.simulators.base_vec_env import MembersVecEnv
 from palaestra_trainer.simulators.interface import Environment
 from palaestra_trainer.simulators.restarter import Restarter, await_one, settle
-from palaestra_trainer.job.user_code.copies import copied
+from palaestra_trainer.waiting.check import Check, go_on
 from palaestra_trainer.waiting.greenlets import take_turns
-from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 

@@ -8,13 +8,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-from palaestra_trainer.job.configuration import load
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.metadata import data_sheet
 from palaestra_trainer.exporting.policy_module import PolicyModule
 from palaestra_trainer.exporting.verify import OBSERVATIONS, Run, compare
-from palaestra_trainer.run.policies import load_policy
+from palaestra_trainer.job.configuration import load
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.run.policies import load_policy
 
 FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
 

@@ -18,12 +18,12 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from palaestra_trainer.job.configuration import Configuration, Environment
 from palaestra_trainer.environments.make import creator_of
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.exporting.policy_module import Normalizer, PolicyModule
-from palaestra_trainer.run.summary import measured
+from palaestra_trainer.job.configuration import Configuration, Environment
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.summary import measured
 
 KEY = "palaestra"  # the key of the sheet in a file's metadata
 MOST_BOUNDS = 1_000  # for a space with more numbers, bounds are not listed one by one

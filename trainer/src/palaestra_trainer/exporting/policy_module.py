@@ -15,7 +15,6 @@ from gymnasium import spaces
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 from torch import nn
 
-from palaestra_trainer.algorithms import takes_masks
 from palaestra_trainer.environments.masks import ACTION_MASKS, choices_of
 from palaestra_trainer.errors import ExportError
 from palaestra_trainer.run.policies import TrainedPolicy
@@ -74,7 +73,7 @@ class PolicyModule(nn.Module):
         self.action_space: spaces.Space[Any] = loaded.model.action_space
         self._seen = parts_of(loaded.model.observation_space)
         self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
-        self.choices = choices_of(self.action_space) if takes_masks(loaded.model) else []
+        self.choices = choices_of(self.action_space) if loaded.takes_masks else []
         if self.choices and ACTION_MASKS in self.spaces:
             raise ExportError(
                 f"the observation has a key {ACTION_MASKS}, which is the input for masks; nothing was "

@@ -1,8 +1,8 @@
 """One member that plays episodes for a training loop that cannot handle faults.
 
 Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
-reward 0 and `sim_fault` (`palaestra_trainer.environments.infos`). The member is restarted in the background, and the next
-episode begins when it is up.
+reward 0 and `sim_fault` (`palaestra_trainer.environments.infos`). The member is restarted in the background,
+and the next episode begins when it is up.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.seeding import np_random
 
-from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.environments.infos import OURS, of_environment
+from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.simulators.interface import Environment, Step
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.job.user_code.copies import copied
 
 
 class StepResult(NamedTuple):

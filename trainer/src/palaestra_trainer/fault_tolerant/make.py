@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
-from uuid import uuid4
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_protocol.pod.enums import Role
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.fault_tolerant.env_group import EnvGroup
+from palaestra_trainer.fault_tolerant.episode_runner import StepResult
 from palaestra_trainer.job.configuration import (
     CONFIG_VARIABLE,
     Configuration,
@@ -18,15 +20,12 @@ from palaestra_trainer.job.configuration import (
     SimulatorConfiguration,
     load,
 )
-from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.fault_tolerant.env_group import EnvGroup
-from palaestra_trainer.fault_tolerant.episode_runner import StepResult
 from palaestra_trainer.run.custom_program import ProgramReport, reported
 from palaestra_trainer.run.telemetry.progress_sources import follow
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.configured import require_driver
-from palaestra_trainer.simulators.connect import connect_members, robot_of, simulator_at
-from palaestra_trainer.simulators.entry_point import own_world
+from palaestra_trainer.simulators.connect import connect_members, new_simulator, robot_of
+from palaestra_trainer.simulators.entry_point import own_world, role_of
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import Member, NullWatcher, Watcher
 from palaestra_trainer.simulators.notebook_simulator import (
@@ -35,10 +34,11 @@ from palaestra_trainer.simulators.notebook_simulator import (
     offered_simulator,
 )
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 
 
-def make_players(wanted: Environment | None, number: int | None, role: Role) -> EnvGroup:
+def make_players(
+    environment_id: str | None, number: int | None, role_name: str, options: dict[str, Any]
+) -> EnvGroup:
     """Return a group of environments of one class, each in its own simulator, which is up.
 
     The simulator is that of the newest `Webots` facade of this process that no environment uses. Without such
@@ -46,9 +46,10 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
     are started: stubs, or MuJoCo for `SeeTarget-v0`.
 
     Args:
-        wanted: the environment; None: that of PALAESTRA_CONFIG.
+        environment_id: the id of the environment; None: that of PALAESTRA_CONFIG.
         number: number of simulators; None: that of the facade, else all of the role, else a new one.
-        role: the role of the simulators in PALAESTRA_CONFIG.
+        role_name: the role of the simulators in PALAESTRA_CONFIG.
+        options: options of the environment.
 
     Raises:
         ConfigurationError: the environment is missing or wrong, too few simulators with the role are free, or
@@ -56,6 +57,12 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
         FaultBudgetSpent: a simulator did not start.
         MasterLost: no ROS master responds.
     """
+    if environment_id is None and options:
+        raise ConfigurationError(
+            f"environment: options were given without it ({', '.join(options)}); name the environment too"
+        )
+    wanted = None if environment_id is None else Environment(id=environment_id, options=options)
+    role = role_of(role_name)
     if number is not None and number < 1:
         raise ConfigurationError(f"num_envs: {number} is not a number of environments; give 1 or more")
     configuration = load() if os.environ.get(CONFIG_VARIABLE) else None
@@ -120,10 +127,9 @@ def _in_own(environment: Environment, number: int, world: str, driver: str) -> E
     with ExitStack() as stack:
         members = []
         for entry in entries:
-            # A stub ignores six such digits when it seeds its faults, so that the faults are repeatable.
-            launcher = ProcessLauncher(world, driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
-            stack.callback(launcher.close)
-            members.append(simulator_at(launcher, configuration, entry))
+            member, process = new_simulator(configuration, entry)
+            stack.callback(process.close)
+            members.append(member)
         return EnvGroup(_started(stack, configuration, members, NullWatcher()), stack.pop_all().close)
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from palaestra_trainer.algorithms.space_compat import refuse_flaws
-from palaestra_trainer.episodes.base_vec_env import MembersVecEnv
+from palaestra_trainer.environments.infos import TRUNCATED
+from palaestra_trainer.environments.space_flaws import refuse_flaws
 from palaestra_trainer.fault_tolerant.env_group import EnvGroup
 from palaestra_trainer.fault_tolerant.episode_runner import StepResult
-from palaestra_trainer.environments.infos import TRUNCATED
+from palaestra_trainer.simulators.base_vec_env import MembersVecEnv
 
 
 class FaultTolerantVecEnv(MembersVecEnv):
@@ -19,7 +19,8 @@ class FaultTolerantVecEnv(MembersVecEnv):
 
     The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
     that Stable-Baselines3's Monitor would add. If a fault truncated the episode, the info has `sim_fault`
-    (`palaestra_trainer.environments.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count the episode.
+    (`palaestra_trainer.environments.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count
+    the episode.
 
     Args:
         players: the members, in the order of the rows.

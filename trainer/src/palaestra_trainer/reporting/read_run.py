@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from palaestra_protocol.masking import masked
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.event_files import Scalars, add_scalars
 from palaestra_trainer.reporting.plain_values import (
     flat,
@@ -26,7 +27,6 @@ from palaestra_trainer.reporting.plain_values import (
 from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Evaluated, Points, ReportedFault, RunData
 from palaestra_trainer.reporting.tolerant_files import head, json_file, lines, yaml_file
-from palaestra_trainer.job.run_directory import RunDirectory
 
 MOST_CURVES_BYTES = 64 * 2**20  # of all event files, which take 5 s to read
 _INTERRUPTED = 75

@@ -9,11 +9,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.reporting.film import animated, pictures
 from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.reporting.run_data import Replay
 from palaestra_trainer.reporting.tolerant_files import json_file
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
 VIDEO_PX: Final = 720
 _LEAST_HZ, _MOST_HZ = 1, 60

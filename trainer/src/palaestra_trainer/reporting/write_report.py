@@ -10,9 +10,9 @@ from typing import Any
 
 import structlog
 
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.reporting.page import page
 from palaestra_trainer.reporting.read_run import read_run
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 
 log = structlog.get_logger(__name__)
 

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.capabilities import Joints
 from palaestra_trainer.robots.simulated import SimulatedRobot
-from palaestra_trainer.ros import call_together
-from palaestra_trainer.waiting.greenlets import let_others
-from palaestra_trainer.webots import Command, JointMotor, PositionSensor
+from palaestra_trainer.webots import Command, JointMotor, PositionSensor, set_commands
 
 
 class JointRobot(SimulatedRobot, Joints):
@@ -62,10 +60,7 @@ class JointRobot(SimulatedRobot, Joints):
 
     def command(self, values: Iterable[float]) -> None:
         """Set the command of each motor, within `greatest`, until changed."""
-        for motor in self._motors:
-            motor.prepare()
-        calls = [
-            (motor.service, {"value": min(max(float(value), -most), most)})
+        set_commands(
+            (motor, min(max(float(value), -most), most))
             for motor, value, most in zip(self._motors, values, self.greatest, strict=True)
-        ]
-        call_together(calls, meanwhile=let_others)
+        )

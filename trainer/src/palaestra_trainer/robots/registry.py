@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from palaestra_trainer.job.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import nearest
+from palaestra_trainer.job.user_code import imports
 from palaestra_trainer.robots.base import RobotAbc
 from palaestra_trainer.robots.simulated import SimulatedRobot
-from palaestra_trainer.job.user_code import imports
 
 SHIPPED: dict[str, str] = {
     "Robotino": "palaestra_trainer.robots.robotino:Robotino",

@@ -23,10 +23,11 @@ from palaestra_trainer import algorithms
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
-from palaestra_trainer.job.configuration import Configuration, dump
 from palaestra_trainer.environments.env_checker import refuse_statistics
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
+from palaestra_trainer.job.configuration import Configuration, dump
+from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.best_model import Enough, forget_after
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
@@ -39,6 +40,7 @@ from palaestra_trainer.run.her_reward_env import make_judge
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.logger import CurvesLogger, hide_points
 from palaestra_trainer.run.resume import rejoin
+from palaestra_trainer.run.signals import Interruption
 from palaestra_trainer.run.summary import finished, last_word_of, summarise, write_summary
 from palaestra_trainer.run.telemetry.fault_log import FaultLog
 from palaestra_trainer.run.telemetry.metrics import constants
@@ -50,11 +52,9 @@ from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.training_callback import Resumed, TrainingCallback
 from palaestra_trainer.run.versions import versions
 from palaestra_trainer.run.watchdog import Watchdog, stalled
-from palaestra_trainer.job.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.waiting.exit import leave_after
-from palaestra_trainer.waiting.signals import Interruption
 
 log = structlog.get_logger(__name__)
 

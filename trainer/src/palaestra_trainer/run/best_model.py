@@ -25,12 +25,18 @@ from palaestra_trainer import algorithms
 from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_all
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.job.run_directory import (
+    RunDirectory,
+    append_line,
+    drop_lines,
+    read_lines,
+    replace_file,
+)
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.context import RunContext
 from palaestra_trainer.run.logger import CurvesLogger
 from palaestra_trainer.run.replays import films_of, keep_replays
 from palaestra_trainer.run.telemetry.progress import Progress
-from palaestra_trainer.job.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
 from palaestra_trainer.simulators.fleet import resting, running
 
 log = structlog.get_logger(__name__)

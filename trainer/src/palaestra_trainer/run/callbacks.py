@@ -22,8 +22,8 @@ from stable_baselines3.common.callbacks import (
     StopTrainingOnRewardThreshold,
 )
 
-from palaestra_trainer.job.configuration import Callback
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError, fact_of
+from palaestra_trainer.job.configuration import Callback
 from palaestra_trainer.job.user_code import imports
 from palaestra_trainer.job.user_code.kwargs import AcceptedArguments
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palaestra_trainer.algorithms.replay_size import ReplaySize
-from palaestra_trainer.job.configuration import Checkpoint
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Checkpoint
 from palaestra_trainer.job.run_directory import RunDirectory
 
 # The reserve is for an update with its batches, evaluations, and the write of a checkpoint. It is far more

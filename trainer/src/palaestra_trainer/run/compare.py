@@ -14,19 +14,19 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_protocol.pod.enums import ExitCode, Role
-from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, load_run
 from palaestra_trainer.episodes.evaluation import EvaluationResult, evaluate_on_all
 from palaestra_trainer.episodes.paired_difference import Pairs, Verdict, interval, verdict
 from palaestra_trainer.episodes.seeds import fresh_seeds
 from palaestra_trainer.episodes.wilson import CONFIDENCE, wilson
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration, load_run
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers
 from palaestra_trainer.run.evaluate import Playing, evaluating, playing
-from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.waiting.at_once import at_once
+from palaestra_trainer.waiting.check import Check, go_on
 from palaestra_trainer.waiting.exit import leave_after
-from palaestra_trainer.waiting.signals import Check, go_on
 
 MakeHere = Callable[[Path], MakeMembers]  # the simulators of a run directory
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from palaestra_trainer.job.configuration import Configuration
-from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.signals import Interruption
+from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.simulators.fleet import Fleet
-from palaestra_trainer.waiting.signals import Interruption
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

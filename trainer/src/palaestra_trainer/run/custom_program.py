@@ -17,8 +17,8 @@ from typing import Any
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_protocol.pod.status import Cause, Termination
-from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.environments.infos import ours
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.run.telemetry.metrics import constants
 from palaestra_trainer.run.telemetry.progress import Counters, Progress
 from palaestra_trainer.run.telemetry.status_server import status_server

@@ -17,8 +17,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.run.best_model import BEST
 from palaestra_trainer.job.run_directory import RunDirectory
+from palaestra_trainer.run.best_model import BEST
 
 REMEDY = "restore it from a copy, or move the run directory away to start a new run"
 _DATA = "data"

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from palaestra_protocol.pod.status import Termination
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.reporting.write_report import report_end
 from palaestra_trainer.run.telemetry.logs import last_lines
 from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.run.termination import End, write_last_word
-from palaestra_trainer.job.run_directory import RunDirectory
 
 
 def write_end(directory: RunDirectory, progress: Progress, end: End) -> None:

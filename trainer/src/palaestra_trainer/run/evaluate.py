@@ -12,20 +12,20 @@ import structlog
 
 from palaestra_protocol.pod.enums import ExitCode, Role
 from palaestra_trainer import algorithms
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.episodes.evaluation import ActingPolicy, evaluate_on_all
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.run.attempt import STOPPED_S, MakeMembers, use_threads
-from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.simulators.drivers import in_driver
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.interface import NullWatcher
 from palaestra_trainer.simulators.restarter import Restarter
+from palaestra_trainer.waiting.check import Check, go_on
 from palaestra_trainer.waiting.exit import leave_after
-from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 

@@ -12,14 +12,10 @@ from typing import Any
 
 import gymnasium
 
-from palaestra_trainer.job.configuration import DEFAULT_ROBOT, Configuration
-from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.episodes.vec_env import COMPUTE_REWARD
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.registry import robot_class
-from palaestra_trainer.robots.simulated import SimulatedScene
-from palaestra_trainer.webots import Attached, Webots
-from palaestra_trainer.webots.facade import open_facades
+from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.simulators.connect import unconnected_environment
 
 # No simulator has this name. So an environment that reads a sensor gets SimulatorDead with this name.
 _NAME = "judge"
@@ -31,10 +27,7 @@ def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
     Raises:
         ConfigurationError: the environment does not fit the job's robot, or has no `compute_reward`.
     """
-    webots = Webots(_NAME, wanted.simulators[0].world, launcher=Attached())
-    open_facades.withdraw(webots)
-    robot = robot_class(wanted.robot or DEFAULT_ROBOT)(webots)
-    judge = make_environment(wanted.environment, robot, SimulatedScene(webots, robot))
+    judge = unconnected_environment(wanted, _NAME)
     if not callable(getattr(judge.unwrapped, COMPUTE_REWARD, None)):
         raise ConfigurationError(
             f"environment.id: {wanted.environment.id} has no {COMPUTE_REWARD}, which HerReplayBuffer needs; "

@@ -14,14 +14,14 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import entry_of, predict_allowed, takes_masks
-from palaestra_trainer.job.configuration import Configuration, Environment, load
 from palaestra_trainer.environments.make import keywords, make_environment
 from palaestra_trainer.environments.masks import masks_in
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Configuration, Environment, load
+from palaestra_trainer.job.run_directory import RunDirectory
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.run.byte_code import refuse_another_python
 from palaestra_trainer.run.checkpoint.tensors import NORMALIZE
-from palaestra_trainer.job.run_directory import RunDirectory
 
 
 class Scale(NamedTuple):
@@ -52,6 +52,11 @@ class TrainedPolicy:
     environment: Environment
     scales: Mapping[str, Scale]
 
+    @property
+    def takes_masks(self) -> bool:
+        """Whether the policy chooses only among allowed actions, as one of MaskablePPO does."""
+        return takes_masks(self.model)
+
     def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
         """Return the environment that the policy learned in, with its wrappers, a robot and its scene.
 
@@ -80,7 +85,7 @@ class TrainedPolicy:
             ValueError: a policy that needs masks got none or wrong ones, or another policy got masks.
         """
         seen = (self._seen(observation), state, episode_start)
-        if takes_masks(self.model):
+        if self.takes_masks:
             if action_masks is None:
                 raise ValueError(
                     "action_masks: the policy chooses only among allowed actions; pass "

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
-from palaestra_trainer.reporting.read_replays import replays_of
 from palaestra_trainer.job.run_directory import RunDirectory, replace_file
+from palaestra_trainer.reporting.read_replays import replays_of
 
 
 def keep_replays(directory: RunDirectory, evaluation: EvaluationResult, name: str) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from typing import Any
 
 from palaestra_protocol.pod.status import SuccessInterval, Termination
 from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
 from palaestra_trainer.run.best_model import best_of, confirmation_of
 from palaestra_trainer.run.telemetry.goodput import trained_share
 from palaestra_trainer.run.telemetry.progress import Progress
-from palaestra_trainer.job.run_directory import RunDirectory, read_lines, replace_file
 
 _NEEDED = frozenset({"target", "steps", "success_rate", "success_interval"})  # fields of a finished run
 

@@ -24,7 +24,7 @@ from palaestra_trainer.errors import (
     SimulatorHung,
     fact_of,
 )
-from palaestra_trainer.waiting.signals import Interrupted
+from palaestra_trainer.run.signals import Interrupted
 
 log = structlog.get_logger(__name__)
 

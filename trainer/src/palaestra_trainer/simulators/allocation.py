@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.webots.launching.locks import FileLock
 
 

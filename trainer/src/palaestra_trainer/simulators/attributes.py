@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.simulators.interface import Environment
-from palaestra_trainer.job.user_code.copies import copied
 
 
 class Attributes:

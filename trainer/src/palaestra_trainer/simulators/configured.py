@@ -12,8 +12,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.connect import OwnSimulator, connect

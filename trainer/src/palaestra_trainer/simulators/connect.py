@@ -10,8 +10,14 @@ import os
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import gymnasium
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
+from palaestra_trainer.environments.make import make_environment
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.job.configuration import (
     CONFIG_VARIABLE,
     DEFAULT_ROBOT,
@@ -19,16 +25,13 @@ from palaestra_trainer.job.configuration import (
     SimulatorConfiguration,
     load,
 )
-from palaestra_trainer.environments.make import make_environment
-from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.registry import robot_class
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
-from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import limit_of
 from palaestra_trainer.simulators.interface import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
-from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots import Attached, Mode, Webots, ensure_node
 from palaestra_trainer.webots.facade import open_facades
 from palaestra_trainer.webots.launching.local_simulator import ProcessLauncher
 from palaestra_trainer.webots.launching.sidecar import Sidecar
@@ -129,6 +132,41 @@ class OwnSimulator:
         """End it; safe to repeat."""
         self.robot.close()
         self.webots.close()
+
+
+def unconnected_environment(configuration: Configuration, name: str) -> gymnasium.Env[Any, Any]:
+    """Return an environment without a simulator; a call that needs the simulator raises SimulatorDead.
+
+    Args:
+        configuration: defines the environment and its robot.
+        name: the name of the simulator in that error.
+
+    Raises:
+        ConfigurationError: the environment is unknown, or it does not accept its options or this robot.
+    """
+    webots = Webots(name, configuration.simulators[0].world, launcher=Attached())
+    open_facades.withdraw(webots)
+    robot = robot_class(configuration.robot or DEFAULT_ROBOT)(webots)
+    return make_environment(configuration.environment, robot, SimulatedScene(webots, robot))
+
+
+def new_simulator(
+    configuration: Configuration, entry: SimulatorConfiguration
+) -> tuple[Simulator, ProcessLauncher]:
+    """Return a simulator in a new process of this machine, not started, and the launcher of that process.
+
+    Other simulators of the same world may run: the ROS names of this one get a random suffix.
+
+    Raises:
+        ConfigurationError: the sidecar refused the world or the driver, or as `simulator_at`.
+    """
+    # A stub ignores six such digits when it seeds its faults, so that the faults are repeatable.
+    launcher = ProcessLauncher(entry.world, entry.driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
+    with ExitStack() as undo:
+        undo.callback(launcher.close)
+        simulator = simulator_at(launcher, configuration, entry)
+        undo.pop_all()
+    return simulator, launcher
 
 
 def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:

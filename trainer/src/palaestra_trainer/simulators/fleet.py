@@ -11,14 +11,14 @@ from contextlib import ExitStack, contextmanager
 import structlog
 
 from palaestra_protocol.pod.enums import Role
-from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.interface import Member, Watcher
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
 from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
-from palaestra_trainer.waiting.signals import Check, go_on
+from palaestra_trainer.waiting.check import Check, go_on
 
 # A start that takes longer is logged with the missing simulators, and again each time its duration doubles.
 LONG_S = 5.0

@@ -9,9 +9,9 @@ from typing import Any
 
 import gymnasium
 
-from palaestra_trainer.job.configuration import Environment as Wanted
 from palaestra_trainer.environments.make import make_environment
 from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.job.configuration import Environment as Wanted
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.connect import robot_for
 from palaestra_trainer.simulators.interface import Environment, Step

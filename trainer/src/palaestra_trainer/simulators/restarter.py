@@ -21,6 +21,7 @@ import numpy as np
 import structlog
 
 from palaestra_protocol.pod.status import Cause
+from palaestra_trainer.environments.copies import copied
 from palaestra_trainer.environments.masks import mask_of
 from palaestra_trainer.errors import (
     ConfigurationError,
@@ -36,9 +37,8 @@ from palaestra_trainer.simulators.finite_check import check_observation, check_r
 from palaestra_trainer.simulators.interface import Member, NullWatcher, Step, Watcher
 from palaestra_trainer.simulators.stats import SimulatorStats
 from palaestra_trainer.simulators.threads import in_background
-from palaestra_trainer.job.user_code.copies import copied
+from palaestra_trainer.waiting.check import Check, go_on
 from palaestra_trainer.waiting.greenlets import away_s, let_others
-from palaestra_trainer.waiting.signals import Check, go_on
 
 log = structlog.get_logger(__name__)
 

@@ -11,8 +11,8 @@ from typing import Any
 import gymnasium
 
 from palaestra_protocol.control import RobotName
-from palaestra_trainer.job.configuration import Recycle
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
+from palaestra_trainer.job.configuration import Recycle
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.sight import Sight

@@ -6,10 +6,11 @@ from collections import deque
 from typing import Protocol, runtime_checkable
 
 from palaestra_protocol.metrics import Tally
-from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.simulators.budget import RestartBudget
 from palaestra_trainer.simulators.interface import Member
 
+# Bounds of the buckets in which Prometheus counts the durations of steps.
+STEP_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 SLOW_TIMES = 10
 SLOW_S = 0.05
 _REMEMBERED = 100
@@ -60,7 +61,7 @@ class SimulatorStats:
     """
 
     def __init__(self, member: Member, budget: RestartBudget) -> None:
-        self.steps: Tally = metric_definitions.STEP_DURATION.tally()
+        self.steps: Tally = Tally(STEP_S)
         self.resets, self.stepped = 0, False
         self._member = member
         self._budget = budget

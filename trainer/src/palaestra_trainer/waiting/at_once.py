@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from typing import TypeVar
 
-from palaestra_trainer.waiting.signals import Check
+from palaestra_trainer.waiting.check import Check
 
 LOOK_EVERY_S = 0.1
 

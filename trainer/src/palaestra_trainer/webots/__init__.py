@@ -4,6 +4,7 @@ Only this package handles the peculiarities of that controller: it can lose a wa
 while the simulation is paused, and a reset does not restore the whole state.
 """
 
+from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.cameras import Camera, Lidar, LidarPoints, RangeFinder
 from palaestra_trainer.webots.device_check import require_node
@@ -16,7 +17,7 @@ from palaestra_trainer.webots.devices import (
     set_velocities,
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
-from palaestra_trainer.webots.joint_motor import Command, JointMotor
+from palaestra_trainer.webots.joint_motor import Command, JointMotor, set_commands
 from palaestra_trainer.webots.mujoco import MujocoActuator, MujocoSensor
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.obstacles import FLOOR, Thing
@@ -47,6 +48,8 @@ __all__ = [
     "Thing",
     "TouchSensor",
     "Webots",
+    "ensure_node",
     "require_node",
+    "set_commands",
     "set_velocities",
 ]

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Literal
 
+from palaestra_trainer.ros import call_together
+from palaestra_trainer.waiting.greenlets import let_others
 from palaestra_trainer.webots.devices import topic_name
 from palaestra_trainer.webots.services import Services
 
@@ -68,3 +71,15 @@ class JointMotor:
         """Close the connections."""
         self._ready = False
         self._services.close()
+
+
+def set_commands(wanted: Iterable[tuple[JointMotor, float]]) -> None:
+    """Set commands of motors from the next step on; all requests are sent at once.
+
+    Raises:
+        SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+    """
+    commands = list(wanted)
+    for motor, _ in commands:
+        motor.prepare()
+    call_together([(motor.service, {"value": value}) for motor, value in commands], meanwhile=let_others)

@@ -15,13 +15,14 @@ import numpy as np
 from palaestra_trainer.cli.trying.agents import Agent, EndEpisode, EndTry
 from palaestra_trainer.cli.trying.problems import Problems, beyond, check_by_libraries
 from palaestra_trainer.cli.trying.step_times import StepTimes
+from palaestra_trainer.environments.episode_end import REMEDY
 from palaestra_trainer.environments.masks import gives_masks
 from palaestra_trainer.episodes.evaluation import Episode
 from palaestra_trainer.episodes.reset_options import reset_options
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, SimulatorFault, TrainerError, fact_of
+from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.simulators.restarter import LOOK_EVERY_S, Restarter
-from palaestra_trainer.environments.episode_end import REMEDY
-from palaestra_trainer.waiting.signals import Check, Interrupted
+from palaestra_trainer.waiting.check import Check
 
 MOST_STEPS = 10_000  # the limit of one episode; a trainer would wait longer, but a person would not
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from palaestra_trainer.cli.trying.agents import EndEpisode, EndTry
 from palaestra_trainer.cli.trying.keymap import NEXT, QUIT, Keys, decode
-from palaestra_trainer.waiting.signals import Check
+from palaestra_trainer.waiting.check import Check
 
 _LOOK_EVERY_S = 0.1
 _MOST_BYTES = 64

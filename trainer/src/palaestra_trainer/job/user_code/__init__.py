@@ -1,1 +1,1 @@
-"""The code of a job's author: its classes and their options are checked, and values are copied for it."""
+"""The code of a job's author: its classes and their options are checked."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from palaestra_trainer.job.configuration import Configuration
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Configuration
 
 MANIFEST = "manifest.json"
 EXPERIENCE = "experience"

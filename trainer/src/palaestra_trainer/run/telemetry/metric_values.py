@@ -11,8 +11,8 @@ from typing import Any
 from stable_baselines3.common.logger import KVWriter
 
 from palaestra_protocol.metrics import Tally
-from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.episodes.evaluation import EvaluationResult
+from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.simulators.stats import SimulatorStats
 
 EPISODES_IN_MEAN = 100  # as in Stable-Baselines3's rollout/ep_rew_mean

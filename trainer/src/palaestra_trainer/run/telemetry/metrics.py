@@ -18,8 +18,8 @@ from prometheus_client.registry import Collector
 
 from palaestra_protocol.metrics import Family, Values
 from palaestra_protocol.pod.status import SimulatorStatus, SuccessInterval, TrainerStatus
-from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.job.configuration import Configuration
+from palaestra_trainer.run.telemetry import metric_definitions
 from palaestra_trainer.run.telemetry.metric_values import MetricValues
 from palaestra_trainer.run.telemetry.progress import Counters, Progress
 

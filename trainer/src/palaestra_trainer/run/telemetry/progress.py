@@ -26,9 +26,9 @@ from palaestra_protocol.pod.status import (
     TrainerStatus,
 )
 from palaestra_protocol.scene import SceneState
+from palaestra_trainer.environments.infos import extra_steps
 from palaestra_trainer.episodes.evaluation import EvaluationResult
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.environments.infos import extra_steps
 from palaestra_trainer.run.telemetry.fault_log import FaultLog
 from palaestra_trainer.run.telemetry.goodput import GoodputLedger
 from palaestra_trainer.run.telemetry.metric_values import EPISODES_IN_MEAN, MetricValues

@@ -6,14 +6,14 @@ import pytest
 import structlog
 
 from palaestra_trainer.algorithms.reinforce import REINFORCE
+from palaestra_trainer.environments import episode_end
+from palaestra_trainer.environments.episode_end import SAY_EVERY_S, EpisodeEnd
 from palaestra_trainer.episodes.evaluation import evaluate
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.restarter import Restarter
 from palaestra_trainer.testing import FakeTask
 from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
-from palaestra_trainer.environments import episode_end
-from palaestra_trainer.environments.episode_end import SAY_EVERY_S, EpisodeEnd
 
 
 class Endless(FakeTask):

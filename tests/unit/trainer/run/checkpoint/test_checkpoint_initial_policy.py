@@ -15,8 +15,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from palaestra_trainer.algorithms import make_model, normalizer_of
-from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm, Normalize
 from palaestra_trainer.run.checkpoint import begin_from, save_tensors
 
 SMALL = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}}

@@ -14,9 +14,9 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from palaestra_trainer.episodes.evaluation import Episode, EvaluationResult
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
-from palaestra_trainer.run.telemetry.metric_definitions import FAMILIES
 from palaestra_trainer.run.attempt import Attempt, AttemptDependencies
 from palaestra_trainer.run.telemetry import metrics
+from palaestra_trainer.run.telemetry.metric_definitions import FAMILIES
 from palaestra_trainer.run.telemetry.metric_values import Logged
 from palaestra_trainer.run.telemetry.progress import Progress
 from palaestra_trainer.simulators.budget import RestartLimit

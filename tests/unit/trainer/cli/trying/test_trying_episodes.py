@@ -14,9 +14,10 @@ from palaestra_trainer.cli.trying.report import as_json, line_of, summary
 from palaestra_trainer.cli.trying.step_times import StepTimes
 from palaestra_trainer.environments.env_checker import held
 from palaestra_trainer.errors import FaultBudgetSpent
+from palaestra_trainer.run.signals import Interrupted
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.restarter import Restarter
-from palaestra_trainer.waiting.signals import Interrupted, go_on
+from palaestra_trainer.waiting.check import go_on
 
 
 class Task(gymnasium.Env):

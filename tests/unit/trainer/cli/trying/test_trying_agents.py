@@ -16,7 +16,8 @@ from palaestra_trainer.cli.trying.keymap import DOWN, LEFT, RIGHT, SPACE, UP, de
 from palaestra_trainer.environments.masks import all_allowed, allows
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.geometry import Movement
-from palaestra_trainer.waiting.signals import Interrupted, go_on
+from palaestra_trainer.run.signals import Interrupted
+from palaestra_trainer.waiting.check import go_on
 
 MASKED = (spaces.Discrete(4, start=2), spaces.MultiDiscrete([2, 3]), spaces.MultiBinary(3))
 SPACES = (

@@ -18,9 +18,9 @@ import structlog
 import torch
 
 from palaestra_trainer.algorithms import buffers, make_model
-from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.run import checkpoint
 from palaestra_trainer.simulators.restarter import Restarter
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from structlog.testing import capture_logs
 
-from palaestra_trainer.job.configuration import dump, load, load_run, parse
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.job.configuration import dump, load, load_run, parse
 
 COMPLETE = """
 job: move-to-target

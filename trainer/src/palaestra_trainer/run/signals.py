@@ -16,7 +16,7 @@ from __future__ import annotations
 import atexit
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self
@@ -28,12 +28,6 @@ from palaestra_trainer.waiting import shutdown_deadline
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 HURRY = "a second signal ends at once"
-
-Check = Callable[[], None]
-
-
-def go_on() -> None:
-    """Do nothing."""
 
 
 class Interrupted(TrainerError):

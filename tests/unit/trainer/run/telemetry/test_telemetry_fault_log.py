@@ -6,10 +6,10 @@ import pytest
 
 from palaestra_protocol.pod.enums import Role
 from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.job.run_directory import read_lines
 from palaestra_trainer.run.telemetry import fault_log
 from palaestra_trainer.run.telemetry.fault_log import FaultLog
 from palaestra_trainer.run.telemetry.progress import Progress
-from palaestra_trainer.job.run_directory import read_lines
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import json
 
 import pytest
 
+from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines, replace_file
 from palaestra_trainer.run.summary import finished, summarise, write_summary
 from palaestra_trainer.run.telemetry.progress import Progress
-from palaestra_trainer.job.run_directory import RunDirectory, append_line, read_lines, replace_file
 
 
 @pytest.fixture
