@@ -266,7 +266,7 @@ def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandone
     it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
     restarter = Restarter(it.member, RestartLimit(restarts=1000))
-    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
+    restarter.begin_restart(SimulatorDead("collect-0", "gone"))
     give_up = time.monotonic() + PATIENCE_S
     while it.first.sidecar.state().starts < 2:
         assert time.monotonic() < give_up

@@ -12,7 +12,7 @@ from stable_baselines3.common.noise import ActionNoise
 from torch import nn
 
 from palaestra_trainer.algorithms import ALGORITHMS, make_model
-from palaestra_trainer.algorithms.rollout_state import BESIDE, RolloutState, beside
+from palaestra_trainer.algorithms.rollout_state import ROLLOUT_STATES, RolloutState, rollout_state_of
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.job.configuration import Algorithm
 from palaestra_trainer.simulators.restarter import Restarter
@@ -127,7 +127,7 @@ def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
 
     model.learn(80, changes)
 
-    declared = beside(model)
+    declared = rollout_state_of(model)
     networks = {
         f"{network}.{tensor}"
         for network in declared.networks
@@ -140,7 +140,7 @@ def test_a_rollout_changes_what_is_declared_and_nothing_else(name):
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_has_an_entry(name):
     """The entry is its own, or that of a class that it extends."""
-    assert any(cls in BESIDE for cls in ALGORITHMS[name].original.__mro__)
+    assert any(cls in ROLLOUT_STATES for cls in ALGORITHMS[name].original.__mro__)
 
 
 def test_a_class_without_a_known_ancestor_keeps_its_whole_policy():
@@ -148,4 +148,4 @@ def test_a_class_without_a_known_ancestor_keeps_its_whole_policy():
     model = model_of("PPO")
     stranger = type("Stranger", (), {"policy": model.policy})()
 
-    assert beside(stranger) == RolloutState(networks=("policy",))
+    assert rollout_state_of(stranger) == RolloutState(networks=("policy",))

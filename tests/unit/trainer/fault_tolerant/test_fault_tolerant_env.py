@@ -24,9 +24,11 @@ RIGHT, LEFT = 1, 0
 def make_env(make_players, make_member):
     """Make an environment whose member breaks as the keywords say, and return both."""
 
-    def make(*, restarts=10, deadline_s=20.0, mend_at_once=False, **faults):
+    def make(*, restarts=10, deadline_s=20.0, wait_for_restart=False, **faults):
         member = make_member(**faults)
-        players = make_players(member, restarts=restarts, deadline_s=deadline_s, mend_at_once=mend_at_once)
+        players = make_players(
+            member, restarts=restarts, deadline_s=deadline_s, wait_for_restart=wait_for_restart
+        )
         return FaultTolerantEnv(players), member
 
     return make
@@ -172,7 +174,7 @@ def test_a_number_that_is_not_finite_is_no_fault(make_env):
 
 def test_a_step_can_wait_for_the_mending_itself(make_env):
     """A program that pauses its simulator after each step must not do so during a restart."""
-    env, member = make_env(mend_at_once=True, steps={1: WrongData("collect-0", "nonsense")})
+    env, member = make_env(wait_for_restart=True, steps={1: WrongData("collect-0", "nonsense")})
     env.reset()
 
     assert env.step(RIGHT)[4]["palaestra"]["sim_fault"]["kind"] == "wrong_data"

@@ -291,7 +291,7 @@ def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
     fleet, members = make_fleet(held=True)
     fleet.start()
     (restarter,) = fleet.collecting
-    restarter.begin_mending(SimulatorHung("collect-0", "slow"))
+    restarter.begin_restart(SimulatorHung("collect-0", "slow"))
 
     fleet.stop()
 
@@ -303,7 +303,7 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
     """Only the restarting thread may use it."""
     fleet, members = make_fleet(held=True)
     fleet.start()
-    fleet.collecting[0].begin_mending(SimulatorHung("collect-0", "slow"))
+    fleet.collecting[0].begin_restart(SimulatorHung("collect-0", "slow"))
 
     with resting(fleet.collecting):
         pass
@@ -374,7 +374,7 @@ def test_fifty_faults_leave_nothing_behind(make_member):
     threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 
     for number in range(50):
-        restarter.begin_mending(SimulatorHung("collect-0", f"fault {number}"))
+        restarter.begin_restart(SimulatorHung("collect-0", f"fault {number}"))
         await_one([restarter])
         assert restarter.up()
     for thread in threading.enumerate():

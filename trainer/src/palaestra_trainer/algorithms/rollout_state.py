@@ -37,7 +37,7 @@ class RolloutState:
 _NOTHING = RolloutState()
 _UNKNOWN = RolloutState(networks=("policy",))
 _EXPLORATION = ("exploration_rate", "_n_calls")
-BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
+ROLLOUT_STATES: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
     {
         sb3.DQN: RolloutState(networks=("q_net_target",), numbers=_EXPLORATION),
         sb3_contrib.QRDQN: RolloutState(networks=("quantile_net_target",), numbers=_EXPLORATION),
@@ -60,7 +60,7 @@ BESIDE: Mapping[type[BaseAlgorithm], RolloutState] = MappingProxyType(
 )
 
 
-def beside(model: BaseAlgorithm) -> RolloutState:
+def rollout_state_of(model: BaseAlgorithm) -> RolloutState:
     """Return the entry of the model's class, or of its nearest ancestor that has one."""
-    known = (BESIDE[cls] for cls in type(model).__mro__ if cls in BESIDE)
+    known = (ROLLOUT_STATES[cls] for cls in type(model).__mro__ if cls in ROLLOUT_STATES)
     return next(known, _UNKNOWN)

@@ -244,7 +244,7 @@ class Collector:
             }
         }
         self._actions = self._found_broken = None
-        self.restarter.begin_mending(fault, self._length)
+        self.restarter.begin_restart(fault, self._length)
 
     def _recover(self) -> CollectedRow:
         """Return the row of a step without a running episode."""

@@ -234,7 +234,7 @@ class _Games:
         try:
             episode = _play(self._policy, restarter, (place, seed), check, rewards)
         except SimulatorFault as fault:
-            restarter.begin_mending(fault, len(rewards))
+            restarter.begin_restart(fault, len(rewards))
             with self._changed:
                 self.faults += 1
                 self._waiting.appendleft((place, seed))

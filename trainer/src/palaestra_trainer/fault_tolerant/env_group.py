@@ -30,7 +30,7 @@ class EnvGroup:
         restarters: the restarter of each member; the members are up or being started.
         release: stops and releases the simulators.
         deadline_s: the longest wait for a simulator that restarts.
-        mend_at_once: whether the step with the fault waits for the restart; False: the next reset waits.
+        wait_for_restart: whether the step with the fault waits for the restart; False: the next reset waits.
         played: called with the rows of each step.
 
     Attributes:
@@ -43,13 +43,13 @@ class EnvGroup:
         release: Callable[[], None],
         deadline_s: float = 600.0,
         *,
-        mend_at_once: bool = False,
+        wait_for_restart: bool = False,
         played: Callable[[Sequence[StepResult]], None] = _nothing,
     ) -> None:
         self.all = [EpisodeRunner(restarter) for restarter in restarters]
         self._release = release
         self._deadline_s = deadline_s
-        self._mend_at_once = mend_at_once
+        self._wait_for_restart = wait_for_restart
         self._played = played
         self._process: int | None = os.getpid()
         atexit.register(self.close)
@@ -74,12 +74,12 @@ class EnvGroup:
         Raises:
             ResetNeeded: no episode is running.
             Diverged: observation or reward is not finite.
-            FaultBudgetSpent: as `begin`, if `mend_at_once`.
+            FaultBudgetSpent: as `begin`, if `wait_for_restart`.
         """
         [player] = self.all
         row = player.step(action)
         self._played([row])
-        if self._mend_at_once:
+        if self._wait_for_restart:
             self._await_up()
         return row
 

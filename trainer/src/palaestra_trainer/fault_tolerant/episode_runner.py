@@ -100,7 +100,7 @@ class EpisodeRunner:
         try:
             self.observation, self.reset_info = self.restarter.reset(seed, options)
         except SimulatorFault as fault:
-            self.restarter.begin_mending(fault)
+            self.restarter.begin_restart(fault)
             return
         self._last = copied(self.observation)
         self._return, self._length, self._began = 0.0, 0, time.monotonic()
@@ -128,7 +128,7 @@ class EpisodeRunner:
         return StepResult(step, None if self.playing else self._summary())
 
     def _cut(self, fault: SimulatorFault) -> StepResult:
-        self.restarter.begin_mending(fault, self._length)
+        self.restarter.begin_restart(fault, self._length)
         report = {
             "kind": fault.kind,
             "simulator": self.restarter.name,

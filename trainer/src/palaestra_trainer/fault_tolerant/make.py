@@ -87,7 +87,7 @@ def _in_facade(place: NotebookSimulator, environment: Environment) -> EnvGroup:
         restarter = Restarter(NotebookMember(place, environment))
         undo.pop_all()
     # The program may pause the simulator after any step, so `step` must not return during a restart.
-    return EnvGroup([restarter], restarter.stop, mend_at_once=True)
+    return EnvGroup([restarter], restarter.stop, wait_for_restart=True)
 
 
 def _in_job(configuration: Configuration, number: int | None, role: Role) -> EnvGroup:

@@ -107,7 +107,7 @@ class Restarter:
             ConfigurationError: before any step, two processes in a row lacked a device that the environment
                 needs, or failed with the same message.
             MasterLost: it could not be restarted without a ROS master.
-            SimulatorFault: it could not be recycled; call `begin_mending`.
+            SimulatorFault: it could not be recycled; call `begin_restart`.
         """
         if self.busy:
             return False
@@ -120,7 +120,7 @@ class Restarter:
         """Begin to start the member, again after each fault, until it is up or lost."""
         self._begin(self._start)
 
-    def begin_mending(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
+    def begin_restart(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
         """Begin to restart the broken member, again after each fault, until it is up or lost.
 
         Args:
@@ -128,7 +128,7 @@ class Restarter:
             steps_lost: environment steps of the episode that the fault truncated.
         """
         self._report(fault, steps_lost)
-        self._begin(partial(self._mend, fault))
+        self._begin(partial(self._restart, fault))
 
     def abandon(self) -> None:
         """Begin no further restart after the current one; callable from any thread."""
@@ -151,7 +151,7 @@ class Restarter:
         `check` is called every tenth of a second while the member is recycled; it raises to end the wait.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: it broke; call `begin_restart`.
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
@@ -168,7 +168,7 @@ class Restarter:
         Observation and info are copies, and the environment gets a copy of the action.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: it broke; call `begin_restart`.
             Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
@@ -184,7 +184,7 @@ class Restarter:
         """Return a mask of the actions that the environment allows in the next step; shape (choices,), bool.
 
         Raises:
-            SimulatorFault: it broke; call `begin_mending`.
+            SimulatorFault: it broke; call `begin_restart`.
             ConfigurationError: the environment returned no mask of its actions.
         """
         return mask_of(self.member.env)
@@ -218,7 +218,7 @@ class Restarter:
             try:
                 self._await_recycling(check)
             except SimulatorFault as fault:
-                self.begin_mending(fault)
+                self.begin_restart(fault)
         self._switch(self.member.unpause)
 
     def _begin(self, work: Callable[[], None]) -> None:
@@ -231,12 +231,12 @@ class Restarter:
         except SimulatorFault as fault:
             self._report(fault)
             self.tried = True
-            self._mend(fault)
+            self._restart(fault)
         else:
             self.tried = True
             self.watcher.started(self.name)
 
-    def _mend(self, fault: SimulatorFault) -> None:
+    def _restart(self, fault: SimulatorFault) -> None:
         while self._may_restart(fault):
             try:
                 self.member.restart()

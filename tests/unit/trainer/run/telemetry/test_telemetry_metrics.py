@@ -153,7 +153,7 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
     restarter.reset(1)
     restarter.step(1)
     restarter.step(1)
-    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
+    restarter.begin_restart(SimulatorDead("collect-0", "gone"))
     await_one([restarter])
 
     steps = values(progress, "palaestra_simulator_step_duration_seconds_count", "simulator")
@@ -167,7 +167,7 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
 def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
     """By the same window by which the simulator is given up."""
     restarter = Restarter(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
-    restarter.begin_mending(SimulatorDead("collect-0", "gone"))
+    restarter.begin_restart(SimulatorDead("collect-0", "gone"))
     await_one([restarter])
     before = restarter.meter.budget_spent
     clock.now = 60.0

@@ -99,7 +99,7 @@ def _attempt(restarter: Restarter, tried: Tried, work: Callable[[], None]) -> No
         tried.problems.add(
             f"a fault of the simulator ended an episode ({fault}); `palaestra run -v` shows its output"
         )
-        restarter.begin_mending(fault)
+        restarter.begin_restart(fault)
     except Diverged as error:
         tried.problems.add(str(error))
     except TrainerError as error:

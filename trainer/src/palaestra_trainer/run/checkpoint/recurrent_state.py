@@ -8,21 +8,21 @@ from typing import Any
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.algorithms.rollout_state import beside
+from palaestra_trainer.algorithms.rollout_state import rollout_state_of
 
 
 def networks(model: BaseAlgorithm) -> list[torch.Tensor]:
     """Return the tensors of the networks that a rollout changes; the caller copies or overwrites them."""
     return [
         tensor
-        for name in beside(model).networks
+        for name in rollout_state_of(model).networks
         for tensor in getattr(model, name).state_dict(keep_vars=True).values()
     ]
 
 
 def memories(model: BaseAlgorithm) -> list[torch.Tensor]:
     """Return the states of the model's recurrent networks; no code writes to these tensors later."""
-    return [state for name in beside(model).memories for state in _tensors(getattr(model, name))]
+    return [state for name in rollout_state_of(model).memories for state in _tensors(getattr(model, name))]
 
 
 def remember(model: BaseAlgorithm, states: Sequence[torch.Tensor]) -> None:
@@ -31,7 +31,7 @@ def remember(model: BaseAlgorithm, states: Sequence[torch.Tensor]) -> None:
     A member without a saved state keeps the model's current one; its episode and its state begin together.
     """
     left = iter(states)
-    for name in beside(model).memories:
+    for name in rollout_state_of(model).memories:
         setattr(model, name, _replaced(getattr(model, name), left))
 
 

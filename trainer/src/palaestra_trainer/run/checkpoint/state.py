@@ -22,7 +22,7 @@ from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
 from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.algorithms.observations import Observations, by_name, from_names
-from palaestra_trainer.algorithms.rollout_state import beside
+from palaestra_trainer.algorithms.rollout_state import rollout_state_of
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.run.checkpoint import recurrent_state
 from palaestra_trainer.run.checkpoint.rng import Generators
@@ -80,7 +80,7 @@ class TrainingState:
         buffer, normalizer = replay_buffer(model), normalizer_of(model)
         seen = normalizer.old_obs if normalizer else model._last_obs
         return cls(
-            numbers={name: getattr(model, name) for name in (*_NUMBERS, *beside(model).numbers)},
+            numbers={name: getattr(model, name) for name in (*_NUMBERS, *rollout_state_of(model).numbers)},
             generators=Generators.now(model.action_space, model.device),
             observation=as_returned(model, cast("Observations", seen)),
             episode_starts=np.asarray(model._last_episode_starts),
