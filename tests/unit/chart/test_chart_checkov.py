@@ -1,4 +1,4 @@
-"""checkov's findings in the chart are complete here, each with the reason why it stays."""
+"""The complete list of checkov's findings in the chart, with the reason why each finding is accepted."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ Objects = tuple[tuple[str, str], ...]
 
 
 class Accepted(NamedTuple):
-    """The reason why a check's findings are accepted, and the objects that they are about."""
+    """The reason why the findings of a check are accepted, and the objects to which they apply."""
 
     reason: str
     objects: Objects
@@ -43,7 +43,7 @@ EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
 
 @pytest.fixture(scope="module")
 def found():
-    """The findings by mode; checkov runs once for all modes, because it takes seconds to start."""
+    """Return the findings by mode; checkov starts slowly, so it runs once for all modes."""
     return findings({mode: rendered(MODES[mode]) for mode in EXPECTED})
 
 
