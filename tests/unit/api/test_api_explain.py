@@ -96,7 +96,7 @@ def test_no_line_of_prose_is_wider_than_the_terminal() -> None:
 
 @pytest.fixture(scope="module")
 def schema():
-    """The JSON Schema of a TrainingJob, as `--json` prints it."""
+    """Return the JSON Schema of a TrainingJob, as `palaestra explain --json` prints it."""
     return json.loads(json.dumps(json_schema(whole_job())))
 
 

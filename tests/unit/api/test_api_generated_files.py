@@ -34,7 +34,7 @@ EXAMPLES = [
     "name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/reference/trainingjob.md"]
 )
 def test_the_committed_file_is_current(name, repository) -> None:
-    """`make golden` writes these files again."""
+    """If the models have changed, `make golden` generates these files again."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]
 
 
@@ -63,7 +63,7 @@ def test_the_smallest_example_is_twelve_lines_at_most(repository) -> None:
 
 
 def test_the_examples_show_what_their_names_say(repository) -> None:
-    """These examples have two collectors, a sparse reward and REINFORCE."""
+    """A user chooses an example by its name, such as two-collectors or sparse-reward."""
 
     def job(name: str):
         text = (repository / f"manifests/examples/{name}.yaml").read_text(encoding="utf-8")

@@ -166,7 +166,7 @@ def test_a_wrong_version_alone_hides_nothing(job_data) -> None:
     ],
 )
 def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
-    """The message begins with the file's name, where a field's path would be."""
+    """Such a document has no fields, so the message begins with the name of the file."""
     assert told(text) == (f"job.yaml: {fact}; begin it with apiVersion: palaestra.dev/v1alpha1",)
 
 

@@ -11,7 +11,7 @@ NOON = "2026-01-31T12:00:00Z"
 
 @pytest.fixture
 def least(job_data) -> TrainingJob:
-    """A job that sets only its two groups."""
+    """Return a job that sets only its two groups."""
     return validate(job_data())
 
 
@@ -35,9 +35,9 @@ def test_a_group_is_of_stubs_in_the_arena(least) -> None:
 
 
 def test_simulators_are_expected_to_fail_sometimes(least) -> None:
-    """A simulator may restart ten times in ten minutes, and has a minute to start.
+    """By default a simulator may restart ten times in ten minutes, and has a minute to start.
 
-    The plan sets when simulators are recycled.
+    Without `recycle` in the spec, the plan decides when simulators are recycled.
     """
     group = least.spec.simulators[0]
 

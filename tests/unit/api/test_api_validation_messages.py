@@ -48,7 +48,7 @@ SENTENCES = [
      "spec.trainer.evaluation.stopAtSuccessRate: 0 is not more than 0; use more than 0"),
     ({"trainer.evaluation.stopAtSuccessRate": 95},
      "spec.trainer.evaluation.stopAtSuccessRate: 95 is more than 1; use 1 or less"),
-    # The wrong type, with YAML's traps.
+    # A value of the wrong type, for example text that looks like a number in YAML.
     ({"trainer.steps": "50000"},
      'spec.trainer.steps: "50000" is text; write a whole number without quotes'),
     ({"trainer.steps": 1.5}, "spec.trainer.steps: 1.5 is not a whole number; write one"),
@@ -119,7 +119,7 @@ SENTENCES = [
     ({"trainer.env": [{"name": "2FAST", "value": ""}]},
      ('spec.trainer.env[0].name: "2FAST" is not the name of a variable; '
      "use letters, digits and '_', no digit first")),
-    # Too much.
+    # A value, a list or a map that is too large, or a value that JSON cannot represent.
     ({"trainer.command": ["x"] * 65}, "spec.trainer.command: has more than 64 entries; remove some"),
     ({"scheduling.nodeSelector": {f"k{n}": "" for n in range(33)}},
      "spec.scheduling.nodeSelector: has more than 32 entries; remove some"),

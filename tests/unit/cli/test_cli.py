@@ -1,4 +1,4 @@
-"""The commands: their input, their output and their exit codes."""
+"""The commands of `palaestra`: their input, their output and their exit codes."""
 
 import re
 

@@ -19,7 +19,7 @@ def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent,
     """The clocks of leader and follower differ by `offset`, and run at the same speed."""
     tenure = Tenure(sent=sent, duration_s=duration_s)
     follower = ObservedLease()
-    # A renewal is written `travel` after it was sent, and the follower sees it `looked` after that.
+    # The API server writes a renewal `travel` s after it is sent; the follower reads it `looked` s later.
     seen = sent + travel + looked + offset
     follower.see(claim(duration_s=duration_s), seen)
 

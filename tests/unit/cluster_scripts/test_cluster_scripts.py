@@ -135,7 +135,7 @@ def test_asking_for_built_programs_builds_nothing(run):
 def test_an_error_has_a_remedy(run, command, environment, message):
     """The message names the object, the fact and the remedy."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
-        pytest.skip("Go is installed beside the system's programs")
+        pytest.skip("Go is installed next to the system's programs")
 
     result = run(*command, **environment)
 
@@ -143,7 +143,7 @@ def test_an_error_has_a_remedy(run, command, environment, message):
     assert message in result.stderr
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can change to another user")
 def test_missing_packages_are_one_line_to_type_for_who_is_not_root(run):
     """The script installs nothing without consent; it prints the one command to run."""
     nobody = ("setpriv", "--reuid", "65534", "--clear-groups")

@@ -58,7 +58,7 @@ class Scene:
         self.now = START  # the operator's wall clock, which somebody may set
         self.clock_s = 1000.0  # the operator's monotonic clock
         self.record = ReconcileRecord()
-        self.behind_s = 0.0  # how far the node's clock is behind the API server's
+        self.behind_s = 0.0  # delay of the node's clock behind the API server's
         self.server_s = 0.0  # the API server's clock, minus START
         self.layout = ClusterLayout(
             images=Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
@@ -74,7 +74,7 @@ class Scene:
         self.switchers: dict[str, str] = {}
         self.unadmitted: dict[str, str] = {}
         self.deleted = False
-        self.budget = False  # whether a disruption budget allows no eviction
+        self.budget = False  # whether a disruption budget forbids evictions
         self.pods_made = 0
 
     @property

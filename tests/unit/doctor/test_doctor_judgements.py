@@ -103,7 +103,7 @@ def test_a_definition_with_more_in_it_is_the_same():
 
 
 def test_the_place_where_another_release_s_definition_differs_is_returned():
-    """The function returns the path of the first difference."""
+    """The path shows an administrator which field of the cluster's definition is outdated."""
     ours = crd()
     found = deepcopy(ours)
     del found["spec"]["versions"][0]["schema"]["openAPIV3Schema"]["properties"]["spec"]

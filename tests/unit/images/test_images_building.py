@@ -58,7 +58,7 @@ def root(tmp_path):
 
 @pytest.fixture
 def engine():
-    """Return an engine."""
+    """Return an engine that only records its orders."""
     return WritingEngine()
 
 

@@ -92,7 +92,7 @@ def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec
 
 
 def test_a_job_with_mujoco_runs_where_it_is_installed(request_for):
-    """`make setup` installs MuJoCo."""
+    """The development setup installs MuJoCo, so the check must find no problem."""
     assert not list(preflight.programs_exist(request_for(**collecting(driver="mujoco"))))
 
 

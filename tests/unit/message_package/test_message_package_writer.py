@@ -77,7 +77,7 @@ def test_a_failed_write_leaves_the_earlier_package_as_it_was(tmp_path):
 
     done = subprocess.run(
         [COMMAND, tmp_path],
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # Python would keep half of its bytecode
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # Python would leave incomplete bytecode files
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)),
         capture_output=True,
         text=True,

@@ -64,7 +64,10 @@ def test_a_text_renames_a_device_or_leaves_it_out(load):
 
 
 def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
-    """The color order begins with blue; the camera looks down on a red plate and moves with its body."""
+    """The plate below the camera is red, and blue is the first color of a pixel.
+
+    The camera moves with its body.
+    """
     plate = '<geom type="box" pos="0 0 0.1" size="0.5 0.5 0.01" rgba="1 0 0 1" contype="0" conaffinity="0"/>'
     simulation = load(FORCE, "", ('<geom name="floor"', f'{plate}<geom name="floor"'))
     _, camera = simulation.robots[0].parts.devices.rows["eye"]

@@ -87,7 +87,7 @@ class Cluster:
         return self.children(None, KEY)[0]
 
     def children(self, resource, _):
-        """Return the Job, the only object."""
+        """Return the Job, or an empty list for another kind."""
         if resource is not None and resource.kind != "Job":
             return []
         metadata = {

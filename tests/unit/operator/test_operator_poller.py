@@ -45,7 +45,7 @@ class Trainer(socketserver.ThreadingTCPServer):
 
 
 class Answering(socketserver.BaseRequestHandler):
-    """Handle one connection."""
+    """The handler of one connection to `Trainer`."""
 
     def handle(self):
         """Send the response."""
