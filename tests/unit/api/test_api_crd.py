@@ -99,7 +99,7 @@ def test_every_map_is_bounded_and_every_object_has_fields() -> None:
 def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
     """Without `x-kubernetes-preserve-unknown-fields` the API server would prune all hyperparameters.
 
-    They must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
+    Free objects must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
     """
     free = [path for path, schema in ALL.items()
             if schema.get("x-kubernetes-preserve-unknown-fields")]  # fmt: skip

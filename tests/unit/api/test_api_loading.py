@@ -171,7 +171,7 @@ def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
 
 
 def test_the_error_for_a_file_that_is_no_yaml_has_line_and_column() -> None:
-    """The line and the column count from 1."""
+    """Line and column are counted from 1, as in editors."""
     problem = told("spec:\n  trainer: [1, 2\n")[0]
 
     assert problem.startswith("job.yaml:3:1: not YAML: ")

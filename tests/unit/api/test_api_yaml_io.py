@@ -78,7 +78,7 @@ def test_anchors_and_merges_are_followed() -> None:
     ],
 )
 def test_the_error_for_text_that_cannot_be_read_has_line_and_column(text, problem) -> None:
-    """Both are counted from 1, as in editors."""
+    """Line and column are counted from 1, as in editors."""
     with pytest.raises(NotYaml) as caught:
         read(text, "job.yaml")
 

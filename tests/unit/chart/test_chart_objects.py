@@ -123,7 +123,10 @@ def test_the_account_of_the_trial_can_be_left_out(made):
 
 @every_mode
 def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode):
-    """The roles list each verb that the operator uses; only a person may grant it access to Secrets."""
+    """The roles list each verb of the operator.
+
+    Only an administrator may bind the role that reads Secrets.
+    """
     assert not [right for right in rules(roles(made(mode)).values()) if "*" in "".join(right)]
     assert bound(made(mode))
     assert not [right for right in rules(bound(made(mode))) if "secrets" in right]

@@ -37,5 +37,5 @@ def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
     ],
 )
 def test_what_only_looks_like_it_does_not(kind, name, uid):
-    """A job `job-0` may exist next to `job`, and its name is also that of a child of `job`."""
+    """A TrainingJob `job-0` may exist next to `job`, whose child also has the name `job-0`."""
     assert not concerns(event(kind, name, uid), running_job())

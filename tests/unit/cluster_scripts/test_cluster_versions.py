@@ -58,7 +58,7 @@ def test_a_version_that_no_module_asks_for_is_an_error():
 
 
 def test_the_images_that_a_node_names_are_brought_along(tmp_path):
-    """A node would try to pull an image of another version, but it has no access to a registry."""
+    """A node would try to pull an image of another version, and a node here cannot reach a registry."""
     node = "".join(path.read_text() for path in sorted((CLUSTER / "node").rglob("*")) if path.is_file())
     named = set(re.findall(r"(?:registry\.k8s\.io|palaestra\.dev)/[\w./-]+:v?\d[\w.-]*", node))
 

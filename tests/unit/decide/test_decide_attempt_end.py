@@ -168,7 +168,7 @@ def delete(scene, pod):
 @pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
 @pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
 def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, take, looks):
-    """Each cause counts once, even if the operator sees only the next pod."""
+    """Each disruption counts once, whatever its cause, even if the operator sees only the next pod."""
     scene, pod = training(backoffLimit=0)
     take(scene, pod)
     told = disrupted(scene.settle(5)) if looks else []
@@ -203,7 +203,7 @@ def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
 
 
 def test_two_disruptions_in_a_row_are_two_events(training):
-    """Between the two the replica did not train, but each disruption must reach the user."""
+    """The replica did not train between the two disruptions, but each of them must emit an event."""
     scene, pod = training()
     evict(scene, pod)
     told = disrupted(scene.settle(5))

@@ -132,7 +132,7 @@ def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_th
 
 
 def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
-    """The image was pulled long before the timeout, so the message must not blame it."""
+    """The image was pulled long before the timeout, so it is not the cause of the timeout."""
     scene = accepted(startTimeoutSeconds=1000)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
@@ -192,7 +192,7 @@ def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
 def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
     """The operator may be killed after it wrote the mark and before it evicted the pod.
 
-    After its restart it evicts the pod, and the replacement counts once.
+    After its restart the operator evicts the pod, and counts the replacement once.
     """
     scene = accepted()
     scene.budget = True

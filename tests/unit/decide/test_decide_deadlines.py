@@ -1,7 +1,4 @@
-"""When a deadline passes, the operator writes one patch with the reason.
-
-It stops the replica or replaces its pod.
-"""
+"""One patch with the reason stops a replica whose deadline has passed, or replaces its pod."""
 
 import pytest
 
@@ -44,7 +41,7 @@ def test_a_replica_has_failed_once_its_job_carries_the_mark(training):
 
 
 def test_suspended_time_does_not_count_for_the_active_deadline(training):
-    """The job was active for only one of eleven minutes."""
+    """The job was suspended for ten of eleven minutes, in which it could not train."""
     scene, _ = training(activeDeadlineSeconds=120)
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
@@ -235,7 +232,10 @@ def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_sc
 
 @pytest.mark.parametrize("how", ["unreachable", "deleted", "ended"])
 def test_a_crash_loop_of_before_is_not_held_against_a_pod_that_trained(training, how):
-    """A new operator has not polled the trainer yet, and the simulators of an ending pod exit with errors."""
+    """An operator that has just started has not polled the trainer yet.
+
+    The sidecars of an ending pod exit with errors, which look like a crash loop.
+    """
     scene, pod = training()
     scene.poll(pod, phase="training", step=50)
     scene.settle(5)

@@ -89,7 +89,7 @@ def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(tra
 
 
 def test_a_full_volume_is_reported_with_its_remedy(training, last_word):
-    """A person can free space or request a larger volume, so the message must say it."""
+    """A person can free space or request a larger volume, so the message must name this remedy."""
     scene, pod = training(backoffLimit=0)
     scene.end(pod, 1, last_word(reason="StorageFull: checkpoints/5: disk full"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")

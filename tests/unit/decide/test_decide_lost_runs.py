@@ -72,7 +72,10 @@ def test_a_job_with_a_lost_run_needs_a_person(training):
 
 
 def test_a_claim_that_is_lost_between_two_pods_suspends_the_job(training):
-    """The next pod waits for the claim; if somebody created an empty one, the pod would train from step 0."""
+    """The next pod waits for the claim.
+
+    If somebody created an empty claim, the pod would train from step 0.
+    """
     scene, pod = training()
     scene.poll(pod, step=500)
     scene.settle()

@@ -113,7 +113,7 @@ def test_a_kill_that_is_the_replicas_reason_is_one_event(scene_and_pod):
 
 
 def test_without_a_limit_it_was_its_node_that_ran_short(scene_and_pod):
-    """A webhook may have removed the limits, so the message must blame the node's memory."""
+    """A webhook may have removed the limits; the message must then name the node's memory as the cause."""
     scene, pod = scene_and_pod
     for each in pod["spec"]["initContainers"]:
         del each["resources"]["limits"]

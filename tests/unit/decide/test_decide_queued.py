@@ -63,7 +63,7 @@ def test_long_words_leave_the_rest_of_the_message_whole(queued, last_word):
 
 @pytest.mark.parametrize("words", [SHORT, "LocalQueue robots doesn't exist"])
 def test_an_operator_that_was_restarted_keeps_the_words_until_it_has_asked(words, queued):
-    """If a restart first removed the message, it would write the status of each waiting job twice."""
+    """If a restart removed the messages, the operator would write each waiting job's status twice."""
     say(queued, words)
     before = queued.raw["status"]
 

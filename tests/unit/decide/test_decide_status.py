@@ -92,7 +92,7 @@ def test_the_status_lists_simulators(training, simulator):
 def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
     """All replicas have the same worlds, so the job has one list.
 
-    It stays after the reporting pod is deleted.
+    The list stays after the pod that reported it is deleted.
     """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in range(2)]
@@ -220,10 +220,7 @@ def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits
 
 
 def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(accepted, last_word):
-    """`palaestra watch` and the event take the message from there.
-
-    In every condition it would be repeated.
-    """
+    """`palaestra watch` and the event take the message from these conditions; the others refer to it."""
     scene = accepted()
     scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

@@ -76,10 +76,7 @@ def size(data):
 
 
 def test_a_hundred_replicas_of_32_simulators_fit_with_the_largest_world():
-    """Unshortened, it has 3 MiB.
-
-    The API server refused such a status, and the operator sent it again for ever.
-    """
+    """The full status has 3 MiB. The API server refused it, and the operator sent it again for ever."""
     status = whole([replica(i) for i in range(100)])
     assert size(status) > MOST
 
@@ -126,7 +123,7 @@ def test_a_replica_that_failed_keeps_its_log_longest():
 def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     phases, simulators, text, kills, taken
 ):
-    """The schema allows any of these statuses; to shorten one a second time must change nothing."""
+    """The schema allows any of these statuses. To shorten a shortened status again must change nothing."""
     status = whole(
         [replica(i, each, simulators=simulators, text=text, kills=kills) for i, each in enumerate(phases)]
     )

@@ -76,7 +76,7 @@ def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(t
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
     """Pods and Jobs come from two watches.
 
-    A resumption that the operator sees late must not count again for the pod after that.
+    A resumption that the operator sees late must not count again for the next pod.
     """
     scene, _ = training()
     scene.objects["pods"].clear()
@@ -223,7 +223,7 @@ def test_a_mark_is_counted_once(training):
 
 
 def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(training):
-    """The annotation names an earlier pod and Kueue writes none, so only the times show this suspension."""
+    """Kueue writes no annotation, and the old one names an earlier pod, so only the times decide."""
     scene, pod = training()
     pause(scene, pod)
     second = scene.running_pod()

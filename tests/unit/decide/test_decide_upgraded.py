@@ -52,7 +52,7 @@ def test_it_runs_on(upgraded):
 
 
 def test_it_is_suspended_and_resumed(upgraded):
-    """A user can still change the fields that may change."""
+    """A user can still change `suspend`, like every field that may change."""
     for generation, suspend in enumerate((True, False), 2):
         upgraded.raw["spec"]["suspend"] = suspend
         upgraded.raw["metadata"]["generation"] = generation

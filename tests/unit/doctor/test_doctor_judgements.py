@@ -114,10 +114,9 @@ def test_the_place_where_another_release_s_definition_differs_is_returned():
 
 
 def test_the_operators_rights_are_those_of_an_installation():
-    """The doctor must check exactly the granted permissions.
+    """The doctor would report a permission that no role grants as missing for ever.
 
-    It would report a permission that no role grants as missing for ever; nobody would notice the lack of one
-    that it does not check.
+    If the doctor did not check a permission, nobody would notice that the permission is missing.
     """
     installed = yaml.safe_load_all((ROOT / "manifests/install.yaml").read_text())
     [role] = [

@@ -15,7 +15,7 @@ STATE = {
 
 
 def test_times_uids_and_made_up_names_are_replaced_by_their_shape():
-    """These values are different in every run."""
+    """Times, uids and generated names are different in every run."""
     assert shaped(f"{UID} at 2026-01-31T12:00:00Z in place-3-5959: pod job-0-x7k2p, 127.90.91.3") == (
         "<uid> at <time> in <namespace>: pod job-0-<pod>, <address>"
     )

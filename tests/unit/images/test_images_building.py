@@ -77,7 +77,7 @@ def test_an_unchanged_image_is_not_built_again(workshop, engine):
 
 
 def test_an_archive_keeps_its_age_when_it_is_used(workshop):
-    """A test cluster compares this time to find out whether it has loaded the archive."""
+    """A test cluster compares the modification time to find out whether it must load the archive."""
     before = workshop.build(OPERATOR).archive.stat().st_mtime_ns
 
     assert workshop.build(OPERATOR).archive.stat().st_mtime_ns == before

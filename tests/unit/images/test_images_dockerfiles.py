@@ -49,7 +49,7 @@ def test_an_image_runs_as_a_user_without_rights(instructions):
 
 
 def test_an_image_runs_as_any_user_of_the_group_0(instructions):
-    """OpenShift runs each namespace under its own user ID, which has no name and no home in the image."""
+    """OpenShift gives each namespace a user ID, which has no name and no home in the image."""
     folders = [
         words
         for run in values(instructions, "RUN")

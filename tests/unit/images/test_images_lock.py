@@ -61,7 +61,7 @@ def test_markers_are_decided_for_the_python_of_the_image():
 
 
 def test_what_is_left_out_takes_along_what_only_it_needs():
-    """Debian's PyTorch replaces the locked one, so the locked one's libraries are not needed either."""
+    """Debian's PyTorch replaces the locked PyTorch, whose libraries are then not needed either."""
     assert names(share(parse(SMALL), ["palaestra"], "x86_64", without=["parent"])) == set()
 
 
@@ -92,7 +92,7 @@ def test_a_share_keeps_every_hash():
 
 
 def test_a_lock_of_another_form_is_refused_with_the_line():
-    """If the parser skipped an unknown line, the image would lack this package."""
+    """If the parser skipped an unknown line, the image would lack the package of that line."""
     with pytest.raises(ValueError, match=r"'child @ file:///child' has no version with hashes"):
         parse("child @ file:///child\n    # via palaestra\n")
 
@@ -157,7 +157,7 @@ def test_what_an_image_has_besides_is_nothing_that_it_has_already():
 
 
 def test_the_trainer_for_cuda_has_the_locked_torch_and_its_libraries():
-    """Debian's PyTorch has no CUDA, so this image needs the locked one."""
+    """Debian's PyTorch has no CUDA, so this image needs the locked PyTorch."""
     recipe = recipes("cuda")["trainer"]
 
     assert {"torch", "triton", "nvidia-cudnn-cu12"} <= names(

@@ -1,4 +1,4 @@
-"""A browser may send two messages to the server of a live view: its camera, and a use of our own controls."""
+"""A browser may send two messages to a live view: the pose of its camera, and the use of our own controls."""
 
 import http.client
 from typing import get_type_hints

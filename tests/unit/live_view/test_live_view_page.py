@@ -143,7 +143,7 @@ def test_a_page_that_nobody_looks_at_asks_for_nothing(page, simulator):
 
 @pytest.mark.usefixtures("browser")
 def test_it_draws_every_shape_and_moves_what_moves(page, simulator):
-    """A node without a pose in the state has its pose of the scene."""
+    """If the state has no pose for a node, the page uses the pose of the scene."""
     eventually(lambda: place(page, "robot") == 2.0)
     assert place(page, "mark") == 1.0
 

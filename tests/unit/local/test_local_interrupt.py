@@ -65,7 +65,7 @@ def test_a_first_signal_after_the_deadline_does_not_kill():
 
 @pytest.mark.parametrize("signals", [1, 2])
 def test_a_run_that_a_person_ends_has_not_expired(signals):
-    """This holds however long the trainer takes to stop."""
+    """The run counts as ended by the user, however long the trainer takes to stop."""
     told, interrupt = ended_by(signals)
 
     assert told == ["stop", "kill"][:signals]

@@ -62,7 +62,7 @@ def test_what_an_author_writes_reaches_the_program_as_it_stands():
 
 
 def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
-    """This machine has no Secret; without the error the trainer would fail later, without the variable."""
+    """This machine has no Secrets, so the trainer would later fail because of the missing variable."""
     secret = {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}}
 
     with pytest.raises(RunRefused, match=r"env TOKEN of container trainer: .* give it as `value`"):
@@ -70,7 +70,7 @@ def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
 
 
 def test_a_second_main_container_is_refused():
-    """The exit code of a pod is that of its main container, so a pod can have only one."""
+    """The exit code of a pod is that of its main container, so it can have only one main container."""
     two = {"spec": {"containers": [{"name": "a", "command": ["x"]}, {"name": "b", "command": ["y"]}]}}
 
     with pytest.raises(RunRefused, match="container b"):

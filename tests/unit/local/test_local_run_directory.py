@@ -234,7 +234,7 @@ def test_only_one_runner_at_a_time_has_a_directory(tmp_path):
 def test_a_file_system_without_locks_is_refused(tmp_path, monkeypatch, number):
     """Without locks, two runs could write to one directory.
 
-    Such file systems are NFS without its lock service and Lustre without `flock`.
+    Examples are NFS without its lock service and Lustre without `flock`.
     """
     monkeypatch.setattr("fcntl.flock", failing(number))
     path = tmp_path / "job" / "0"

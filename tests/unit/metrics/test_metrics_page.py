@@ -70,7 +70,7 @@ def test_a_name_tells_its_home(program):
 
 @each_family
 def test_a_counter_and_nothing_else_ends_in_total(family):
-    """The author of a query sees from the name whether it needs `rate`."""
+    """The author of a query sees from the name whether the metric needs `rate`."""
     assert family.name.endswith("_total") is (family.kind is MetricType.COUNTER)
 
 

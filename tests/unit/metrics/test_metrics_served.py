@@ -52,7 +52,10 @@ def series(text):
 
 @pytest.mark.parametrize(("served", "declared"), [(operator, of_operator), (trainer, of_trainer)])
 def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, declared):
-    """It needs ascending buckets up to infinity, an equal count, and a sum if no value is negative."""
+    """A strict reader needs ascending buckets up to infinity and an equal count.
+
+    It also needs a sum, except for a histogram whose sum may decrease.
+    """
     text = served()
     found = series(text)
 

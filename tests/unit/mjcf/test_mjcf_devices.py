@@ -85,7 +85,7 @@ def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
 
 
 def test_a_force_accelerates_its_joint(load):
-    """The model applies the actuator's gear: 1.1 N accelerate 1.1 kg at 1 m/s2, for half a second."""
+    """The device accounts for the gear: 1.1 N accelerate 1.1 kg at 1 m/s2, for half a second."""
     simulation = load(FORCE, "", ('damping="0.01"', 'damping="1000"'))
     simulation.robots[0].motors["push"].set_effort(1.1)
 
@@ -96,7 +96,7 @@ def test_a_force_accelerates_its_joint(load):
 
 
 def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
-    """A motor of Webots does the same. An infinite target position means that it turns at its velocity."""
+    """A motor of Webots does the same. With an infinite target position the motor turns at its velocity."""
     simulation = load(VELOCITY)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(math.inf)
@@ -148,7 +148,7 @@ def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command
 
 
 def test_sensors_have_the_values_of_the_moment(load):
-    """MuJoCo computes sensor values at the beginning of a step, but a device must have those of its end."""
+    """MuJoCo computes sensor values at the beginning of a step. A device must have the values at its end."""
     simulation = load()
     simulation.robots[0].motors["push"].set_effort(5.0)
 
@@ -213,7 +213,7 @@ def test_devices_of_one_name_are_told_apart(load):
 
 
 def test_sensors_without_names_on_one_joint_have_their_numbers(load):
-    """MuJoCo loads two such sensors, and without names a text in <custom> could not rename them."""
+    """MuJoCo loads such sensors. A text in <custom> cannot rename them, because they have no names."""
     twice = '<jointvel joint="hinge"/><jointvel joint="hinge"/>'
 
     found = kinds(load(FORCE, twice))

@@ -202,7 +202,7 @@ def test_a_sensor_and_an_actuator_of_one_name_are_told_apart(load):
 
 
 def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
-    """The user must find the sensor of the message in the model, so the remedy has its name there."""
+    """The remedy uses the sensor's name in the model, so that the user can find the sensor there."""
     texts = '<text name="device:sensor/cart velocity" data="grip"/>'
 
     with pytest.raises(WorldError, match="a second device 'mujoco/grip'"):

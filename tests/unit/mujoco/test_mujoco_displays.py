@@ -50,7 +50,7 @@ def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
 
 
 def test_a_display_without_its_camera_is_transparent_where_nothing_was_drawn(devices):
-    """Webots also shows only the drawings then."""
+    """Without the camera, Webots also shows only the drawings."""
     _, display = devices()
     display.attach("eye")
     display.picture.draw([(3, 2)], WHITE)

@@ -16,7 +16,7 @@ PENDING = {
 
 @pytest.mark.parametrize("kept", [dict, trimmed])
 def test_a_claim_that_was_never_bound_is_unused(kept):
-    """The cached copy of a claim keeps the fields that show this."""
+    """The cached copy of a claim keeps the fields that show whether the claim was bound."""
     assert is_unused(kept(PENDING))
 
 

@@ -30,5 +30,5 @@ def test_of_several_managers_it_is_the_last():
     ids=["absent", "no list", "no entries", "no fields"],
 )
 def test_what_does_not_tell_is_nobody(fields):
-    """The operator must not fail, whatever content is stored there."""
+    """Any content may be stored in managedFields, and the operator must not fail."""
     assert suspends({"metadata": {"managedFields": fields}}) == ""

@@ -29,7 +29,7 @@ def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
 
 
 def test_a_sidecar_without_its_restart_policy_is_a_plain_init_container(look, raw_pod):
-    """A webhook or an old kubelet may have dropped the restart policy."""
+    """A webhook may have dropped the restart policy."""
     del raw_pod["spec"]["initContainers"][0]["restartPolicy"]
 
     assert pod(look, raw_pod).containers[0].kind is ContainerKind.INIT

@@ -81,7 +81,7 @@ def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     ],
 )
 def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
-    """The conditions that come before the last pod's end are enough: on a lost node it never ends."""
+    """The conditions before the last pod's end are enough, because on a lost node the pod never ends."""
     raw_job["status"] = {"conditions": conditions}
 
     assert look(jobs=[raw_job]).replicas[0].job.end is end
@@ -236,7 +236,7 @@ def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, ra
 
 
 def test_the_event_about_the_probe_is_read_and_not_one_about_another_container():
-    """When the trainer has ended, the kubelet also ends the other containers and emits such events."""
+    """After the trainer the kubelet also ends the other containers, and emits events about them."""
     probe = {"reason": "Killing", "message": "Container trainer failed startup probe, will be restarted"}
     other = {"reason": "Killing", "message": "Stopping container sim-collect-0"}
     events = [

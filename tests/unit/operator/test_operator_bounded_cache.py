@@ -1,4 +1,4 @@
-"""A bounded cache holds facts about TrainingJobs for which the operator must send requests."""
+"""A bounded cache holds the facts about TrainingJobs that no watch delivers, by TrainingJob."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The operator creates an object whose name is already in use."""
+"""The operator tries to create an object whose name is already in use."""
 
 import pytest
 

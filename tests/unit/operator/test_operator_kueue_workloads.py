@@ -1,4 +1,4 @@
-"""When the operator requests from the API server why Kueue does not admit a Job."""
+"""The operator requests the reason why Kueue does not admit a Job only if the Job waits in a queue."""
 
 import pytest
 

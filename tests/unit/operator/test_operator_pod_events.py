@@ -1,4 +1,4 @@
-"""When the operator requests the events of a Job or a pod."""
+"""The operator requests the events of a Job or a pod only if they may explain a wait or an end."""
 
 import pytest
 

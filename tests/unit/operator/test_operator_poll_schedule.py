@@ -79,7 +79,7 @@ def test_a_silent_pod_is_asked_again():
 
 
 def test_no_more_are_asked_at_once_than_there_are_places():
-    """Each response may have 64 KiB, so parallel polls need memory."""
+    """Each response may have 64 KiB, so the number of parallel polls must be limited."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1000), 0.0)
 

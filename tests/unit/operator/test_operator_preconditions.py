@@ -1,4 +1,4 @@
-"""The operator does not execute a decision from an outdated cache: a read and preconditions detect it."""
+"""The operator does not execute a decision from an outdated cache, which a read and preconditions reveal."""
 
 import pytest
 

@@ -173,7 +173,7 @@ def test_a_job_that_is_gone_leaves_the_line(begin: Begin, slow: Slow) -> None:
 def test_a_check_without_a_verdict_is_tried_again(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a node has too little time or memory, the world may still be valid."""
+    """A check may fail because the node lacks time or memory, although the world is valid."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.PAUSE_S", 0.0)
     checking, slow.comes_to_nothing = begin(slow), True
     hand_over(checking, slow, EVIL, [large()])
