@@ -22,7 +22,7 @@ def test_a_seed_names_the_same_plan_again(seed):
 
 
 def test_every_write_of_every_workload_meets_a_fault_before_and_one_after_it_is_carried_out():
-    """The documentation of the fault tests promises this coverage, so the test counts the faults."""
+    """docs/explain/reliability.md promises two faults for each write, so the test counts the faults."""
     counts = {"ends": {WRITE: 7}, "pauses": {WRITE: 12}}
     met = defaultdict(list)
     for it in plans(counts):
