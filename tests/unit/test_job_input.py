@@ -1,4 +1,4 @@
-"""A job that a program passes in, with new values in some fields."""
+"""A job that a program passes in, and the same job with new values in some fields."""
 
 import copy
 
@@ -21,7 +21,7 @@ RATE = "trainer.algorithm.hyperparameters.learning_rate"
 
 
 def test_a_job_is_the_same_in_every_form(tmp_path):
-    """The forms are a path, a path as text, YAML, plain data, and the model."""
+    """A caller may pass a path, a path as text, YAML text, plain data or a model."""
     (tmp_path / "job.yaml").write_text(TEXT)
     model = load(TEXT)
     plain = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
@@ -33,7 +33,7 @@ def test_a_job_is_the_same_in_every_form(tmp_path):
 
 
 def test_fields_are_changed_by_their_path_and_the_given_job_stays():
-    """A notebook can compare two jobs that differ in one field."""
+    """In a notebook, a user can compare two jobs that differ in one field."""
     job = load(TEXT)
     before = copy.deepcopy(job)
 
@@ -45,7 +45,7 @@ def test_fields_are_changed_by_their_path_and_the_given_job_stays():
 
 
 def test_an_item_of_a_list_is_changed_also_if_the_list_is_a_default():
-    """The job does not list its simulators."""
+    """This job does not list its simulators, so the change applies to the default groups."""
     job = palaestra.changed(TEXT, {"simulators[0].count": 2, 'metadata.labels["a.b/c"]': "d"})
 
     assert [group.count for group in job.spec.simulators] == [2, 1]
@@ -63,7 +63,7 @@ def test_an_item_of_a_list_is_changed_also_if_the_list_is_a_default():
     ],
 )
 def test_a_mistake_is_reported_as_in_a_file(changes, problem):
-    """The message has field, fact and remedy."""
+    """The message has the field, the fact and the remedy."""
     with pytest.raises(SpecErrors) as refused:
         palaestra.changed(TEXT, changes)
 
@@ -71,6 +71,6 @@ def test_a_mistake_is_reported_as_in_a_file(changes, problem):
 
 
 def test_a_document_that_is_no_job_is_refused_as_in_a_file():
-    """This holds whatever is to be changed in it."""
+    """The error about the document comes before any error about the changes."""
     with pytest.raises(SpecErrors, match="the document is a list, not a mapping"):
         palaestra.changed("- a\n- b\n", {"seed": 1})

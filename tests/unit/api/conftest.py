@@ -1,4 +1,4 @@
-"""Build the job files of these tests: a test names only the fields that matter to it."""
+"""Fixtures that build job files: a test names only the fields that its claim needs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,5 +43,5 @@ def problems() -> Callable[..., list[str]]:
 
 @pytest.fixture(scope="session")
 def repository() -> Path:
-    """The root of the checkout."""
+    """Return the root of the checkout."""
     return Path(__file__).parents[3]

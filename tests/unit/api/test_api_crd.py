@@ -1,4 +1,4 @@
-"""The CustomResourceDefinition is structural, bounded and small, and equals the models."""
+"""The CustomResourceDefinition is structural, bounded and small, and agrees with the models."""
 
 import re
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ def rules_of(path: str) -> list[dict[str, str]]:
 
 
 def frozen(path: str) -> bool:
-    """Return whether the field at `path` cannot change: a rule freezes it, its parent or all its parts."""
+    """Return whether the field at `path` cannot change: a rule freezes it, its parent or all its children."""
     above, _, name = path.rpartition(".")
     if "" in kept(path) or {"", f".{name}"} & kept(above):
         return True
@@ -59,7 +59,7 @@ def test_no_keyword_is_used_that_a_structural_schema_forbids() -> None:
 
 
 def test_every_type_is_spelled_out() -> None:
-    """Only quantities and the values of free objects have no type; marks of Kubernetes replace it."""
+    """Only quantities and the values of free objects have no `type`; an `x-kubernetes-` mark replaces it."""
     marks = ("x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields")
     untyped = [path for path, schema in ALL.items() if "type" not in schema]
 
@@ -76,7 +76,7 @@ def test_every_type_is_spelled_out() -> None:
     ],
 )
 def test_every_text_and_list_is_bounded(kind, bounds) -> None:
-    """The cost of a rule is estimated from the largest object that the schema admits."""
+    """An API server estimates the cost of a CEL rule from the largest object that the schema admits."""
     unbounded = [
         path for path, schema in ALL.items()
         if schema.get("type") == kind and not bounds & schema.keys()
@@ -97,9 +97,9 @@ def test_every_map_is_bounded_and_every_object_has_fields() -> None:
 
 
 def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
-    """Without that mark the API server would prune all hyperparameters.
+    """Without `x-kubernetes-preserve-unknown-fields` the API server would prune all hyperparameters.
 
-    They must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
+    Free objects must be maps: if two objects have unknown fields, an API server overlooks a renamed key.
     """
     free = [path for path, schema in ALL.items()
             if schema.get("x-kubernetes-preserve-unknown-fields")]  # fmt: skip
@@ -123,12 +123,15 @@ def test_every_field_is_described() -> None:
 
 
 def test_the_definition_is_small_enough_to_be_applied() -> None:
-    """The copy that `kubectl apply` keeps in an annotation may have 262,144 bytes; half is enough here."""
+    """`kubectl apply` copies the definition into an annotation of at most 262,144 bytes.
+
+    Half of that limit leaves space for new fields.
+    """
     assert len(crd_text().encode()) < 131_072
 
 
 def test_the_defaults_are_those_of_the_models(job_data) -> None:
-    """A job must mean the same whether an API server fills in its defaults or the models do."""
+    """A job must mean the same whether an API server or the models fill in its defaults."""
 
     def filled(schema: dict[str, Any], data: Any) -> Any:
         if "items" in schema:
@@ -150,7 +153,7 @@ def test_the_defaults_are_those_of_the_models(job_data) -> None:
 
 
 def test_rules_stand_where_the_models_have_them() -> None:
-    """Each rule of the models is in the definition once, with the same text."""
+    """The definition has each CEL rule of the models once, at the same path and with the same message."""
     for path, model in walk(TrainingJob):
         at = WHOLE
         for name in path:
@@ -178,7 +181,7 @@ def test_a_rule_names_a_field_that_the_object_has() -> None:
     ],
 )
 def test_deadlines_ttl_and_suspend_may_change(path) -> None:
-    """These fields limit the time of a run; they do not change its result."""
+    """These fields limit the duration of a run and do not change its result."""
     assert not frozen(path)
 
 
@@ -198,12 +201,12 @@ def test_deadlines_ttl_and_suspend_may_change(path) -> None:
     ],
 )  # fmt: skip
 def test_all_else_stays_as_it_was_accepted(path) -> None:
-    """If a spec could change during a run, nobody could explain the result."""
+    """If a spec could change during a run, nobody could say which spec produced the result."""
     assert frozen(path)
 
 
 def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
-    """The author of a new field must decide whether it may change."""
+    """The author of a new field must decide whether users may change it."""
     free = [name for name in ALL["spec"]["properties"] if not frozen(f"spec.{name}")]
 
     assert free == [
@@ -217,7 +220,10 @@ def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
 
 
 def test_a_field_of_a_part_is_kept_by_a_rule_of_its_own() -> None:
-    """The API server's message has the path of the rule; `spec.trainer` would not name the wrong field."""
+    """The API server's message has the path of the rule, so the rule must be at the frozen field.
+
+    A rule at `spec.trainer` would not name the field that changed.
+    """
     alone = ("spec.trainer.steps", "spec.trainer.algorithm.name", "spec.storage.size", "spec.network.egress")
 
     assert [path for path in alone if "" not in kept(path)] == []
@@ -231,7 +237,7 @@ def test_groups_cannot_be_added_or_removed() -> None:
 
 
 def test_lists_of_named_things_are_maps_to_the_api_server() -> None:
-    """The API server then refuses a duplicate name, and compares an item with its old value by name."""
+    """The API server then refuses a duplicate name, and finds an item's old value by the item's name."""
     named = {path for path, schema in ALL.items() if schema.get("x-kubernetes-list-type") == "map"}
 
     assert named == {
@@ -245,33 +251,39 @@ def test_lists_of_named_things_are_maps_to_the_api_server() -> None:
 
 
 def test_the_keys_of_such_a_list_are_required() -> None:
-    """An API server refuses the definition otherwise."""
+    """An API server refuses the definition if a map key of a list is an optional field."""
     for schema in ALL.values():
         for key in schema.get("x-kubernetes-list-map-keys", []):
             assert key in schema["items"]["required"]
 
 
 def test_of_the_metadata_only_the_name_is_bounded() -> None:
-    """An API server accepts no other rule there; the name must leave room for suffixes of child objects."""
+    """In the metadata, an API server accepts only rules on `name` and `generateName`.
+
+    The limit on the name leaves space for the suffixes of the child objects.
+    """
     assert ALL["metadata"]["properties"].keys() == {"name"}
     assert ALL["metadata.name"]["maxLength"] == 48
 
 
 def test_columns_show_what_there_is() -> None:
-    """A column with a wrong path stays empty for ever."""
+    """A printer column whose path matches no field would stay empty for ever."""
     for column in VERSION["additionalPrinterColumns"]:
         path = re.sub(r"\[\?.*?\]", "[]", column["jsonPath"]).removeprefix(".")
         assert path in ALL or path == "metadata.creationTimestamp"
 
 
 def test_a_field_to_select_by_is_a_plain_one() -> None:
-    """An API server refuses the whole definition if such a field is a list or an object."""
+    """An API server refuses the definition if a selectable field is a list or an object."""
     for field in VERSION["selectableFields"]:
         assert ALL[field["jsonPath"].removeprefix(".")]["type"] == "string"
 
 
 def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
-    """People use `-o wide` only after they have noticed a problem; the other columns are for that."""
+    """`kubectl get` shows these columns.
+
+    The others need `-o wide`, which people use only after they notice a problem.
+    """
     columns = VERSION["additionalPrinterColumns"]
 
     assert [column["name"] for column in columns if not column.get("priority")] == [
@@ -280,7 +292,7 @@ def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
 
 
 def test_status_is_written_apart_and_the_short_name_is_tj() -> None:
-    """The permission to edit a job must not include its status."""
+    """A user with permission to edit a job must not be able to write its status."""
     assert VERSION["subresources"] == {"status": {}}
     assert crd()["spec"]["names"]["shortNames"] == ["tj"]
     assert crd()["spec"]["names"]["categories"] == ["all", "palaestra"]

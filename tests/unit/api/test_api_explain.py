@@ -1,4 +1,4 @@
-"""`palaestra explain`: every field is found by what a person types, and editors get the same facts."""
+"""`palaestra explain` finds a field by the path that a person types; the JSON Schema has the same facts."""
 
 import json
 
@@ -28,13 +28,13 @@ FIELDS = list(whole_job().walk())
     ],
 )
 def test_a_field_is_found_as_kubectl_a_message_or_a_person_writes_it(typed, path) -> None:
-    """Messages have indices, kubectl wants the kind first, and `spec.` is in nearly every path."""
+    """Messages contain indices, `kubectl explain` puts the kind first, and people leave out `spec.`."""
     assert field_at(typed).shown_path == path
 
 
 @pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.shown_path or "TrainingJob")
 def test_every_field_is_found_by_its_own_path_and_has_a_description(field) -> None:
-    """What `--recursive` lists can be typed; a field without a description explains nothing."""
+    """A user can type every path that `--recursive` lists, and reads a description there."""
     assert field_at(field.shown_path) == field
     assert field.paragraphs
 
@@ -62,7 +62,7 @@ def test_every_field_is_found_by_its_own_path_and_has_a_description(field) -> No
     ],
 )
 def test_a_wrong_path_is_one_sentence_with_the_nearest_fields(typed, remedy) -> None:
-    """A name is often remembered without its place, or in Python's spelling."""
+    """People often remember a field's name without its path, or in Python's spelling."""
     with pytest.raises(UnknownField) as refused:
         field_at(typed)
 
@@ -70,7 +70,7 @@ def test_a_wrong_path_is_one_sentence_with_the_nearest_fields(typed, remedy) -> 
 
 
 def test_the_text_has_type_default_rules_and_fields() -> None:
-    """They are the same facts as in the tables of the reference page."""
+    """The text has the same facts as the tables of the reference page."""
     text = field_text(field_at("trainer.algorithm.normalize"), 100)
 
     assert text.startswith("spec.trainer.algorithm.normalize: object; optional\n\n  Normalization of ")
@@ -80,7 +80,7 @@ def test_the_text_has_type_default_rules_and_fields() -> None:
 
 
 def test_the_recursive_text_has_every_field_once_and_no_description() -> None:
-    """The text fits on one screen and can be searched."""
+    """The text is short, so that a user can search it on the screen."""
     text = field_text(whole_job(), 100, recursive=True)
 
     named = [line.split(":")[0].strip() for line in text.partition("Fields:\n")[2].splitlines()]
@@ -88,7 +88,7 @@ def test_the_recursive_text_has_every_field_once_and_no_description() -> None:
 
 
 def test_no_line_of_prose_is_wider_than_the_terminal() -> None:
-    """A terminal would break words."""
+    """A terminal would break a wider line in the middle of a word."""
     lines = [line for field in FIELDS for line in field_text(field, 60).splitlines()]
 
     assert [line for line in lines if len(line) > 60 and ": " not in line and "://" not in line] == []
@@ -96,12 +96,12 @@ def test_no_line_of_prose_is_wider_than_the_terminal() -> None:
 
 @pytest.fixture(scope="module")
 def schema():
-    """The JSON Schema of a TrainingJob, as `--json` prints it."""
+    """Return the JSON Schema of a TrainingJob, as `palaestra explain --json` prints it."""
     return json.loads(json.dumps(json_schema(whole_job())))
 
 
 def test_the_json_schema_accepts_every_example(schema, repository) -> None:
-    """An editor that marks a correct job as wrong is switched off."""
+    """If an editor marks a correct job as wrong, people switch its checks off."""
     jsonschema.Draft7Validator.check_schema(schema)
 
     for path in (repository / "manifests/examples").glob("*.yaml"):
@@ -127,7 +127,7 @@ def test_the_json_schema_marks_a_mistake_at_its_field(schema, job_data, change, 
 
 
 def test_the_json_schema_has_the_text_of_every_field(schema) -> None:
-    """An editor shows the description while a person types, and offers default and members."""
+    """While a person types, an editor shows the description and offers the default and the fields."""
     algorithm = schema["properties"]["spec"]["properties"]["trainer"]["properties"]["algorithm"]
     field = field_at("trainer.algorithm")
 

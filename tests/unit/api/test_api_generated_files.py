@@ -34,13 +34,13 @@ EXAMPLES = [
     "name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/reference/trainingjob.md"]
 )
 def test_the_committed_file_is_current(name, repository) -> None:
-    """`make golden` writes these files again."""
+    """If the models have changed, `make golden` generates these files again."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
-    """Every example is valid, and its job has the name of its file."""
+    """Every example is a valid job, and its `metadata.name` is the name of its file."""
     path = repository / "manifests/examples" / f"{name}.yaml"
 
     job = load(path.read_text(encoding="utf-8"), path.name)
@@ -49,21 +49,21 @@ def test_an_example_is_a_job_of_its_own_name(name, repository) -> None:
 
 
 def test_every_example_is_tested_here(repository) -> None:
-    """An example that no test reads becomes outdated."""
+    """An example that no test reads becomes outdated unnoticed."""
     found = (repository / "manifests/examples").glob("*.yaml")
 
     assert sorted(path.stem for path in found) == EXAMPLES
 
 
 def test_the_smallest_example_is_twelve_lines_at_most(repository) -> None:
-    """With good defaults a job needs few lines."""
+    """The README shows this job; good defaults keep it short."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert len(text.splitlines()) <= 12
 
 
 def test_the_examples_show_what_their_names_say(repository) -> None:
-    """These examples have two collectors, a sparse reward and REINFORCE."""
+    """A user chooses an example by its name, such as two-collectors or sparse-reward."""
 
     def job(name: str):
         text = (repository / f"manifests/examples/{name}.yaml").read_text(encoding="utf-8")
@@ -110,7 +110,7 @@ def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository
 
 
 def test_the_page_shows_the_smallest_example(repository) -> None:
-    """A reader can copy the example from the page, and it works."""
+    """A reader can copy the example from the page and run it."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
     shown = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)
 
@@ -129,7 +129,7 @@ def test_the_page_quotes_the_real_messages(repository, problems) -> None:
 
 
 def test_every_field_has_a_row() -> None:
-    """The reference page must be complete."""
+    """The tables of the reference page must contain every field."""
     text = tables()
 
     def names(at: dict) -> set[str]:
@@ -142,14 +142,14 @@ def test_every_field_has_a_row() -> None:
 
 
 def test_every_rule_stands_below_its_table() -> None:
-    """An author can read each rule before a job breaks it."""
+    """The author of a job can read each rule on the reference page before a job breaks it."""
     section = tables().split("### spec.storage\n")[1].split("###")[0]
 
     assert "- `resumeFrom`: needs existingClaim; name the claim that contains the run" in section
 
 
 def test_a_table_tells_type_default_and_what_is_required() -> None:
-    """Each row of the table has all four."""
+    """A row has the name of a field, its type with its limits, and its default or `required`."""
     rows = tables().splitlines()
 
     assert any(row.startswith("| `count` | integer, 1 to 16 | `1` |") for row in rows)
@@ -161,7 +161,7 @@ def test_a_table_tells_type_default_and_what_is_required() -> None:
 
 
 def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
-    """The introduction is written by people and must stay."""
+    """People write the introduction of the page, so the generator must not change it."""
     text = (repository / "docs/reference/trainingjob.md").read_text(encoding="utf-8")
 
     made = page(text.replace("spec.storage", "spec.tsorage"))
@@ -171,13 +171,13 @@ def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
 
 
 def test_a_page_without_marks_is_refused() -> None:
-    """Without this error the tables would be missing and nobody would notice."""
+    """Without this error the page would lack its tables, and nobody would notice."""
     with pytest.raises(ValueError, match="add both"):
         page("# The TrainingJob\n")
 
 
 def test_the_api_version_is_that_of_the_examples(repository) -> None:
-    """The API version is defined in one place."""
+    """A new API version must also reach the examples, which users copy."""
     text = (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
     assert text.startswith(f"apiVersion: {API_VERSION}\n")

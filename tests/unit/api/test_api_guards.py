@@ -1,4 +1,4 @@
-"""Guards, the rules of a cluster for new jobs: some jobs break each guard, and others do not."""
+"""Guards, the rules that a cluster applies to new jobs: which jobs break a guard, and which do not."""
 
 import re
 
@@ -19,7 +19,7 @@ GUARDS = {
     for guard in model.guards
 }
 
-# Where an address may be, and the line that reports its password.
+# The fields that may contain an address, and the message that reports its password.
 BROKEN = {
     "a variable of the trainer": (
         {"trainer": {"env": [{"name": "MLFLOW_TRACKING_URI", "value": URI}]}},
@@ -90,7 +90,7 @@ def test_an_address_without_a_password_is_not_reported(value):
 
 
 def test_every_guard_is_broken_by_an_example_here():
-    """A guard that has never refused a job is not tested."""
+    """A guard that no example breaks could be wrong without a failing test."""
     fields = {
         re.sub(r"\[\d+\]", "", line.split(": ")[0]).removeprefix("spec.") for _, line in BROKEN.values()
     }
@@ -105,7 +105,7 @@ def test_every_guard_is_broken_by_an_example_here():
 
 @pytest.mark.parametrize("name", GUARDS)
 def test_a_guard_reads_a_field_of_its_object(name):
-    """A renamed field must not leave its old name behind in an expression."""
+    """If a field is renamed, the test finds its old name in the expression of the guard."""
     model, guard = GUARDS[name]
 
     read = {*re.findall(r"\bself[.](\w+)", guard.cel), *guard.reads, guard.field}

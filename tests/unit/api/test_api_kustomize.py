@@ -35,9 +35,9 @@ MORE = {"secretGenerator": [{"name": "keys", "literals": ["token=x"]}], "namePre
 
 @pytest.fixture
 def built(tmp_path):
-    """Return the objects that kustomize makes, by kind.
+    """Return the objects that kustomize builds, by kind.
 
-    A Secret, a claim and a prefix are added to the page's files.
+    The fixture adds a Secret, a claim and a name prefix to the files of the page.
     """
     [references], [kustomization] = (
         blocks(PAGE.read_text(), f"yaml {name}") for name in ("references", "kustomization")
@@ -62,9 +62,9 @@ def built(tmp_path):
 
 
 def test_names_that_kustomize_makes_reach_every_reference_of_a_job(built):
-    """If a job still refers to `worlds`, which kustomize renames to `worlds-7h4fm2k9t6`, it waits for ever.
+    """`kustomize` renames the ConfigMap `worlds` to a name such as `worlds-7h4fm2k9t6`.
 
-    The reason of its wait is WorldMissing.
+    A job that still refers to `worlds` would wait for ever with the reason WorldMissing.
     """
     spec = built["TrainingJob"]["spec"]
     world, secret, claim = (
@@ -81,5 +81,5 @@ def test_names_that_kustomize_makes_reach_every_reference_of_a_job(built):
 
 
 def test_a_world_that_kustomize_makes_is_open_to_jobs(built):
-    """Without the label the operator would hold the job."""
+    """Without this label on the ConfigMap the operator would not start the job."""
     assert built["ConfigMap"]["metadata"]["labels"] == {"palaestra.dev/for-jobs": "true"}

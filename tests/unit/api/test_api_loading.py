@@ -1,4 +1,4 @@
-"""All mistakes of a job file are reported at once, each of them once."""
+"""`load` reports all mistakes of a job file at once, and each mistake only once."""
 
 import pytest
 
@@ -45,7 +45,7 @@ def test_five_mistakes_are_five_lines() -> None:
 
 
 def test_the_error_reads_as_its_lines() -> None:
-    """A program that prints the error prints one line a mistake."""
+    """A program that prints the error prints one line for each mistake."""
     error = SpecErrors("job.yaml", ("a: is wrong; mend it", "b: too; also"))
 
     assert str(error) == "a: is wrong; mend it\nb: too; also"
@@ -62,7 +62,7 @@ def test_a_rule_is_not_judged_on_a_field_that_is_wrong(problems) -> None:
 
 
 def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
-    """A wrong count does not affect the rule about the roles."""
+    """The wrong deadline does not affect the rule about roles, so both mistakes are reported."""
     group = {"name": "a", "role": "Evaluate", "startDeadlineSeconds": 0}
 
     assert problems({"simulators": [group]}) == [
@@ -72,7 +72,7 @@ def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
 
 
 def test_a_rule_keeps_its_place_when_earlier_items_are_wrong(problems) -> None:
-    """The message has the index that the author sees in the file."""
+    """The message has the index of the item in the author's file."""
     groups = [
         "nonsense",
         {"name": "a", "role": "nonsense"},
@@ -83,7 +83,7 @@ def test_a_rule_keeps_its_place_when_earlier_items_are_wrong(problems) -> None:
 
 
 def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
-    """The rules of the spec do not depend on the metadata."""
+    """The rules of the spec do not depend on the metadata, so a wrong name does not hide their messages."""
     data = job_data({"suspend": True, "scheduling.queueName": "robots"})
     data["metadata"] = {"name": "-"}
 
@@ -97,7 +97,10 @@ def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
 
 
 def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> None:
-    """The error also lists mistakes that only the second pass of the validation finds."""
+    """Only the second pass of the validation finds duplicate names.
+
+    The error has the mistakes of both passes.
+    """
     groups = [
         {"name": "a", "role": "Collect", "count": 0},
         {"name": "a", "role": "Evaluate"},
@@ -116,7 +119,7 @@ def test_no_simulators_is_not_the_same_as_nothing_said(problems) -> None:
 
 @pytest.mark.parametrize("key", ["apiVersion", "kind", "metadata", "spec"])
 def test_what_every_object_needs_is_asked_for(key, job_data) -> None:
-    """A file that kubectl refuses is refused here too."""
+    """`kubectl` refuses a file without these keys, so `validate` refuses it too."""
     data = job_data()
     del data[key]
 
@@ -125,7 +128,10 @@ def test_what_every_object_needs_is_asked_for(key, job_data) -> None:
 
 
 def test_an_object_of_another_kind_is_reported_only_as_such(job_data) -> None:
-    """A Deployment has a hundred fields that a TrainingJob lacks; the only mistake to report is its kind."""
+    """A TrainingJob lacks most fields of a Deployment.
+
+    A message about each field would hide the wrong kind.
+    """
     data = {**job_data(), "apiVersion": "apps/v1", "kind": "Deployment", "spec": {"template": {}}}
 
     with pytest.raises(SpecErrors) as caught:
@@ -160,12 +166,12 @@ def test_a_wrong_version_alone_hides_nothing(job_data) -> None:
     ],
 )
 def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
-    """The message begins with the file's name, where a field's path would be."""
+    """Such a document has no fields, so the message begins with the name of the file."""
     assert told(text) == (f"job.yaml: {fact}; begin it with apiVersion: palaestra.dev/v1alpha1",)
 
 
 def test_the_error_for_a_file_that_is_no_yaml_has_line_and_column() -> None:
-    """The line and the column count from 1."""
+    """Line and column are counted from 1, as in editors."""
     problem = told("spec:\n  trainer: [1, 2\n")[0]
 
     assert problem.startswith("job.yaml:3:1: not YAML: ")
@@ -191,7 +197,7 @@ spec:
 
 
 def test_a_whole_number_is_one_however_it_is_written() -> None:
-    """An API server stores it as an integer, and a file must mean the same on a laptop and on a cluster."""
+    """An API server stores `1e6` as an integer. A file must mean the same on a laptop and on a cluster."""
     trainer = load(MILLIONS).spec.trainer
     given = trainer.algorithm.hyperparameters
 
@@ -202,5 +208,5 @@ def test_a_whole_number_is_one_however_it_is_written() -> None:
 
 @pytest.mark.parametrize("steps", ["1.5", "1e-3", "1e300"])
 def test_a_number_that_is_not_whole_is_still_refused(steps) -> None:
-    """A float that is too large to be exact is refused, too."""
+    """A float that is too large to be an exact integer is refused too."""
     assert any("spec.trainer.steps" in each for each in told(MILLIONS.replace("1e6\n", f"{steps}\n")))

@@ -11,12 +11,12 @@ NOON = "2026-01-31T12:00:00Z"
 
 @pytest.fixture
 def least(job_data) -> TrainingJob:
-    """A job that sets only its two groups."""
+    """Return a job that sets only its two groups."""
     return validate(job_data())
 
 
 def test_a_job_without_a_spec_collects_and_evaluates() -> None:
-    """The smallest job that can learn has one simulator for each."""
+    """The smallest job that can learn has one simulator for each role."""
     job = TrainingJob(metadata=Metadata(name="least"), spec=Spec())
 
     assert [(group.name, group.role, group.count) for group in job.spec.simulators] == [
@@ -26,7 +26,7 @@ def test_a_job_without_a_spec_collects_and_evaluates() -> None:
 
 
 def test_a_group_is_of_stubs_in_the_arena(least) -> None:
-    """Nothing has to be installed for a first run."""
+    """A first run works without an installed simulator."""
     group = least.spec.simulators[0]
 
     assert group.driver is Driver.STUB
@@ -35,9 +35,9 @@ def test_a_group_is_of_stubs_in_the_arena(least) -> None:
 
 
 def test_simulators_are_expected_to_fail_sometimes(least) -> None:
-    """A simulator may restart ten times in ten minutes, and has a minute to start.
+    """By default a simulator may restart ten times in ten minutes, and has a minute to start.
 
-    The plan sets when simulators are recycled.
+    Without `recycle` in the spec, the plan decides when simulators are recycled.
     """
     group = least.spec.simulators[0]
 
@@ -48,7 +48,7 @@ def test_simulators_are_expected_to_fail_sometimes(least) -> None:
 
 
 def test_the_trainer_learns_to_move_to_the_target(least) -> None:
-    """This is the bundled task, with the algorithm that is shown to solve it."""
+    """The default is the bundled task with an algorithm that solves it."""
     trainer = least.spec.trainer
 
     assert (trainer.environment.id, trainer.environment.reward) == ("MoveToTargetEnv-v0", "Dense")
@@ -58,7 +58,7 @@ def test_the_trainer_learns_to_move_to_the_target(least) -> None:
 
 
 def test_what_was_not_said_is_absent(least) -> None:
-    """None is never replaced here: the release or the cluster sets the value, or there is no limit."""
+    """The models leave these fields None: the release or the cluster sets the value, or no limit applies."""
     spec = least.spec
 
     assert (spec.trainer.image, spec.trainer.evaluation.stop_at_success_rate) == (None, None)
@@ -68,7 +68,7 @@ def test_what_was_not_said_is_absent(least) -> None:
 
 
 def test_a_run_is_kept_and_tried_again(least) -> None:
-    """The run directory outlives the job, and three failures are retried."""
+    """By default the run directory outlives the job, and three failures are retried."""
     spec = least.spec
 
     assert (spec.storage.size, spec.storage.retain, spec.storage.ephemeral) == (
@@ -78,12 +78,12 @@ def test_a_run_is_kept_and_tried_again(least) -> None:
 
 
 def test_a_job_lies_in_the_namespace_default_and_has_no_uid(least) -> None:
-    """Only a cluster gives a uid."""
+    """Only an API server gives an object a uid."""
     assert (least.metadata.namespace, least.metadata.uid) == ("default", None)
 
 
 def test_a_new_job_has_an_empty_status(least) -> None:
-    """A status is an observation, so a job that was only read from a file has an empty one."""
+    """The operator writes the status, so a job that comes from a file has an empty one."""
     status = least.status
 
     assert (status.phase, status.observed_generation, status.start_time) == (None, None, None)
@@ -112,7 +112,7 @@ def test_a_quantity_is_a_whole_number_or_a_text(written, read, job_data) -> None
 
 
 def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
-    """A client can parse the status that the operator wrote."""
+    """A client can parse a status that the operator wrote."""
     seen = "2026-01-31T12:00:00Z"
     replica = {
         "index": 0,
@@ -144,7 +144,7 @@ def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
 
 @pytest.mark.parametrize("namespace", ["1team", "42", "team-1"])
 def test_a_namespace_may_begin_with_a_digit(namespace, job_data) -> None:
-    """RFC 1123 allows it, so such namespaces exist."""
+    """RFC 1123 allows a digit at the beginning, so clusters have such namespaces."""
     data = job_data()
     data["metadata"]["namespace"] = namespace
 
@@ -152,9 +152,9 @@ def test_a_namespace_may_begin_with_a_digit(namespace, job_data) -> None:
 
 
 def test_a_name_that_an_api_server_made_is_a_name(job_data) -> None:
-    """`kubectl create` of a file with generateName makes such a name.
+    """`kubectl create` of a file with `generateName` produces such a name.
 
-    The server leaves generateName in the object.
+    The API server leaves `generateName` in the object.
     """
     data = job_data()
     data["metadata"] = {"name": "try-x2b4q", "generateName": "try-"}
@@ -163,7 +163,7 @@ def test_a_name_that_an_api_server_made_is_a_name(job_data) -> None:
 
 
 def test_a_job_whose_name_is_still_to_be_made_is_refused_with_the_remedy(job_data) -> None:
-    """`palaestra run` and `Client.apply` need the final name, also to restart the job under it."""
+    """`palaestra run` and `Client.apply` need the final name, to find the same job again later."""
     data = job_data({"replicas": 0})
     data["metadata"] = {"generateName": "try-"}
 
@@ -177,7 +177,7 @@ def test_a_job_whose_name_is_still_to_be_made_is_refused_with_the_remedy(job_dat
 
 
 def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> None:
-    """A job that was read from a cluster is still a job file."""
+    """A user can read a job from a cluster and use it as a job file."""
     data = job_data()
     data["metadata"] |= {"uid": "5a0c", "generation": 3, "managedFields": [], "finalizers": []}
 
@@ -217,7 +217,7 @@ NEWER_STATUS = {
 
 
 def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
-    """An older command line, or an operator after a rollback, reads the fields that it knows."""
+    """After a rollback, an older operator or command line reads the fields that its release knows."""
     status = validate(job_data() | {"status": NEWER_STATUS}).status
 
     assert status.phase == "Running"
@@ -232,12 +232,15 @@ def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
     [{"phase": "Halted"}, {"replicas": [{"index": 0, "phase": "Halted"}]}, {"replicas": [{"index": "0"}]}],
 )
 def test_a_phase_or_type_that_is_unknown_is_still_refused(wrong, job_data) -> None:
-    """An unknown phase could mean that a replica has ended, and it must then never be started again."""
+    """An unknown phase could mean that a replica has ended.
+
+    The operator must not start an ended replica again.
+    """
     with pytest.raises(SpecErrors, match=r"^status"):
         validate(job_data() | {"status": wrong})
 
 
 def test_an_unknown_field_of_the_spec_is_refused_as_ever(job_data) -> None:
-    """A person wrote it, so it is a mistake."""
+    """People write the spec, so an unknown field there is a mistake."""
     with pytest.raises(SpecErrors, match=r"spec.ofTomorrow: is not a field"):
         validate(job_data({"ofTomorrow": 1}))

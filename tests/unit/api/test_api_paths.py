@@ -1,4 +1,4 @@
-"""Paths of fields, and data from which parts are taken."""
+"""Paths of fields, and `Pruned`: a job's data from which wrong values are removed."""
 
 import pytest
 from hypothesis import given
@@ -30,18 +30,18 @@ PIECES = st.integers(0, 99) | st.text(max_size=4) | st.from_regex(r"[a-z_]{1,4}"
 
 @given(st.lists(PIECES, min_size=1).map(tuple))
 def test_a_path_is_read_as_it_is_shown(path) -> None:
-    """A user can copy a path from a message."""
+    """A user can copy a path from a message into a command."""
     assert path_of(shown(path)) == path
 
 
 @pytest.mark.parametrize("text", ["", ".a", "a..b", "a.", "a[", "a[-1]", 'a["b]', 'a["\\x"]', "a-b"])
 def test_a_text_that_is_no_path_is_empty(text) -> None:
-    """A mistyped path is not taken for a field."""
+    """`path_of` returns an empty path for a mistyped text, which therefore names no field."""
     assert path_of(text) == ()
 
 
 def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
-    """A mistake in the third group is reported for the third group, even if the first was taken out."""
+    """A mistake in the third group is reported for the third group, even if the first group was removed."""
     pruned = Pruned({"groups": ["a", "b", {"role": "c"}]})
 
     pruned.take(("groups", 0))
@@ -51,7 +51,7 @@ def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
 
 
 def test_what_is_not_there_cannot_be_taken() -> None:
-    """The caller then takes the object that lacks it."""
+    """`take` returns False if the path does not exist; the caller then removes the parent object."""
     pruned = Pruned({"a": {"b": 1}})
 
     assert not pruned.take(("a", "c"))
@@ -61,7 +61,7 @@ def test_what_is_not_there_cannot_be_taken() -> None:
 
 
 def test_a_stand_in_is_put_once() -> None:
-    """A second replacement would mean that the stand-in itself is wrong."""
+    """`take` returns False the second time: the error is then in the stand-in itself."""
     pruned = Pruned({"metadata": 3})
 
     assert pruned.take(("metadata",), {"name": "stand-in"})
@@ -78,12 +78,12 @@ JSON = st.recursive(
 
 @given(JSON)
 def test_nothing_taken_is_everything_left(data) -> None:
-    """Without a `take` the data is unchanged."""
+    """Without a call of `take`, `data` returns the data unchanged."""
     assert Pruned(data).data() == data
 
 
 def test_the_model_at_a_path_is_found_through_lists() -> None:
-    """The nearest names come from the model in which the mistake is."""
+    """The proposed field names come from the model at the path of the mistake."""
     assert model_at(TrainingJob, ("spec", "simulators", 3, "world")) is WorldSource
     assert model_at(TrainingJob, ("spec", "trainer", "env", 0)) is Variable
     assert model_at(TrainingJob, ("spec", "seed")) is None
@@ -91,7 +91,7 @@ def test_the_model_at_a_path_is_found_through_lists() -> None:
 
 
 def test_the_tree_of_models_begins_with_the_job_itself() -> None:
-    """The walk reaches the smallest part of the job, too."""
+    """The walk also reaches the most deeply nested model."""
     paths = [path for path, _ in walk(TrainingJob)]
 
     assert paths[0] == ()

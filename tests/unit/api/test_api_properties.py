@@ -1,4 +1,4 @@
-"""Any job stays equal when it is written and read; every mutilated job is refused with a message."""
+"""Any job stays equal when it is written and read; any damaged job is accepted or refused with messages."""
 
 import re
 from copy import deepcopy
@@ -138,7 +138,7 @@ def told(data: object) -> tuple[str, ...] | None:
 
 
 def well_told(problems: tuple[str, ...]) -> bool:
-    """Return whether there are problems, each a line with a path, a fact and a remedy."""
+    """Return whether at least one problem is given, and each is a line with a path, a fact and a remedy."""
     return bool(problems) and all(LINE.fullmatch(line) for line in problems)
 
 
@@ -152,7 +152,7 @@ def test_a_job_is_the_same_after_writing_and_reading(data) -> None:
 
 @given(JOBS)
 def test_defaults_are_resolved_once(data) -> None:
-    """A job with its defaults written out is the same job."""
+    """A job with its defaults written out is equal to the job without them."""
     resolved = as_data(validate(data))
 
     assert as_data(validate(resolved)) == resolved
@@ -160,7 +160,7 @@ def test_defaults_are_resolved_once(data) -> None:
 
 @given(JOBS)
 def test_a_job_does_not_change_what_it_was_read_from(data) -> None:
-    """The data belongs to the caller."""
+    """The data belongs to the caller, so `validate` must not change it."""
     before = deepcopy(data)
 
     validate(data)
@@ -169,7 +169,7 @@ def test_a_job_does_not_change_what_it_was_read_from(data) -> None:
 
 
 def places(data: object) -> list[tuple]:
-    """Return the containers and keys of everything in `data`."""
+    """Return the container and the key of each value in `data`."""
     if isinstance(data, dict):
         return [(data, key) for key in data] + [p for v in data.values() for p in places(v)]
     if isinstance(data, list):
@@ -179,7 +179,7 @@ def places(data: object) -> list[tuple]:
 
 @given(JOBS, st.data())
 def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
-    """The only error is one with path, fact and remedy, whatever value is put wherever."""
+    """Whatever value is put at any path, each error has a path, a fact and a remedy."""
     data = deepcopy(job)
     for _ in range(draw.draw(st.integers(1, 3))):
         holder, key = draw.draw(st.sampled_from(places(data)))
@@ -194,7 +194,7 @@ def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
 
 @given(JOBS, st.data())
 def test_whatever_is_taken_from_a_job_file_the_reader_copes(job, draw) -> None:
-    """An editor may leave half a file after a crash."""
+    """An editor that crashes may leave half a file."""
     text = yaml.safe_dump(job)
     start = draw.draw(st.integers(0, len(text)))
     end = draw.draw(st.integers(start, len(text)))
@@ -264,7 +264,10 @@ AFFINITIES = st.fixed_dictionaries(
 
 @given(AFFINITIES)
 def test_any_affinity_of_a_pod_is_accepted(affinity):
-    """The API server accepts it, so the operator would refuse it only after `kubectl apply`."""
+    """The API server accepts any affinity of a pod in a job.
+
+    The models must accept it too, or the operator would refuse the job after `kubectl apply`.
+    """
     job = validate(make_job(scheduling={"affinity": affinity}))
 
     assert job.spec.scheduling.affinity == affinity

@@ -1,4 +1,4 @@
-"""Every reason has its sentences, which one file and one table hold."""
+"""Each reason of a status has a meaning, a message and a remedy, in one table."""
 
 import re
 import string
@@ -11,19 +11,19 @@ from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 
 
 def test_every_reason_has_a_row() -> None:
-    """The row has the meaning of the reason and the remedy."""
+    """The row contains the meaning of the reason and its remedy."""
     assert set(ROWS) == set(Reason)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_reason_is_one_word_for_programs(reason) -> None:
-    """Kubernetes requires it for the reasons of conditions."""
+    """Kubernetes requires a CamelCase word as the reason of a condition."""
     assert re.fullmatch("[A-Z][A-Za-z]{2,39}", reason)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_message_is_filled_in_and_stays_within_its_bounds(reason) -> None:
-    """Facts come from other programs and may have any length."""
+    """The facts in a message come from other programs and may have any length."""
     fields = {name for _, name, _, _ in string.Formatter().parse(ROWS[reason].message) if name}
 
     message = say(reason, **{name: f"\n{name}\x00 {'x' * 5000}" for name in fields})
@@ -33,14 +33,14 @@ def test_a_message_is_filled_in_and_stays_within_its_bounds(reason) -> None:
 
 
 def test_a_message_that_lacks_a_fact_is_a_mistake_of_ours() -> None:
-    """Without the error the user would read a message with unfilled braces."""
+    """Without this error a user would read a message with unfilled braces."""
     with pytest.raises(KeyError):
         say(Reason.IMAGE_PULL)
 
 
 @pytest.mark.parametrize("reason", Reason)
 def test_a_row_is_one_line_of_a_table(reason) -> None:
-    """A bar or a line break would break the table."""
+    """A vertical bar or a line break in a cell would break the Markdown table."""
     row = ROWS[reason]
 
     assert row.meaning
@@ -49,7 +49,7 @@ def test_a_row_is_one_line_of_a_table(reason) -> None:
 
 
 def test_operations_has_a_row_for_each_reason(repository) -> None:
-    """A reader of a status looks up its reason there and finds what to do."""
+    """A reader of a status looks up the reason on the page and finds the remedy."""
     text = (repository / "docs/reference/reasons.md").read_text()
 
     assert reasons_table() in text
@@ -58,6 +58,6 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
 
 
 def test_a_page_without_its_marks_raises_an_error() -> None:
-    """Without this error, the missing table would stay unnoticed."""
+    """Without this error the page would lack its table, and nobody would notice."""
     with pytest.raises(ValueError, match=r"lacks <!-- generated from the reasons.*; add both"):
         reasons_page("# Operations")

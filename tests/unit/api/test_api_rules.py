@@ -1,7 +1,7 @@
-"""Every rule: the change that breaks it, the line that says so, and that its CEL twin is sound.
+"""Every rule: a change that breaks it, and the message that reports the change.
 
-Break a rule here and the API server refuses the same job with the same sentence: the expression
-and the check stand beside one another in the models.
+The API server refuses such a job with the same message: the models define the CEL expression of a rule next
+to its check in Python.
 """
 
 import re
@@ -15,7 +15,7 @@ from palaestra.api.model_walk import fields_of, walk
 ROLES = ("Collect", "Collect", "Evaluate")
 COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
 
-# What breaks each rule, and the one line that reports it.
+# For each rule: changes that break it, and the message that reports them.
 BROKEN = {
     "no group collects": (
         {"simulators": [{"name": "evaluate", "role": "Evaluate"}]},
@@ -270,7 +270,7 @@ BROKEN = {
     ),
 }
 
-# Jobs with the same fields that keep the rules.
+# Changes to the same fields that break no rule.
 KEPT = {
     "no evaluation at all": {
         "simulators": [{"name": "collect", "role": "Collect"}],
@@ -333,7 +333,7 @@ KEPT = {
 }
 
 
-# Each rule of each model once, by a readable name.
+# The rules of all models, by a readable name.
 RULES = {
     f"{model.__name__}.{rule.field}: {rule.message}": (model, rule)
     for _, model in walk(TrainingJob)
@@ -343,7 +343,7 @@ RULES = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
-    """The line has a path, a fact and a remedy; consequences of the mistake are not reported."""
+    """The line has a path, a fact and a remedy; further errors that the mistake causes are not reported."""
     changes, line = BROKEN[name]
 
     assert problems(changes) == [line]
@@ -351,12 +351,12 @@ def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
 
 @pytest.mark.parametrize("name", KEPT)
 def test_what_keeps_the_rules_is_accepted(name, problems) -> None:
-    """A rule refuses only what its sentence says."""
+    """A rule must not refuse more than its message says."""
     assert problems(KEPT[name]) == []
 
 
 def test_every_rule_is_broken_by_an_example_here() -> None:
-    """A rule that has never failed in a test is not tested."""
+    """A rule that no example breaks could be wrong without a failing test."""
     told = {line.split(": ", 1)[1] for _, line in BROKEN.values()}
 
     assert {rule.message for _, rule in RULES.values()} == told
@@ -364,7 +364,7 @@ def test_every_rule_is_broken_by_an_example_here() -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_reads_only_fields_that_there_are(name) -> None:
-    """A renamed field must not stay in an expression under its old name."""
+    """If a field is renamed, the test finds its old name in the expression of the rule."""
     model, rule = RULES[name]
     known = {field for _, below in walk(model) for field in fields_of(below)}
 
@@ -376,7 +376,7 @@ def test_a_rule_reads_only_fields_that_there_are(name) -> None:
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
-    """The message has two parts, of which the second is an instruction, and no full stop."""
+    """Each message states a fact and, after a semicolon, an instruction without a full stop."""
     message = RULES[name][1].message
 
     fact, remedy = message.split("; ")
@@ -387,7 +387,10 @@ def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
 
 
 def test_only_what_lies_in_options_has_no_expression() -> None:
-    """An API server cannot check fields of free objects; it checks all other rules itself."""
+    """An API server cannot check the fields of free objects such as hyperparameters.
+
+    All other rules have a CEL expression, so the API server checks them itself.
+    """
     without = [rule.message for _, rule in RULES.values() if not rule.cel]
 
     algorithms = {message.split()[0] for message in without}
@@ -395,6 +398,6 @@ def test_only_what_lies_in_options_has_no_expression() -> None:
 
 
 def test_a_job_built_in_python_keeps_the_rules_too() -> None:
-    """The rules belong to the models, not to the reader of files."""
+    """The models check the rules, so a job that does not come from a file is checked too."""
     with pytest.raises(ValidationError, match="needs exactly one of inline"):
         WorldSource()

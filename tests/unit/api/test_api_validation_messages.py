@@ -1,4 +1,4 @@
-"""Each kind of mistake in a field has a sentence for its author."""
+"""Each kind of mistake in a field has its own message for the author of the job."""
 
 import json
 
@@ -48,7 +48,7 @@ SENTENCES = [
      "spec.trainer.evaluation.stopAtSuccessRate: 0 is not more than 0; use more than 0"),
     ({"trainer.evaluation.stopAtSuccessRate": 95},
      "spec.trainer.evaluation.stopAtSuccessRate: 95 is more than 1; use 1 or less"),
-    # The wrong type, with YAML's traps.
+    # A value of the wrong type, for example text that looks like a number in YAML.
     ({"trainer.steps": "50000"},
      'spec.trainer.steps: "50000" is text; write a whole number without quotes'),
     ({"trainer.steps": 1.5}, "spec.trainer.steps: 1.5 is not a whole number; write one"),
@@ -119,7 +119,7 @@ SENTENCES = [
     ({"trainer.env": [{"name": "2FAST", "value": ""}]},
      ('spec.trainer.env[0].name: "2FAST" is not the name of a variable; '
      "use letters, digits and '_', no digit first")),
-    # Too much.
+    # A value, a list or a map that is too large, or a value that JSON cannot represent.
     ({"trainer.command": ["x"] * 65}, "spec.trainer.command: has more than 64 entries; remove some"),
     ({"scheduling.nodeSelector": {f"k{n}": "" for n in range(33)}},
      "spec.scheduling.nodeSelector: has more than 32 entries; remove some"),
@@ -172,19 +172,19 @@ SENTENCES = [
 
 @pytest.mark.parametrize(("changes", "line"), SENTENCES, ids=[line[:60] for _, line in SENTENCES])
 def test_an_error_has_path_fact_and_remedy(changes, line, problems) -> None:
-    """One mistake is one line, with all that its author needs to correct it."""
+    """One mistake gives one line, with all that the author needs to correct it."""
     assert problems(changes) == [line]
 
 
 def test_a_path_with_a_key_that_is_no_word_shows_it_in_brackets(problems) -> None:
-    """A dot in a label's key does not separate fields."""
+    """In brackets, the dot in a label's key does not look like a separator of fields."""
     assert problems({"scheduling.podLabels": {"a.b/c": 1}}) == [
         'spec.scheduling.podLabels["a.b/c"]: 1 is a number where text is needed; quote it: "1"'
     ]
 
 
 def test_a_key_that_is_too_long_is_reported_at_its_map(problems) -> None:
-    """The path ends in the key, so it shows which key is too long."""
+    """The path ends with the key, so the author sees which key is too long."""
     line = problems({"scheduling.podLabels": {LONG: "a"}})[0]
 
     assert line.startswith("spec.scheduling.podLabels.xxx")
@@ -192,7 +192,7 @@ def test_a_key_that_is_too_long_is_reported_at_its_map(problems) -> None:
 
 
 def test_a_long_value_is_cut_in_the_sentence(problems) -> None:
-    """The message must stay short."""
+    """The message must stay short, whatever value the author wrote."""
     (line,) = problems({"simulators.1.role": LONG})
 
     assert len(line) < 150
@@ -200,13 +200,13 @@ def test_a_long_value_is_cut_in_the_sentence(problems) -> None:
 
 
 def test_line_breaks_in_a_value_or_a_key_do_not_break_the_line(problems) -> None:
-    """One mistake is one line, whatever value was written."""
+    """A program that prints one line for each mistake must not print a line break from the job."""
     (line,) = problems({"trainer.a\nb": 1})
 
     assert "\n" not in line
 
 
 def test_the_error_for_a_wrong_time_has_an_example(job_data) -> None:
-    """The authors of programs that write a status read the message too."""
+    """The authors of programs that write a status read this message too."""
     with pytest.raises(SpecErrors, match=r'^status.startTime: "noon" is not a time; write it as'):
         validate(job_data() | {"status": {"startTime": "noon"}})

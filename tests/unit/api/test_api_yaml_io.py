@@ -33,14 +33,14 @@ from palaestra.api.yaml_io import NotYaml, read, write
     ],
 )
 def test_a_scalar_is_what_a_cluster_takes_it_for(text, value) -> None:
-    """`learning_rate: 5e-4` is a number, 1:30 is not a number of seconds, and a date is not an object."""
+    """`5e-4` is a number; `1:30` is not the number 90, and a date stays text."""
     found = read(f"a: {text}", "job.yaml")["a"]
 
     assert (found, type(found)) == (value, type(value))
 
 
 def test_anchors_and_merges_are_followed() -> None:
-    """An anchor avoids repetition; a key of the mapping itself overrides a merged one."""
+    """An anchor avoids repetition; a mapping's own key overrides a merged key."""
     text = "a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: {<<: [{x: 5}, *a]}\n"
 
     assert read(text, "job.yaml") == {
@@ -78,7 +78,7 @@ def test_anchors_and_merges_are_followed() -> None:
     ],
 )
 def test_the_error_for_text_that_cannot_be_read_has_line_and_column(text, problem) -> None:
-    """Both counted from 1, as editors count."""
+    """Line and column are counted from 1, as in editors."""
     with pytest.raises(NotYaml) as caught:
         read(text, "job.yaml")
 
@@ -94,13 +94,13 @@ def test_the_error_for_text_that_cannot_be_read_has_line_and_column(text, proble
     ],
 )
 def test_a_document_without_end_is_refused(text, fact) -> None:
-    """A job file must not exhaust the memory of its reader."""
+    """A job file must not exhaust the memory of the program that reads it."""
     with pytest.raises(NotYaml, match=f"^job.yaml: {fact}"):
         read(text, "job.yaml")
 
 
 def test_aliases_count_as_often_as_they_are_used() -> None:
-    """Nine lines could stand for a billion values."""
+    """Nine lines of aliases can expand to a billion values."""
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]
 
@@ -110,7 +110,7 @@ def test_aliases_count_as_often_as_they_are_used() -> None:
 
 @given(st.text())
 def test_any_text_is_read_or_refused_with_the_file_s_name(text) -> None:
-    """For any text of a file, the reader raises no other error."""
+    """For any text, the reader returns a value or raises `NotYaml`, and no other error."""
     try:
         read(text, "job.yaml")
         problem = "job.yaml: none"
@@ -132,13 +132,13 @@ PLAIN = st.recursive(
 
 @given(PLAIN)
 def test_what_is_written_is_read_as_the_same(data) -> None:
-    """Texts that look like another type, such as `5e-4` and `no`, are quoted."""
+    """`write` quotes texts that look like another type, such as `5e-4` and `no`."""
     assert read(write(data), "job.yaml") == data
 
 
 @pytest.mark.parametrize("text", ["5e-4", "1:30", "no", "~", "2026-01-31", "\x85", "a\u2028b", "\r", " a\n"])
 def test_a_text_stays_a_text_when_it_is_written(text) -> None:
-    """Neither this reader nor a plain YAML 1.1 reader takes it for another type."""
+    """Neither this reader nor a YAML 1.1 parser reads the text as another type."""
     written = write({"value": text})
 
     assert read(written, "job.yaml") == {"value": text}

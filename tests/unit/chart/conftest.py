@@ -1,4 +1,4 @@
-"""The chart's objects in each mode, rendered by Helm; the tests are skipped where Helm is not built."""
+"""Fixtures that render the chart with Helm in each mode; where Helm is not built, the tests are skipped."""
 
 from collections.abc import Callable
 from functools import cache
@@ -15,19 +15,19 @@ Object = dict[str, Any]
 
 @pytest.fixture(scope="session", autouse=True)
 def helm_is_built() -> None:
-    """Every test of this folder needs Helm."""
+    """Skip every test of this folder if Helm is not built."""
     programs(("helm",))
 
 
 @pytest.fixture(scope="session")
 def made() -> Callable[[str], list[Object]]:
-    """Return all objects of a mode."""
+    """Return a function that returns all objects of a mode."""
     return cache(lambda mode: objects(MODES[mode]))
 
 
 @pytest.fixture
 def one(made) -> Callable[..., Object]:
-    """Return the only object of a kind and a name in a mode."""
+    """Return a function that returns the only object of a kind and a name in a mode."""
 
     def find(mode: str, kind: str, name: str = "palaestra-operator") -> Object:
         [found] = [each for each in made(mode) if (each["kind"], each["metadata"]["name"]) == (kind, name)]

@@ -1,4 +1,4 @@
-"""checkov's findings in the chart are complete here, each with the reason why it stays."""
+"""The complete list of checkov's findings in the chart, with the reason why each finding is accepted."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ Objects = tuple[tuple[str, str], ...]
 
 
 class Accepted(NamedTuple):
-    """The reason why a check's findings are accepted, and the objects that they are about."""
+    """The reason why the findings of a check are accepted, and the objects to which they apply."""
 
     reason: str
     objects: Objects
@@ -24,18 +24,18 @@ class Accepted(NamedTuple):
 
 ALWAYS = {
     "CKV_K8S_11": Accepted(
-        "A limit of CPU slows a pod down on an idle node; requests share a busy one, and memory is limited.",
+        "A CPU limit slows a pod down even on an idle node; CPU requests suffice, and memory is limited.",
         (OPERATOR, TENSORBOARD, JUPYTER, TRIAL),
     ),
-    "CKV_K8S_38": Accepted("Both ask the API server; nobody else holds a token.", (OPERATOR, TRIAL)),
-    "CKV_K8S_8": Accepted("It ends by itself, and at its deadline at the latest.", (TRIAL,)),
-    "CKV_K8S_9": Accepted("Nobody sends it requests.", (TRIAL,)),
-    "CKV2_K8S_6": Accepted("It listens on no port, so there is nothing to close.", (TRIAL,)),
+    "CKV_K8S_38": Accepted("Both send requests to the API server.", (OPERATOR, TRIAL)),
+    "CKV_K8S_8": Accepted("The test's pod ends by itself, at its deadline at the latest.", (TRIAL,)),
+    "CKV_K8S_9": Accepted("No program sends requests to the test's pod.", (TRIAL,)),
+    "CKV2_K8S_6": Accepted("The test's pod listens on no port, so it needs no NetworkPolicy.", (TRIAL,)),
 }
 BY_DEFAULT = {
-    "CKV_K8S_43": Accepted("The registry determines the digests, so they are values.", (OPERATOR, TRIAL)),
+    "CKV_K8S_43": Accepted("A digest depends on the registry, so the user sets it.", (OPERATOR, TRIAL)),
     "CKV_K8S_15": Accepted(
-        "Images of a release never change, and nodes without a registry hold them.", (OPERATOR, TRIAL)
+        "The images of a release never change; a node without a registry cannot pull.", (OPERATOR, TRIAL)
     ),
 }
 EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
@@ -43,7 +43,7 @@ EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
 
 @pytest.fixture(scope="module")
 def found():
-    """The findings by mode; checkov runs once for all modes, because it takes seconds to start."""
+    """Return the findings by mode; checkov starts slowly, so it runs once for all modes."""
     return findings({mode: rendered(MODES[mode]) for mode in EXPECTED})
 
 

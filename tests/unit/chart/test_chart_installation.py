@@ -1,4 +1,4 @@
-"""The content of manifests/install.yaml, read from the recorded file, so these tests run without Helm."""
+"""The objects of manifests/install.yaml, read from the committed file, so these tests run without Helm."""
 
 from importlib.metadata import version
 
@@ -11,12 +11,12 @@ from tests.chart.installation import installed
 
 @pytest.fixture(autouse=True)
 def helm_is_built():
-    """Only the other tests of this folder need Helm."""
+    """Override the fixture of the folder, because these tests do not need Helm."""
 
 
 @pytest.fixture
 def made():
-    """The objects of an installation by kind and name."""
+    """Return the objects of an installation by kind and name."""
     return {(each["kind"], each["metadata"]["name"]): each for each in installed()}
 
 
@@ -26,7 +26,7 @@ def verbs(role, resource):
 
 
 def test_what_others_need_is_made_before_them(made):
-    """`kubectl apply -f` creates the objects once, from top to bottom."""
+    """`kubectl apply -f` creates the objects from top to bottom and does not retry."""
     kinds = [kind for kind, _ in made]
 
     assert kinds[0] == "Namespace"
@@ -34,7 +34,7 @@ def test_what_others_need_is_made_before_them(made):
 
 
 def test_everything_is_in_the_namespace_that_the_operator_takes_for_its_own(made):
-    """Trainers accept requests of an operator in that namespace."""
+    """Trainers accept requests only from an operator in that namespace."""
     namespaces = {each["metadata"].get("namespace", DEFAULT_NAMESPACE) for each in made.values()}
 
     assert namespaces == {DEFAULT_NAMESPACE}
@@ -42,14 +42,14 @@ def test_everything_is_in_the_namespace_that_the_operator_takes_for_its_own(made
 
 
 def test_its_namespace_enforces_the_restricted_standard(made):
-    """The namespace refuses every pod that does not meet the standard."""
+    """With this label the API server refuses every pod that does not meet the standard."""
     labels = made["Namespace", DEFAULT_NAMESPACE]["metadata"]["labels"]
 
     assert labels["pod-security.kubernetes.io/enforce"] == "restricted"
 
 
 def test_nothing_of_helm_test_is_in_it(made):
-    """Only Helm runs the test, so without Helm its account would hold unused permissions."""
+    """Without Helm nobody runs the test, so its service account would have unused permissions."""
     assert {
         each["metadata"].get("labels", {}).get("app.kubernetes.io/component") for each in made.values()
     } == {
@@ -59,28 +59,28 @@ def test_nothing_of_helm_test_is_in_it(made):
 
 
 def test_the_operator_is_that_of_the_release(made):
-    """The image tag is never `latest`: an upgrade needs a person's decision."""
+    """The image tag is never `latest`, so that the operator is upgraded only when a person decides it."""
     [container] = made["Deployment", NAME]["spec"]["template"]["spec"]["containers"]
 
     assert container["image"] == f"palaestra-operator:{version('palaestra')}"
 
 
 def test_the_definition_is_that_of_the_models(made):
-    """A change of the models requires a new recording of the definition."""
+    """If the models change, somebody must generate install.yaml again."""
     assert made["CustomResourceDefinition", "trainingjobs.palaestra.dev"] == crd()
 
 
 def test_the_operator_makes_no_pod_itself(made):
-    """Jobs make the pods, so that Kubernetes counts, replaces and deletes them."""
+    """The operator creates Jobs, and Kubernetes creates, counts, replaces and deletes their pods."""
     assert verbs(made["ClusterRole", NAME], "pods") == {"list", "watch"}
     assert verbs(made["ClusterRole", NAME], "pods/eviction") == {"create"}
 
 
 def test_nothing_needs_what_a_plain_cluster_lacks(made):
-    """The kinds of Prometheus come only with the Prometheus Operator."""
+    """Only the Prometheus Operator defines these kinds, so a cluster without it would refuse the file."""
     assert [kind for kind, _ in made if kind.endswith(("Monitor", "PrometheusRule"))] == []
 
 
 def test_nothing_of_helm_test_is_left_in_it(made):
-    """Without Helm the hook's objects would never be deleted."""
+    """Only Helm deletes the objects of its hook; in a cluster without Helm they would stay."""
     assert [name for _, name in made if "test" in name] == []

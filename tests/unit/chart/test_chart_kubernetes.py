@@ -1,7 +1,7 @@
-"""Every object of the chart meets the schemas of Kubernetes, whatever is chosen together.
+"""Every object of the chart meets the schemas of Kubernetes, with any combination of values.
 
-Those of the oldest Kubernetes that the chart allows, and of the newest that is known. What comes with the
-Prometheus Operator has none there: a real API server takes it in tests/integration/chart.
+The schemas are those of the oldest Kubernetes that the chart allows and of the newest known one. Objects of
+the Prometheus Operator have no schema there; tests/integration/chart sends them to a real API server.
 """
 
 import copy
@@ -25,7 +25,7 @@ ROWS = rows()
 
 @pytest.mark.parametrize("row", ROWS, ids=range(len(ROWS)))
 def test_every_object_meets_the_schemas_of_kubernetes(row):
-    """The check is strict: an API server would silently drop an unknown, misspelled field."""
+    """The check is strict, because an API server silently drops an unknown, misspelled field."""
     made = [each for each in objects(together(row)) if each["kind"] not in FOREIGN]
 
     assert len(made) > len(FOREIGN)
@@ -40,7 +40,7 @@ def meets(text, release):
 
 
 def test_a_misspelt_field_is_found(one):
-    """A check that finds no mistake would prove nothing."""
+    """Without this test, a check that accepts every object would pass unnoticed."""
     deployment = copy.deepcopy(one("default", "Deployment"))
     deployment["spec"]["template"]["spec"]["nodeSelektor"] = {}
 
@@ -50,7 +50,7 @@ def test_a_misspelt_field_is_found(one):
 
 
 def test_each_value_is_chosen_with_and_without_each_other():
-    """A template that relies on another value's default breaks when both are set."""
+    """A template that relies on the default of another value breaks when a user sets both values."""
     assert OTHERS.keys() == {value.path for value in readme.values(readme.VALUES.read_text())}
     assert ROWS[0] == ()
     for one, another in permutations(OTHERS, 2):

@@ -1,4 +1,4 @@
-"""What the chart installs around training: TensorBoard, notebooks, alerts, dashboards and scraping."""
+"""The chart's objects for monitoring: TensorBoard, notebooks, alerts, dashboards and scrape targets."""
 
 import json
 import re
@@ -23,7 +23,10 @@ def pods(objects):
 
 
 def test_what_has_no_login_is_reached_by_nobody(one):
-    """`kubectl port-forward` still works: it comes from the node, which no policy blocks."""
+    """These servers have no login.
+
+    `kubectl port-forward` still works: it connects from the node, which a NetworkPolicy does not block.
+    """
     for name in ("palaestra-tensorboard", "palaestra-jupyter"):
         policy = one("offline", "NetworkPolicy", name)["spec"]
         assert "Ingress" in policy["policyTypes"]
@@ -31,7 +34,7 @@ def test_what_has_no_login_is_reached_by_nobody(one):
 
 
 def test_tensorboard_changes_no_run(one):
-    """TensorBoard only reads the volumes to which trainings write."""
+    """TensorBoard mounts the volumes of the runs read-only."""
     pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
     mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
 
@@ -41,7 +44,10 @@ def test_tensorboard_changes_no_run(one):
 
 @pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
 def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
-    """TensorBoard follows links, so with the whole claim it would show each run twice, once by a UID."""
+    """TensorBoard follows links, so in the root of the claim it would show each run twice.
+
+    One of the two would have a UID as its name.
+    """
     made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
 
     [server] = pods(made)["palaestra-tensorboard"]["containers"]
@@ -49,7 +55,7 @@ def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """It stays in its Secret, which is mounted as a file; the server gets only the path."""
+    """The token stays in its Secret, which is mounted as a file; the server receives only the file's path."""
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
     [server] = pod["containers"]
 
@@ -62,14 +68,14 @@ def test_the_token_of_the_notebooks_is_in_no_object(one):
 
 
 def test_the_alerts_are_those_of_the_file(one):
-    """The program promtool checks that file."""
+    """`promtool` checks alerts.yaml, so the installed rules must be equal to it."""
     rules_of_file = yaml.safe_load((CHART / "alerts.yaml").read_text())
 
     assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
 
 
 def test_runbooks_are_links_if_a_value_has_the_address():
-    """The address depends on where the project's files are hosted."""
+    """The chart cannot know the address, because it depends on where the project's files are hosted."""
     address = "https://git.example.com/palaestra/blob/main"
     rule = {"enabled": True, "runbooks": address}
 
@@ -82,7 +88,7 @@ def test_runbooks_are_links_if_a_value_has_the_address():
 
 
 def test_every_dashboard_is_mounted_as_it_is(made):
-    """Byte for byte, with the label that Grafana's sidecar looks for."""
+    """Each dashboard has the content of its file, and the label that Grafana's sidecar searches for."""
     found = {
         name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
         for each in made("monitored")
@@ -96,7 +102,7 @@ def test_every_dashboard_is_mounted_as_it_is(made):
 
 
 def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
-    """The plan sets the names of the ports."""
+    """The plan names the ports of a pod, so the regular expression must match these names."""
     [endpoint] = one("monitored", "PodMonitor", "palaestra-training")["spec"]["podMetricsEndpoints"]
     [keep] = [each for each in endpoint["relabelings"] if each.get("action") == "keep"]
 
@@ -106,7 +112,7 @@ def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
 
 
 def test_what_prometheus_takes_from_a_training_pod_is_bounded(one):
-    """The program of a job's author serves these metrics and could give Prometheus a million series."""
+    """The job author's program serves these metrics and could give Prometheus a million series."""
     bounded = one("monitored", "PodMonitor", "palaestra-training")["spec"]
     [none] = [
         each

@@ -1,4 +1,4 @@
-"""The objects that the chart installs, in every mode."""
+"""The objects that the chart installs in every mode."""
 
 import argparse
 import json
@@ -50,7 +50,7 @@ def rules(roles):
 
 
 def roles(objects):
-    """Return the roles by name and namespace."""
+    """Return the Roles and ClusterRoles by name and namespace."""
     found = [each for each in objects if each["kind"] in {"Role", "ClusterRole"}]
     return {(each["metadata"]["name"], each["metadata"].get("namespace")): each for each in found}
 
@@ -64,7 +64,7 @@ def bound(objects):
 
 @every_mode
 def test_every_object_has_a_place_and_a_name_of_its_own(made, mode):
-    """Otherwise `kubectl apply` would overwrite the first object with the second."""
+    """Of two objects with one name, `kubectl apply` would overwrite the first with the second."""
     keys = [
         (each["kind"], each["metadata"].get("namespace"), each["metadata"]["name"]) for each in made(mode)
     ]
@@ -76,7 +76,7 @@ def test_every_object_has_a_place_and_a_name_of_its_own(made, mode):
 
 @every_mode
 def test_every_pod_meets_the_restricted_standard(made, mode):
-    """A namespace that enforces the standard accepts all of them."""
+    """A namespace that enforces the standard accepts every pod of the chart."""
     for pod in pods(made(mode)).values():
         assert pod["securityContext"]["runAsNonRoot"] is True
         assert pod["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
@@ -90,7 +90,7 @@ def test_every_pod_meets_the_restricted_standard(made, mode):
 
 @every_mode
 def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
-    """No other pod sends requests to the API server."""
+    """The other pods send no requests to the API server, so a token there could only be stolen."""
     trusted = {
         name for name, pod in pods(made(mode)).items() if pod.get("automountServiceAccountToken", True)
     }
@@ -100,14 +100,17 @@ def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
 
 @every_mode
 def test_the_trial_is_one_hook(made, mode):
-    """Helm reports each hook as a separate test suite: one training appeared as five."""
+    """Helm reports each hook as a separate test suite.
+
+    With five hooks one training appeared as five suites.
+    """
     hooks = [each for each in made(mode) if "helm.sh/hook" in each["metadata"].get("annotations", {})]
 
     assert [(each["kind"], each["metadata"]["name"]) for each in hooks] == [("Pod", "palaestra-test")]
 
 
 def test_the_account_of_the_trial_can_be_left_out(made):
-    """The account has its permissions as long as the release is installed, and some platforms forbid that."""
+    """The account keeps its permissions while the release is installed, which some platforms forbid."""
     everything, without = made("default"), objects({"test": {"enabled": False}})
 
     left_out = [each for each in everything if each not in without]
@@ -120,7 +123,10 @@ def test_the_account_of_the_trial_can_be_left_out(made):
 
 @every_mode
 def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode):
-    """The operator's requests are known verb by verb; only a person grants access to Secrets."""
+    """The roles list each verb of the operator.
+
+    Only an administrator may bind the role that reads Secrets.
+    """
     assert not [right for right in rules(roles(made(mode)).values()) if "*" in "".join(right)]
     assert bound(made(mode))
     assert not [right for right in rules(bound(made(mode))) if "secrets" in right]
@@ -137,7 +143,7 @@ def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
 
 
 def test_no_pod_names_a_user_where_the_cluster_chooses_it():
-    """OpenShift refuses a pod whose user is outside the namespace's range."""
+    """OpenShift refuses a pod whose user ID is outside the range of the namespace."""
     all_pods = merged(MODES["everything"], {"podSecurity": {"fixedUser": False}})
     text = json.dumps(objects(all_pods))
 
@@ -146,13 +152,13 @@ def test_no_pod_names_a_user_where_the_cluster_chooses_it():
 
 
 def test_both_modes_hold_the_same_rights(made):
-    """The operator does the same work in each mode."""
+    """The operator sends the same requests in both modes."""
     assert rules(bound(made("namespaced"))) == rules(bound(made("default")))
 
 
 @every_mode
 def test_the_operator_understands_its_options(one, mode):
-    """A chart and an operator of different releases might not agree."""
+    """The operator must be able to parse every option that the chart passes to it."""
     chosen = options(one(mode, "Deployment"))
 
     assert chosen.monitoring_namespace == "monitoring"
@@ -161,9 +167,9 @@ def test_the_operator_understands_its_options(one, mode):
 
 
 def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
-    """The values become options of its command line.
+    """The chart passes these values as options of the operator's command line.
 
-    By default no extra field is allowed and no placement is required.
+    By default no extra field is allowed and no node selector is required.
     """
     closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
 
@@ -184,7 +190,7 @@ def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
 
 
 def test_a_pod_has_a_user_namespace_only_where_it_is_asked_for(one):
-    """A node without user namespaces never starts such a pod."""
+    """A node without user namespaces would never start such a pod."""
     closed, default = (one(mode, "Deployment")["spec"]["template"]["spec"] for mode in ("closed", "default"))
 
     assert closed["hostUsers"] is False
@@ -192,7 +198,7 @@ def test_a_pod_has_a_user_namespace_only_where_it_is_asked_for(one):
 
 
 def test_the_operator_s_defaults_are_those_of_its_release(one):
-    """Naming them again would hide what `palaestra operator --help` says."""
+    """By default the chart leaves these options out, so the defaults of `palaestra operator --help` apply."""
     chosen, release = options(one("default", "Deployment")), Images.of_release(version("palaestra"))
 
     assert (chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image) == (
@@ -205,7 +211,7 @@ def test_the_operator_s_defaults_are_those_of_its_release(one):
 
 
 def test_every_image_comes_from_the_registry_by_its_digest(made, one):
-    """In an offline cluster nothing else can be pulled, neither by a test nor through an option."""
+    """An offline cluster can pull only from this registry; the images of tests and options are included."""
     images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
     chosen = options(one("offline", "Deployment"))
     images |= {chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image}
@@ -215,7 +221,7 @@ def test_every_image_comes_from_the_registry_by_its_digest(made, one):
 
 
 def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
-    """This includes the job of `helm test`, whose pods the operator makes."""
+    """The job of `helm test`, whose pods the operator plans, needs the Secret too."""
     job = yaml.safe_load(one("offline", "ConfigMap", "palaestra-trial")["data"]["job.yaml"])
 
     assert {len(pod["imagePullSecrets"]) for pod in pods(made("offline")).values()} == {1}
@@ -223,7 +229,7 @@ def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
 
 
 def test_an_image_is_never_the_latest(made):
-    """An upgrade needs a person's decision."""
+    """A release is upgraded only when a person decides it."""
     tags = {
         container["image"].partition(":")[2]
         for pod in pods(made("default")).values()
@@ -235,7 +241,7 @@ def test_an_image_is_never_the_latest(made):
 
 @every_mode
 def test_the_trial_is_a_job_that_the_api_takes(one, mode):
-    """Otherwise `helm test` would fail in the user's cluster."""
+    """With an invalid job `helm test` would fail in the user's cluster."""
     namespace = MODES[mode].get("watchNamespaces", [NAMESPACE])[0]
 
     text = one(mode, "ConfigMap", "palaestra-trial")["data"]["job.yaml"]
@@ -247,7 +253,7 @@ def test_the_trial_is_a_job_that_the_api_takes(one, mode):
 
 
 def test_the_definition_is_that_of_the_models_and_is_kept(one):
-    """Helm upgrades the definition, because it is a template; an annotation keeps it after the release."""
+    """The definition is a template, so Helm upgrades it; the annotation keeps it after `helm uninstall`."""
     definition = one("default", "CustomResourceDefinition", "trainingjobs.palaestra.dev")
 
     annotations = definition["metadata"].pop("annotations")
@@ -271,7 +277,7 @@ def test_more_than_one_operator_is_spread_and_survives_a_drain(made, one):
 
 @every_mode
 def test_selectors_find_the_pods_that_they_are_for(made, mode):
-    """Kubernetes reports no error for a Service without pods."""
+    """Kubernetes reports no error for a Service or a policy whose selector matches no pod."""
     labels = {
         each["metadata"]["name"]: each["spec"]["template"]["metadata"]["labels"]
         for each in made(mode)
@@ -287,7 +293,7 @@ def test_selectors_find_the_pods_that_they_are_for(made, mode):
 
 
 def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
-    """Where its egress is restricted, it can reach only the API server and trainers."""
+    """If its egress is restricted, the operator can connect only to the API server and to trainers."""
     open_, closed = one("default", "NetworkPolicy")["spec"], one("closed", "NetworkPolicy")["spec"]
 
     [source] = open_["ingress"][0]["from"]
@@ -298,7 +304,7 @@ def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
 
 
 def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm
-    """The release number is written in four places."""
+    """The release number is written in four files, which must agree."""
     chart = yaml.safe_load((CHART / "Chart.yaml").read_text())
 
     assert {chart["version"], chart["appVersion"]} == {version("palaestra")}
@@ -306,7 +312,7 @@ def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without
 
 @every_mode
 def test_the_notes_tell_what_to_type_next(mode):
-    """Helm shows nothing else after an installation."""
+    """After an installation Helm shows only these notes."""
     where = ("palaestra", str(CHART), f"--namespace={NAMESPACE}")
     said = helm("install", *where, "--dry-run=client", "--values=-", sent=yaml.safe_dump(MODES[mode]))
 
@@ -315,7 +321,7 @@ def test_the_notes_tell_what_to_type_next(mode):
 
 
 def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 - skips without Helm
-    """People asked which of two different timeouts for one command was right."""
+    """With different timeouts in notes and pages, people asked which one was right."""
     root = CHART.parents[1]
     pages = [(root / "docs/howto/install.md").read_text(), (CHART / "README.md").read_text()]
     pages.append(helm("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--dry-run=client"))
@@ -326,7 +332,7 @@ def test_notes_and_pages_give_helm_test_the_same_timeout(made):  # noqa: ARG001 
 
 
 def test_the_token_of_the_notebooks_can_stand_in_an_address():
-    """The server refused a link whose token had a `+`, `/` or `=` of base64, because `?token=` ends there."""
+    """The base64 characters `+`, `/` and `=` broke the link with `?token=`, so the token is hexadecimal."""
     page = (CHART.parents[1] / "docs/howto/install.md").read_text()
     [command] = re.findall(r'--from-literal=token="\$\((.+)\)"', page)
 
@@ -336,6 +342,6 @@ def test_the_token_of_the_notebooks_can_stand_in_an_address():
 
 
 def test_an_old_cluster_is_refused():
-    """Before Kubernetes 1.33 sidecar containers are not stable."""
+    """Sidecar containers are stable only since Kubernetes 1.33."""
     with pytest.raises(HelmRefused, match=r"kubeVersion: >=1\.33\.0-0"):
         helm("template", "palaestra", str(CHART), "--kube-version=1.32.0")

@@ -1,4 +1,4 @@
-"""Permissions are read from roles and from an audit log, so that grants and uses can be compared."""
+"""The permissions that roles grant and that an audit log shows in use, so that both can be compared."""
 
 import json
 
@@ -13,11 +13,11 @@ WHY = 'RBAC: allowed by RoleBinding "reader/robots"'
 
 @pytest.fixture(autouse=True)
 def helm_is_built():
-    """Only the other tests of this folder need Helm."""
+    """Override the fixture of the folder, because these tests do not need Helm."""
 
 
 def role(name, namespace=None, verb="list"):
-    """Return a role that allows one verb on pods, in the cluster or in a namespace."""
+    """Return a ClusterRole, or a Role in a namespace, that allows one verb on pods."""
     metadata = {"name": name} | ({"namespace": namespace} if namespace else {})
     rules = [{"apiGroups": [""], "resources": ["pods"], "verbs": [verb]}]
     return {"kind": "Role" if namespace else "ClusterRole", "metadata": metadata, "rules": rules}
@@ -53,21 +53,21 @@ def entry(verb, *, user="system:serviceaccount:robots:operator", code=200, decis
 
 
 def test_a_right_is_granted_by_a_binding_and_not_by_a_role_alone():
-    """A role without a binding grants nothing."""
+    """Kubernetes grants the permissions of a role only to the subjects of its bindings."""
     bound, alone = role("reads"), role("deletes", verb="delete")
 
     assert granted([bound, alone, binding(bound)], "robots", "operator") == {READ}
 
 
 def test_roles_of_one_name_are_distinguished_by_their_namespaces():
-    """With a list of namespaces, each namespace has a role of this name."""
+    """With a list of watched namespaces, the chart creates a role of the same name in each."""
     here, there = role("jobs", "robots"), role("jobs", "drones", "delete")
 
     assert granted([here, there, binding(here)], "robots", "operator") == {READ}
 
 
 def test_what_another_account_holds_is_not_granted():
-    """An account is identified by its namespace and its name."""
+    """Both the namespace and the name identify a service account."""
     bound = role("reads")
 
     assert granted([bound, binding(bound, "trial")], "robots", "operator") == set()
@@ -75,7 +75,7 @@ def test_what_another_account_holds_is_not_granted():
 
 
 def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
-    """The role takes effect only when somebody binds it."""
+    """The role grants nothing until somebody binds it to the operator's account."""
     rights = granted(installed(), "palaestra-system", "palaestra-operator")
 
     assert rights
@@ -83,7 +83,7 @@ def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
 
 
 def test_a_request_is_the_use_of_a_right():
-    """A use includes the subresource and the reason why it was allowed."""
+    """The use contains the subresource and the API server's reason to allow the request."""
     log = entry("patch", apiGroup="palaestra.dev", resource="trainingjobs", subresource="status")
 
     right = Right("palaestra.dev", "trainingjobs/status", "patch")
@@ -91,21 +91,21 @@ def test_a_request_is_the_use_of_a_right():
 
 
 def test_applying_an_object_that_does_not_exist_yet_uses_two_rights():
-    """An API server checks both and logs one."""
+    """An API server checks `patch` and `create`, and logs only `patch`."""
     verbs = {code: [use.right.verb for use in uses(entry("patch", code=code))] for code in (200, 201)}
 
     assert verbs == {200: ["patch"], 201: ["patch", "create"]}
 
 
 def test_a_refused_request_is_no_right():
-    """A refused request shows a missing permission."""
+    """The log also contains refused requests, for which the account lacks the permission."""
     [use] = uses(entry("list", decision="forbid", code=403))
 
     assert not use.allowed
 
 
 def test_people_discovery_the_past_and_half_a_line_are_left_out():
-    """The log is of a server that others use too, and is still being written."""
+    """Other users send requests to the same API server, and it still writes the log during the test."""
     discovery = json.loads(entry("get"))
     del discovery["objectRef"]
     lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']

@@ -1,4 +1,4 @@
-"""Every value has a description and a rule, and a wrong value is refused with its path."""
+"""Every value has a description and a rule; Helm refuses a wrong value and names its path."""
 
 import json
 from typing import Any
@@ -66,14 +66,14 @@ WRONG = [  # the value that is set, its content, and the path of the mistake bel
 
 
 def chosen(path: str, value: Any) -> dict[str, Any]:
-    """Return values of which one is set."""
+    """Return a values file's content that sets only one value."""
     for step in reversed(path.split(".")):
         value = {step: value}
     return value
 
 
 def refusal(values: dict[str, Any]) -> str:
-    """Return the error with which Helm refuses some values."""
+    """Return the error message with which Helm refuses these values."""
     with pytest.raises(HelmRefused) as refused:
         objects(values)
     return str(refused.value)
@@ -81,7 +81,7 @@ def refusal(values: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize(("path", "value", "below"), WRONG, ids=str)
 def test_a_wrong_value_is_refused_with_its_place(path, value, below):
-    """Helm refuses it before anything is sent to the cluster."""
+    """Helm refuses the value before it sends anything to the cluster."""
     assert f"at '/{path.replace('.', '/')}{below}'" in refusal(chosen(path, value))
 
 
@@ -100,7 +100,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):
-    """Misspelled values are refused, and so are values that need another one."""
+    """Helm refuses misspelled values, and values that require another value."""
     assert told in refusal(values)
 
 
@@ -119,19 +119,19 @@ def _definition(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_the_schema_knows_every_value_and_no_other():
-    """A value that is only in the schema, or only in values.yaml, is a mistake."""
+    """A value that only values.yaml or only the schema has is a mistake of the chart's author."""
     assert properties(SCHEMA) == {value.path for value in VALUES} | {"enabled", "global"}
 
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: value.path)
 def test_every_value_has_a_sentence(value):
-    """Nobody should have to read the templates."""
+    """A user of the chart must not have to read the templates."""
     assert value.sentence.endswith(".")
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_helm_finds_nothing_wrong(mode):
-    """Helm's linter passes, with warnings as errors."""
+    """`helm lint --strict` treats warnings as errors."""
     values = yaml.safe_dump(MODES[mode])
 
     assert "0 chart(s) failed" in helm("lint", str(CHART), "--strict", "--values=-", sent=values)
@@ -148,7 +148,7 @@ dependencies:
 
 @pytest.mark.parametrize("enabled", [True, False])
 def test_a_parent_chart_switches_the_chart_on_and_off(tmp_path, enabled):
-    """Helm's condition is a value of the chart itself, and the schema refused it."""
+    """Helm's `condition` sets `enabled` among the values of this chart, and the schema once refused it."""
     (tmp_path / "charts").mkdir()
     (tmp_path / "charts" / "palaestra").symlink_to(CHART)
     (tmp_path / "Chart.yaml").write_text(PARENT)

@@ -1,4 +1,4 @@
-"""The commands: their input, their output and their exit codes."""
+"""The commands of `palaestra`: their input, their output and their exit codes."""
 
 import re
 
@@ -34,7 +34,7 @@ spec:
 
 @pytest.fixture
 def job(tmp_path):
-    """A file with a job."""
+    """Return the path of a file with a valid job."""
     path = tmp_path / "job.yaml"
     path.write_text(JOB)
     return path
@@ -42,7 +42,7 @@ def job(tmp_path):
 
 @pytest.fixture
 def fails(capsys):
-    """Run a command that fails, and return its lines on standard error."""
+    """Return a function that runs a command, requires exit code 2, and returns the lines of stderr."""
 
     def run(*arguments):
         code = main([str(each) for each in arguments])
@@ -73,14 +73,14 @@ def test_a_file_too_large_for_what_it_should_be_is_refused_by_its_size(fails, tm
 
 
 def test_text_of_others_gives_a_terminal_no_orders(fails, tmp_path):
-    """A file name or a pod's message may have escape sequences, which rename a window or hide lines."""
+    """A file name or a pod's message may have escape sequences that rename a window or hide lines."""
     [line] = fails("plan", tmp_path / "\x1b]0;mine\x07\x1b[2J.yaml")
 
     assert line.isprintable()
 
 
 def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
-    """`palaestra plan FILE | kubectl apply -f -` does what the operator does."""
+    """`palaestra plan FILE | kubectl apply -f -` creates the objects that the operator would create."""
     assert main(["plan", str(job)]) == 0
 
     kinds = [each["kind"] for each in yaml.safe_load_all(capsys.readouterr().out)]
@@ -88,14 +88,14 @@ def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
 
 
 def test_plan_can_print_what_run_would_do_here(job, tmp_path, capsys):
-    """`run` uses the same function with another layout."""
+    """`--layout local` prints the plan that `palaestra run` executes on this machine."""
     main(["plan", str(job), "--layout", "local", "--dir", str(tmp_path)])
 
     assert f"value: {tmp_path}/a/1" in capsys.readouterr().out
 
 
 def test_plan_quotes_text_that_kubectl_would_take_for_a_number(tmp_path, capsys):
-    """YAML readers differ on 5e-4."""
+    """Some YAML parsers read `5e-4` as a number and others as text."""
     path = tmp_path / "job.yaml"
     path.write_text(JOB + "  trainer: {env: [{name: RATE, value: '5e-4'}]}\n")
 
@@ -105,7 +105,7 @@ def test_plan_quotes_text_that_kubectl_would_take_for_a_number(tmp_path, capsys)
 
 
 def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
-    """The author of a world sees how the file from Webots is changed."""
+    """The author of a world can see how the file that Webots reads differs from the original."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
 
@@ -116,7 +116,7 @@ def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
 
 
 def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
-    """Most worlds for the ros controller lack both options; nothing else may change."""
+    """Most worlds with the `ros` controller lack both options; the rest of the file must not change."""
     path = tmp_path / "plain.wbt"
     path.write_text('#VRML_SIM R2023b utf8\nE-puck {\n  controller "ros"\n}\n')
 
@@ -131,7 +131,7 @@ def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
 
 
 def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
-    """The message has line and column, as a compiler's has."""
+    """The message has the line and the column, like a compiler's message."""
     path = tmp_path / "broken.wbt"
     path.write_text("#VRML_SIM R2023b utf8\nRobot { name [ }\n")
 
@@ -141,7 +141,7 @@ def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
 
 
 def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
-    """The command would change nothing in it, and no trainer could drive it."""
+    """The command would change nothing in this world, and no trainer could drive its robot."""
     path = tmp_path / "silent.wbt"
     path.write_bytes(builtin("arena").replace(b'controller "ros"', b'controller "void"'))
 
@@ -152,7 +152,7 @@ def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
 
 
 def test_world_without_a_job_is_refused(tmp_path, fails):
-    """The names come from the job; only a check works without one."""
+    """The ROS names of the robots contain the job's name; only `--check` works without a job."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
 
@@ -162,7 +162,7 @@ def test_world_without_a_job_is_refused(tmp_path, fails):
 
 
 def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
-    """Each simulator reports its own result; nothing is started."""
+    """The check prints a result for each simulator and starts none of them."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     assert main(["world", str(path), "--check"]) == 0
@@ -179,7 +179,7 @@ def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
 
 
 def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatch):
-    """MuJoCo is an extra; a world for the stub can be checked without it."""
+    """MuJoCo is an optional extra; a world for the stub can be checked without it."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
@@ -189,7 +189,7 @@ def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatc
 
 
 def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch):
-    """An operator's image has no simulator."""
+    """The operator's image has the command but no simulator."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
     for module in ("simulators", "world_check"):
@@ -200,7 +200,7 @@ def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch
 
 
 def test_world_s_help_names_all_that_changes(capsys):
-    """The author of a world compares the two files, and must find only the changes that the help lists."""
+    """The author of a world compares the two files and expects only the changes that the help lists."""
     with pytest.raises(SystemExit) as ended:
         main(["world", "--help"])
 
@@ -211,7 +211,7 @@ def test_world_s_help_names_all_that_changes(capsys):
 
 
 def test_crd_prints_a_custom_resource_definition(capsys):
-    """The definition is that of the installed version."""
+    """The printed definition belongs to the installed release."""
     assert main(["crd"]) == 0
 
     crd = yaml.safe_load(capsys.readouterr().out)
@@ -220,7 +220,7 @@ def test_crd_prints_a_custom_resource_definition(capsys):
 
 @pytest.mark.parametrize("command", ["run", "plan"])
 def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monkeypatch):
-    """Five mistakes are five lines, and nothing is started or written."""
+    """The file has five mistakes; the command prints five lines, and starts and writes nothing."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "wrong.yaml"
     path.write_text(WRONG)
@@ -243,7 +243,10 @@ def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monke
 def test_what_is_not_done_here_is_refused_before_anything_is_written(
     spec, line, tmp_path, fails, monkeypatch
 ):
-    """There is no run directory and no lock, and with --fresh the old run stays in its folder."""
+    """The command creates no run directory and no lock.
+
+    Even with `--fresh` the old run stays in its folder.
+    """
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "job.yaml"
     path.write_text(f"{JOB}  {spec}\n")
@@ -264,7 +267,7 @@ def test_a_file_that_is_not_there_is_one_line(tmp_path, fails):
 
 
 def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
-    """The file may be a checkpoint that was named instead of a job."""
+    """A person may name a checkpoint instead of a job."""
     path = tmp_path / "model.zip"
     path.write_bytes(b"PK\xff\xfe")
 
@@ -279,7 +282,7 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
 
 
 def test_an_operator_that_cannot_be_is_not_started(fails):
-    """The command ends before it connects to anything."""
+    """The command exits before it connects to a cluster."""
     told = "--metrics-address: '8080' is not an address; write it as 0.0.0.0:8080"
     assert fails("operator", "--metrics-address=8080") == [told]
 
@@ -311,7 +314,7 @@ A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
     ],
 )
 def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
-    """FILE does not exist, so the error comes before a file is read or a request is sent."""
+    """FILE does not exist, so the error must come before the command reads a file or sends a request."""
     with pytest.raises(SystemExit) as ended:
         main(command.split())
 
@@ -321,14 +324,14 @@ def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsy
 
 @pytest.mark.parametrize("option", ["--agent=zero", "--episodes=3", "--json"])
 def test_what_is_tried_here_is_not_an_option_of_a_cluster(job, fails, option):
-    """A person who forgets --local would wait for a cluster."""
+    """A person who forgets `--local` would otherwise start the trial in a cluster."""
     [line] = fails("try", job, option)
 
     assert line == "--agent, --episodes, --json: are for --local; add it, or leave them out"
 
 
 def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
-    """Nothing is started, and the remedy is in the line."""
+    """The command starts nothing and prints one line, which contains the remedy."""
     job.write_text(
         JOB
         + "  simulators:\n"
@@ -344,7 +347,7 @@ def test_a_simulator_of_ones_own_cannot_be_tried_here(job, fails):
 
 
 def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
-    """The error is not a traceback of a library."""
+    """A person must see a message with a remedy, not a library's traceback."""
     [line] = fails("operator", f"--kubeconfig={tmp_path}/none", "--metrics-address=127.0.0.1:0")
 
     assert line.startswith(f"{tmp_path}/none: ")
@@ -352,7 +355,7 @@ def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
 
 
 def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
-    """The help listed only the exit codes of `run`, but `palaestra get` has others."""
+    """The first help once listed only the exit codes of `run`, but commands such as `get` have others."""
     with pytest.raises(SystemExit):
         main(["--help"])
 
@@ -366,7 +369,7 @@ def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
     "arguments", [["--version"], ["run", "--help"], ["plan", "--help"], ["operator", "--help"]]
 )
 def test_help_and_version_say_what_they_are(arguments, capsys):
-    """Every help ends with the exit codes."""
+    """`--version` prints the release, and every help ends with the exit codes."""
     with pytest.raises(SystemExit) as ended:
         main(arguments)
 
@@ -376,7 +379,7 @@ def test_help_and_version_say_what_they_are(arguments, capsys):
 
 
 def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
-    """The command has no PyTorch of its own; its exit code and message are those of the trainer's program."""
+    """The command runs the trainer's program, which has PyTorch, and passes on its exit code and message."""
     assert main(["export", str(tmp_path / "none"), "--to", "onnx"]) == 2
 
     out, err = capfd.readouterr()
@@ -385,7 +388,7 @@ def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
 
 
 def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
-    """An operator's image has the command but no trainer."""
+    """The operator's image has the command but not the trainer."""
     monkeypatch.setattr("palaestra.cli.export.PROGRAM", "palaestra-none")
 
     assert main(["export", str(tmp_path), "--to", "onnx"]) == 2

@@ -1,4 +1,4 @@
-"""The commands on a cluster, as far as they can be tested without one."""
+"""The commands that use a cluster, as far as tests can check them without one."""
 
 import pytest
 
@@ -12,7 +12,7 @@ COMMANDS = [
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_help_says_what_is_read_and_how_it_ends(name, capsys):
-    """Every command accepts the options with which kubectl selects a cluster."""
+    """Every command has kubectl's options that select a cluster, and its help lists the exit codes."""
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
 
@@ -25,7 +25,7 @@ def test_help_says_what_is_read_and_how_it_ends(name, capsys):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_without_a_cluster_a_line_says_how_to_name_one(name, tmp_path, capsys):
-    """The error is not a traceback of a library, and nothing is written."""
+    """A person must see one line with a remedy, not a library's traceback."""
     job = [] if name in {"get", "doctor"} else ["job"]
 
     code = main([name, *job, f"--kubeconfig={tmp_path}/none"])
@@ -37,7 +37,7 @@ def test_without_a_cluster_a_line_says_how_to_name_one(name, tmp_path, capsys):
 
 
 def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
-    """The message has the file in which it was looked up."""
+    """The message has the name of the context, so that a person can find the mistyped letter."""
     kubeconfig = tmp_path / "kubeconfig"
     kubeconfig.write_text(
         "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
@@ -50,7 +50,7 @@ def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
 
 @pytest.mark.parametrize("option", ["-n", "--namespace=lab", "--context", "--kubeconfig"])
 def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, monkeypatch, capsys):
-    """Users of kubectl write it there; argparse took the namespace for an unknown command."""
+    """Users of kubectl write options before the command; argparse then took the namespace for a command."""
     monkeypatch.setattr("sys.argv", ["/usr/bin/kubectl-palaestra"])
 
     with pytest.raises(SystemExit) as ended:
@@ -67,7 +67,7 @@ def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, 
     [("kubectl-palaestra", "usage: kubectl palaestra"), ("palaestra", "usage: palaestra")],
 )
 def test_help_is_typed_as_it_was_called(program, shown, monkeypatch, capsys):
-    """Called as kubectl's plugin, the command shows examples that can be pasted."""
+    """If kubectl runs the command as a plugin, users can paste the examples of its help."""
     monkeypatch.setattr("sys.argv", [f"/usr/bin/{program}"])
 
     with pytest.raises(SystemExit):

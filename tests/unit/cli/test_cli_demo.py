@@ -1,4 +1,4 @@
-"""`palaestra demo`: its two jobs."""
+"""The two jobs of `palaestra demo`: one trains a policy, the other plays it."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ EXAMPLE = Path(__file__).parents[3] / "manifests/examples/move-to-target.yaml"
 
 
 def test_the_demo_trains_the_example_of_make_run():
-    """Its figures are those of the README; the file is in the wheel, where no examples are."""
+    """The README gives the results of this example; a wheel has the demo's file but not the examples."""
     example = palaestra.api.load(EXAMPLE.read_text(), EXAMPLE.name)
 
     assert demo_job().spec == example.spec
@@ -17,7 +17,7 @@ def test_the_demo_trains_the_example_of_make_run():
 
 
 def test_the_policy_plays_in_the_world_in_which_it_learned():
-    """The stub takes its steps as fast as a robot would, so that a person sees it move."""
+    """In the world of its training the policy reaches the target, which the viewer should see."""
     learns = demo_job()
 
     plays = playing_job(learns, Path("/runs/demo/0"))

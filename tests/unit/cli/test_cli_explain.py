@@ -1,4 +1,4 @@
-"""`palaestra explain`: what it prints, and how it refuses."""
+"""The output and the errors of `palaestra explain`."""
 
 import json
 import shlex
@@ -13,7 +13,7 @@ PAGE = (Path(__file__).parents[3] / "docs/reference/trainingjob.md").read_text(e
 
 
 def test_a_field_is_printed_in_the_width_of_the_terminal(capsys, monkeypatch):
-    """Users of kubectl type `explain` before they write a field."""
+    """Like `kubectl explain`, the command breaks the lines at the width of the terminal."""
     monkeypatch.setenv("COLUMNS", "60")
 
     assert main(["explain", "simulators.role"]) == 0
@@ -26,7 +26,7 @@ def test_a_field_is_printed_in_the_width_of_the_terminal(capsys, monkeypatch):
 
 
 def test_a_field_that_does_not_exist_is_one_sentence(capsys):
-    """It has the field that was probably meant, and nothing is on standard output."""
+    """The message proposes the nearest field; standard output stays empty, so a pipe receives nothing."""
     assert main(["explain", "trainer.step\x1b[2J"]) == 2
     assert main(["explain", "trainer.step"]) == 2
 
@@ -40,7 +40,7 @@ def test_a_field_that_does_not_exist_is_one_sentence(capsys):
 
 @pytest.mark.parametrize("typed", blocks(PAGE, "sh")[0].splitlines())
 def test_the_commands_of_the_page_print_what_it_says(typed, capsys):
-    """A reader types them before the first job."""
+    """A reader of the page types these commands before the first job."""
     words = shlex.split(typed.partition(" >")[0])
 
     assert words[0] == "palaestra"

@@ -1,4 +1,4 @@
-"""`palaestra sweep`, as far as it can be tested without a run."""
+"""`palaestra sweep`, as far as tests can check it without a run."""
 
 import sys
 
@@ -19,14 +19,14 @@ JOB = make_job("j")
 
 @pytest.fixture
 def file(tmp_path):
-    """A sweep file whose job file is missing."""
+    """Return the path of a sweep file whose job file is missing."""
     path = tmp_path / "sweep.yaml"
     path.write_text(yaml.safe_dump(SWEEP))
     return path
 
 
 def test_help_has_its_own_exit_codes(capsys):
-    """Exit code 75 has the same meaning for a sweep as for a run."""
+    """Exit code 75 of a sweep means the same as that of a run: resume with the same command."""
     with pytest.raises(SystemExit):
         main(["sweep", "--help"])
 
@@ -37,7 +37,7 @@ def test_help_has_its_own_exit_codes(capsys):
 
 @pytest.mark.parametrize("option", ["--namespace=lab", "--context=c", "--kubeconfig=k"])
 def test_an_option_for_a_cluster_without_one_is_refused(file, option, capsys):
-    """A user who meant a cluster would notice hours later that the training runs here."""
+    """A user who forgets `--cluster` would notice only hours later that the sweep runs on the laptop."""
     assert main(["sweep", str(file), option]) == 2
 
     assert capsys.readouterr().err.startswith("--cluster: is missing; add it")
@@ -51,7 +51,7 @@ def test_a_job_that_cannot_be_read_is_named(file, capsys):
 
 
 def test_a_search_without_optuna_names_the_extra(file, tmp_path, monkeypatch, capsys):
-    """The error comes before anything is started or written."""
+    """The error comes before the command creates a folder or starts a trial."""
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     monkeypatch.setitem(sys.modules, "optuna", None)
     monkeypatch.delitem(sys.modules, "palaestra.sweeps.optuna_search", raising=False)

@@ -1,4 +1,4 @@
-"""`palaestra view` refuses what it cannot show, in one sentence, before it opens a page."""
+"""`palaestra view` refuses a run that it cannot show, with one message, before it opens a page."""
 
 import pytest
 import yaml
@@ -9,7 +9,7 @@ from palaestra_protocol.http import Address, Server
 
 @pytest.fixture
 def run(tmp_path):
-    """Yield the folder of a run whose sidecar is of an older release."""
+    """Yield the folder of a run whose sidecar, of an older release, has no endpoint for the view."""
     server = Server(Address("127.0.0.1", 0), {}, name="test")
     server.start()
     content = {
@@ -22,7 +22,7 @@ def run(tmp_path):
 
 
 def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monkeypatch, capsys):
-    """Viser is optional, because a pod or a server needs no page."""
+    """Viser is an optional extra, because pods and servers do not need it."""
     monkeypatch.setattr(view_process, "find_spec", lambda _name: None)
 
     assert main(["view", run]) == 2
@@ -32,19 +32,19 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(run, monke
 
 
 def test_another_simulator_is_refused_with_the_known_ones(run, capsys):
-    """The names are those of the job's groups."""
+    """The message lists the simulators of the run."""
     assert main(["view", run, "--simulator", "collect-7"]) == 2
     assert capsys.readouterr().out == "--simulator collect-7: the run has collect-0\n"
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
-    """A name without a slash would be that of a job in a cluster."""
+    """An argument with a slash is always a folder; a name without a slash may be a job in a cluster."""
     assert main(["view", str(tmp_path)]) == 2
     assert "is not a run directory, which has training.yaml" in capsys.readouterr().err
 
 
 def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(tmp_path, capsys):
-    """A person who mistypes a folder would otherwise read about a kubeconfig only."""
+    """A person who mistypes a folder would otherwise read only an error about a kubeconfig."""
     empty = tmp_path / "kubeconfig"
     empty.touch()
 
@@ -53,6 +53,6 @@ def test_a_name_that_is_no_folder_is_looked_up_in_the_cluster_and_that_is_said(t
 
 
 def test_a_simulator_that_shows_nothing_opens_no_page(run, capsys):
-    """The sentence is the sidecar's own."""
+    """The command prints the error that the sidecar returned."""
     assert main(["view", run]) == 1
     assert capsys.readouterr().out.startswith("collect-0: path: is not one of")

@@ -1,4 +1,4 @@
-"""An event is about a job if it names the job or a child of it, and no other job."""
+"""`concerns` accepts an event about a job or its children, and refuses an event about another job."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from tests.unit.view.jobs import running_job
 
 
 def event(kind, name, uid=None):
-    """Return an event about an object."""
+    """Return an event whose `involvedObject` has this kind, name and uid."""
     return {"involvedObject": {"kind": kind, "name": name, "uid": uid}}
 
 
@@ -21,7 +21,7 @@ def event(kind, name, uid=None):
     ],
 )
 def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
-    """If a pod cannot be scheduled, that concerns its job."""
+    """A user who reads a job's events must see, for example, that its pod cannot be scheduled."""
     assert concerns(event(kind, name, uid), running_job())
 
 
@@ -37,5 +37,5 @@ def test_what_was_made_for_a_job_concerns_it(kind, name, uid):
     ],
 )
 def test_what_only_looks_like_it_does_not(kind, name, uid):
-    """A job `job-0` may exist next to `job`."""
+    """A TrainingJob `job-0` may exist next to `job`, whose child also has the name `job-0`."""
     assert not concerns(event(kind, name, uid), running_job())

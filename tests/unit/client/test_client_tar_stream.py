@@ -1,4 +1,4 @@
-"""The tar stream from the container: everything arrives, and nothing is written outside the target folder."""
+"""The tar stream from a pod: all files arrive, and nothing is written outside the target folder."""
 
 import io
 import re
@@ -17,24 +17,24 @@ PROGRAM = Path(palaestra.client.tar_stream.__file__).read_text()
 
 
 def packed(folder, *names):
-    """Return the chunks that the program writes when it runs as in a container."""
+    """Return the tar stream in chunks; the packing program runs as in a container."""
     command = [sys.executable, "-I", "-c", PROGRAM, str(folder), *names]
     done = subprocess.run(command, capture_output=True, timeout=60, check=True)
     return iter([done.stdout[i : i + 1000] for i in range(0, len(done.stdout), 1000)])
 
 
 def archive(*members):
-    """Return the chunks of a tar with these members."""
+    """Return the chunks of a tar archive with these members."""
     file = io.BytesIO()
     with tarfile.open(fileobj=file, mode="w") as tar:
         for member in members:
-            hole = b"0\n".ljust(member.size, b"\0")  # the map of a file that is one hole
+            hole = b"0\n".ljust(member.size, b"\0")  # the map of a sparse file that is one hole
             tar.addfile(member, io.BytesIO(hole if member.pax_headers else b"x" * member.size))
     return iter([file.getvalue()])
 
 
 def test_files_and_folders_arrive_as_they_were(tmp_path):
-    """Empty files and folders, and those in subfolders, are copied too."""
+    """Empty files, and files in subfolders, are copied too."""
     run, there = tmp_path / "run", tmp_path / "there"
     (run / "tensorboard" / "deep").mkdir(parents=True)
     there.mkdir()
@@ -49,14 +49,14 @@ def test_files_and_folders_arrive_as_they_were(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_an_empty_archive(tmp_path):
-    """A run that has written nothing yet is not an error of the program."""
+    """A run that has not written a file yet must not make `fetch` fail."""
     unpack(packed(tmp_path / "none", "model.zip"), tmp_path, WANTED, 10**6)
 
     assert list(tmp_path.iterdir()) == []
 
 
 def member(name, size=1, kind=tarfile.REGTYPE, **words):
-    """Return a member of a tar."""
+    """Return the header of a member of a tar archive."""
     made = tarfile.TarInfo(name)
     made.size, made.type = size, kind
     for word, value in words.items():
@@ -95,7 +95,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize(("members", "fact"), HOSTILE.values(), ids=HOSTILE)
 def test_what_was_not_asked_for_is_refused(tmp_path, members, fact):
-    """The image is chosen by the job's author, so its output is not trusted."""
+    """The job's author chooses the image that sends the archive, so the client does not trust it."""
     inside = tmp_path / "inside"
     inside.mkdir()
 
@@ -118,7 +118,7 @@ ENDLESS = {
 
 @pytest.mark.parametrize("begun", ENDLESS.values(), ids=ENDLESS)
 def test_an_endless_member_is_not_kept_in_memory(tmp_path, begun):
-    """The reader stops at the limits of size."""
+    """The reader stops at its size limits, so the pod cannot fill the client's memory."""
     sent = []
 
     def chunks():
@@ -133,7 +133,7 @@ def test_an_endless_member_is_not_kept_in_memory(tmp_path, begun):
 
 
 def test_files_without_end_are_refused(tmp_path, monkeypatch):
-    """Each empty file still takes an entry of the disk."""
+    """Even empty files use inodes of the client's disk, so their number is limited."""
     monkeypatch.setattr("palaestra.client.tar_extraction.MOST_FILES", 3)
     empty = [member(f"tensorboard/{number}", 0) for number in range(4)]
 
@@ -143,13 +143,13 @@ def test_files_without_end_are_refused(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("sent", [b"x" * 2000, bytes(range(256)) * 8], ids=["letters", "bytes"])
 def test_what_is_no_tar_is_damaged(tmp_path, sent):
-    """A proxy may send a page of its own instead of the pod's data."""
+    """A proxy may send an error page instead of the pod's data."""
     with pytest.raises(WrongArchive, match="it is damaged"):
         unpack(iter([sent]), tmp_path, WANTED, 1000)
 
 
 def test_what_was_cut_off_is_no_archive(tmp_path):
-    """A truncated archive must not look like a short run."""
+    """A user must not take a truncated archive for a complete run."""
     [whole] = archive(member("model.zip", 5000))
 
     with pytest.raises(WrongArchive, match="it is damaged"):
@@ -157,7 +157,10 @@ def test_what_was_cut_off_is_no_archive(tmp_path):
 
 
 def test_the_word_at_the_end_is_waited_for(tmp_path):
-    """The tar ends before its command does, and the exit code comes last."""
+    """The tar archive ends before the command in the pod does.
+
+    The exit code comes last and may be an error.
+    """
 
     def chunks():
         yield from archive(member("model.zip", 0))

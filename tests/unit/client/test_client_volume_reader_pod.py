@@ -1,4 +1,4 @@
-"""The pod that reads a volume is as restricted as the run's own, reads one folder and ends by itself."""
+"""The pod that reads a volume is as restricted as the run's pod, reads one folder and ends by itself."""
 
 import pytest
 
@@ -12,25 +12,25 @@ SCHEDULING = {"nodeSelector": {"pool": "robots"}, "tolerations": [{"key": "robot
 
 @pytest.fixture
 def job():
-    """A job for certain nodes."""
+    """Return a job that runs only on certain nodes."""
     return identified(running_job(spec={"scheduling": SCHEDULING}), UID)
 
 
 @pytest.fixture
 def template(job):
-    """The template of its Job, as planned."""
+    """Return the pod template of the planned Job."""
     images = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
     return plan(job, ClusterLayout(images=images)).replicas[0].job["spec"]["template"]
 
 
 @pytest.fixture
 def pod(job, template):
-    """The pod."""
+    """Return the pod that reads the volume of the run."""
     return reading_pod(job, template, "job-0-fetch-abc", lives_s=600)
 
 
 def test_it_mounts_the_run_and_nothing_else_for_reading_only(pod):
-    """A fetch cannot damage a run."""
+    """`palaestra fetch` must not be able to damage a run."""
     [container] = pod["spec"]["containers"]
 
     assert [each["name"] for each in pod["spec"]["volumes"]] == ["run"]
@@ -39,7 +39,7 @@ def test_it_mounts_the_run_and_nothing_else_for_reading_only(pod):
 
 
 def test_it_meets_restricted_and_holds_no_token(pod, template):
-    """Therefore the pod is admitted in every namespace in which the run's own pod was."""
+    """Every namespace that admitted the run's pod then admits this pod too."""
     [container] = pod["spec"]["containers"]
 
     assert pod["spec"]["securityContext"] == template["spec"]["securityContext"]
@@ -50,14 +50,14 @@ def test_it_meets_restricted_and_holds_no_token(pod, template):
 
 
 def test_it_has_the_trainers_image_and_its_nodes(pod):
-    """The node has this image already, and the volume can be mounted there."""
+    """The nodes of the run have this image already, and they can mount the volume."""
     assert pod["spec"]["containers"][0]["image"] == "trainer:1"
     assert pod["spec"]["nodeSelector"] == SCHEDULING["nodeSelector"]
     assert pod["spec"]["tolerations"][0]["key"] == "robots"
 
 
 def test_it_ends_by_itself_and_goes_with_the_job(pod):
-    """The client that created it may be killed before it deletes it."""
+    """The client may be killed before it deletes the pod."""
     [owner] = pod["metadata"]["ownerReferences"]
 
     assert pod["spec"]["activeDeadlineSeconds"] == 600
@@ -66,14 +66,14 @@ def test_it_ends_by_itself_and_goes_with_the_job(pod):
 
 
 def test_it_is_not_taken_for_a_pod_of_the_job(pod):
-    """Neither the operator, which counts pods by their label, nor a Job that adopts pods may take it."""
+    """The operator counts pods by these labels, and a Job adopts pods by them."""
     assert not {"palaestra.dev/job", "palaestra.dev/replica", "batch.kubernetes.io/job-name"} & set(
         pod["metadata"]["labels"]
     )
 
 
 def test_the_template_is_left_as_it_was(job, template):
-    """Like planning, this function does not change its arguments."""
+    """The caller still uses the template, so the function must not change it."""
     before = repr(template)
 
     reading_pod(job, template, "a", lives_s=1)
@@ -82,5 +82,5 @@ def test_the_template_is_left_as_it_was(job, template):
 
 
 def test_the_run_directory_is_the_trainers(template):
-    """The path comes from the trainer's own configuration and is not passed a second time."""
+    """The path comes from the trainer's configuration in the template, so both always agree."""
     assert run_directory(template) == f"/var/lib/palaestra/{UID}/0"

@@ -1,4 +1,4 @@
-"""The lines for a person who waits for a job."""
+"""The lines that a client prints for a person who waits for a job."""
 
 import pytest
 
@@ -20,7 +20,7 @@ LINE = (
 
 @pytest.fixture
 def news():
-    """Return the lines about a status with these replicas, given those before it."""
+    """Return a function that takes the replicas of the next status and returns the new lines."""
     kept = News("lab/job")
 
     def of(*replicas, phase="Pending"):
@@ -30,19 +30,19 @@ def news():
 
 
 def test_a_reason_to_wait_is_reported_with_since_when_and_the_words_of_the_kubelet(news):
-    """A typo in an image kept a job waiting for hours, and only the word Pending was shown."""
+    """A job with a typo in its image waited for hours, and the user saw only `Pending`."""
     assert news(WAITS) == ["lab/job: Pending", LINE]
 
 
 def test_what_did_not_change_is_reported_once(news):
-    """A status is read every two seconds."""
+    """The client reads the status every two seconds and must not repeat a line."""
     news(WAITS)
 
     assert news(WAITS) == []
 
 
 def test_phrases_that_alternate_are_reported_once_each(news):
-    """A kubelet alternates between a try and a wait, and the wait grows each time."""
+    """The kubelet's message alternates between a pull error and a back-off time, which grows."""
     other = WAITS | {"message": "container trainer: image a:1 cannot be pulled (back-off 10s)"}
     longer = WAITS | {"message": "container trainer: image a:1 cannot be pulled (back-off 20s)"}
 
@@ -52,7 +52,7 @@ def test_phrases_that_alternate_are_reported_once_each(news):
 
 
 def test_a_reason_that_comes_back_is_reported_again(news):
-    """The reason applies again from now on."""
+    """The replica trained in between, so this is a new wait with its own start time."""
     news(WAITS)
     news(WAITS | {"phase": "Running", "reason": "Training"}, phase="Running")
 
@@ -64,7 +64,7 @@ def test_a_reason_that_comes_back_is_reported_again(news):
 
 @pytest.mark.parametrize("reason", ["Queued", "SecretMissing", "Unschedulable", "OfANewerRelease"])
 def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
-    """A reason of another release is included."""
+    """Reasons that this release does not know are included."""
     [_, line] = news(WAITS | {"reason": reason})
 
     assert f": {reason} since" in line
@@ -80,7 +80,7 @@ def test_every_hold_and_trouble_is_a_reason_to_wait(news, reason):
     ],
 )
 def test_steps_on_the_way_and_ends_are_no_reason_to_wait(news, replica):
-    """The line about the job's phase already reports such replicas."""
+    """For these replicas, the line with the phase of the job is enough."""
     assert news(replica) == ["lab/job: Pending"]
 
 

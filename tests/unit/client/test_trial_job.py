@@ -1,4 +1,4 @@
-"""The job that `palaestra try` makes of a user's job, and its report of the end."""
+"""The job that `palaestra try` creates from a user's job, and the report of its end."""
 
 import pytest
 
@@ -7,13 +7,13 @@ from palaestra.smoke_test import TrialFailed, attempt
 
 
 class Server:
-    """An API server that gives every job its status at once, and keeps the created object."""
+    """An API server that gives every created job a fixed status at once, and keeps the created object."""
 
     def __init__(self, **status):
         self.status = {"phase": "Succeeded", **status}
 
     def create(self, _, obj):
-        """Keep the object, and return it as stored."""
+        """Keep the object, and return it as the API server would store it."""
         self.made = obj
         return {**obj, "metadata": {"namespace": "lab", "name": "trial-x", "uid": "u"}}
 
@@ -36,9 +36,9 @@ class Server:
     ],
 )
 def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, created):
-    """A trial sets `Delete` unless its author has set something.
+    """A trial sets `retain: Delete`, unless the author of the job has set `retain` or `existingClaim`.
 
-    `Delete` is refused with an existing claim.
+    The API refuses `Delete` together with an existing claim.
     """
     server = Server()
     spec = {"storage": written} if written else {}
@@ -53,7 +53,7 @@ def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, 
     [("Pending", "True", "Running"), ("Pending", "False", "Accepted"), ("Failed", "True", "Failed")],
 )
 def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted, subject, monkeypatch):
-    """The other conditions only refer to that one."""
+    """Only one condition has the whole message; the others refer to it."""
     conditions = [
         {
             "type": kind,

@@ -1,4 +1,4 @@
-"""The proxy for a server comes from the environment, by the rules of Go."""
+"""The proxy for a server comes from environment variables, which are read by the rules of Go."""
 
 import pytest
 
@@ -43,7 +43,7 @@ from palaestra.cluster.proxies import Proxy, connects_directly, proxy_named, pro
     ],
 )
 def test_no_proxy_is_read_as_go_does(exceptions, host, direct):
-    """NO_PROXY has networks, ports and subdomains; this machine itself never needs a proxy."""
+    """NO_PROXY may list networks, ports and subdomains; connections to this machine never use a proxy."""
     assert connects_directly(host, 6443, exceptions) is direct
 
 
@@ -60,7 +60,7 @@ def test_no_proxy_is_read_as_go_does(exceptions, host, direct):
     ],
 )
 def test_a_proxy_is_named_in_every_form_of_curl(text, proxy):
-    """A missing port is the usual one of the scheme."""
+    """If the port is missing, the default port of the scheme is used."""
     assert proxy_named(text, "HTTPS_PROXY") == proxy
 
 
@@ -88,7 +88,7 @@ def test_what_is_no_proxy_is_refused_without_its_password(text):
     ],
 )
 def test_the_variables_are_those_of_go(environment, server, address):
-    """The upper-case variables win, an empty one counts as unset, and ALL_PROXY is not used."""
+    """The upper-case variable has priority, an empty variable counts as unset, and ALL_PROXY is ignored."""
     found = proxy_of_environment(server, environment | {"ALL_PROXY": "http://never"})
 
     assert (found.address if found else None) == address

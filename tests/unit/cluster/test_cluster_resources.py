@@ -1,4 +1,4 @@
-"""Kinds of objects and their addresses."""
+"""Kinds of Kubernetes objects, and their URL paths at the API server."""
 
 import pytest
 
@@ -30,23 +30,23 @@ from palaestra.cluster.errors import (
     ],
 )
 def test_an_address_is_made_of_group_namespace_and_name(resource, namespace, name, address):
-    """The core group has a root of its own."""
+    """The paths of the core group begin with `/api`, those of other groups with `/apis`."""
     assert resource.address(namespace, name) == address
 
 
 def test_a_name_cannot_lead_to_another_address():
-    """Names come from users' objects, so they are not trusted."""
+    """Users choose the names of objects, so a name must not change the path of a request."""
     assert resources.PODS.address("n", "../secrets/x?y") == "/api/v1/namespaces/n/pods/..%2Fsecrets%2Fx%3Fy"
 
 
 @pytest.mark.parametrize("resource", resources.ALL, ids=lambda resource: resource.plural)
 def test_an_object_names_its_resource(resource):
-    """Planned objects have their kind and version, which identify the resource."""
+    """A planned object has a kind and a version, which identify its resource."""
     assert resources.resource_of({"apiVersion": resource.api_version, "kind": resource.kind}) == resource
 
 
 def test_a_kind_that_the_operator_does_not_use_is_refused_by_name():
-    """The operator has no permission for such a kind either."""
+    """The operator has no permission for such a kind, so a plan that contains it is a bug."""
     with pytest.raises(KeyError, match="apps/v1 Deployment"):
         resources.resource_of({"apiVersion": "apps/v1", "kind": "Deployment"})
 
@@ -68,7 +68,7 @@ def test_a_kind_that_the_operator_does_not_use_is_refused_by_name():
     ],
 )
 def test_each_refusal_has_its_error(code, reason, error):
-    """409 has two meanings, which only the reason distinguishes."""
+    """The code 409 has two meanings, which only the reason distinguishes."""
     found = from_status(code, {"reason": reason, "message": "m"})
 
     assert type(found) is error
@@ -76,7 +76,10 @@ def test_each_refusal_has_its_error(code, reason, error):
 
 
 def test_a_terminating_namespace_is_distinguished_from_a_missing_right():
-    """Both are 403 and Forbidden; the one ends with the namespace, the other needs a person."""
+    """Both responses are 403 Forbidden.
+
+    A terminating namespace needs no action; a missing permission needs a person.
+    """
     causes = [{"reason": "NamespaceTerminating", "message": "namespace lab is being terminated"}]
 
     found = from_status(403, {"reason": "Forbidden", "message": "m", "details": {"causes": causes}})
@@ -89,10 +92,10 @@ def test_a_terminating_namespace_is_distinguished_from_a_missing_right():
     ("header", "seconds"), [("7", 7), (None, 1), ("Wed, 21 Oct 2026 07:28:00 GMT", 1), ("-3", 0)]
 )
 def test_the_wait_that_a_busy_server_asks_for_is_read(header, seconds):
-    """A proxy may send any value."""
+    """A proxy may send any value in the header `Retry-After`."""
     assert from_status(429, {}, header).retry_after_s == seconds
 
 
 def test_a_status_without_anything_still_says_what_happened():
-    """A proxy may respond without a Status object."""
+    """A proxy may respond without a Status object; the error then has the HTTP code."""
     assert str(from_status(502, {})) == "HTTP502 (502): the API server gave no message"

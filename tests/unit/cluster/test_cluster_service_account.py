@@ -1,4 +1,4 @@
-"""A pod's service account: the address of the API server, and a token that kubelets replace."""
+"""A pod's service account gives the address of the API server, and a token that the kubelet renews."""
 
 import pytest
 from urllib3 import ProxyManager
@@ -11,7 +11,7 @@ from tests.control_plane.certificates import Authority
 
 @pytest.fixture(scope="module")
 def authority(tmp_path_factory):
-    """The certificate of a certificate authority."""
+    """Return the certificate of a certificate authority."""
     return Authority.create(tmp_path_factory.mktemp("authority")).pair.certificate.read_bytes()
 
 
@@ -33,7 +33,7 @@ class Clock:
     now_s = 100.0
 
     def __call__(self):
-        """Return the seconds."""
+        """Return the current time in seconds."""
         return self.now_s
 
 
@@ -41,14 +41,14 @@ class Clock:
     ("host", "address"), [("10.96.0.1", "https://10.96.0.1:443"), ("fd00::1", "https://[fd00::1]:443")]
 )
 def test_the_environment_names_the_api_server(files, monkeypatch, host, address):
-    """The address may be IPv4 or IPv6."""
+    """An IPv6 address needs brackets in the URL."""
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", host)
 
     assert account(files).host == address
 
 
 def test_a_token_that_was_replaced_is_sent_within_a_minute(files):
-    """Kubelets replace it after four fifths of its lifetime, and an API server refuses an expired one."""
+    """The kubelet renews a token after 80% of its lifetime, and the API server refuses an expired one."""
     clock = Clock()
     header = account(files, clock).authorization
     before = header()
@@ -61,7 +61,7 @@ def test_a_token_that_was_replaced_is_sent_within_a_minute(files):
 
 
 def test_a_token_that_cannot_be_read_is_no_end(files):
-    """Requests fail and are retried; they succeed when the token is readable again."""
+    """Requests fail and are retried until the token is readable again."""
     clock = Clock()
     header = account(files, clock).authorization
     (files / "token").rename(files / "elsewhere")
@@ -83,7 +83,7 @@ def test_a_pod_without_an_account_is_refused(files, lost):
 
 
 def test_an_authority_that_is_none_is_refused(files):
-    """An error of ssl would end the operator without the name of the file."""
+    """Without this check the operator would end with an error of `ssl`, which does not name the file."""
     (files / "ca.crt").write_text("nothing")
 
     with pytest.raises(NotConfigured, match="is not a certificate"):
@@ -91,7 +91,7 @@ def test_an_authority_that_is_none_is_refused(files):
 
 
 def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_path):
-    """Clusters renew their authorities while the operator runs."""
+    """A cluster may renew its certificate authority while the operator runs."""
     clock = Clock()
     access_of = account(files, clock)
     other = tmp_path / "other"
@@ -108,7 +108,7 @@ def test_an_authority_that_was_replaced_is_trusted_within_a_minute(files, tmp_pa
 
 
 def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
-    """On a laptop there is no account, whatever files exist."""
+    """A laptop may have such files, but it is not in a pod and has no service account."""
     monkeypatch.delenv("KUBERNETES_SERVICE_HOST")
 
     with pytest.raises(NotConfigured, match="KUBERNETES_SERVICE_HOST"):
@@ -121,7 +121,7 @@ def test_outside_of_a_pod_there_is_no_account(files, monkeypatch):
     ids=["none", "for all", "not for the cluster's network"],
 )
 def test_a_proxy_of_the_environment_is_used_but_where_it_says_not(files, monkeypatch, proxy, direct, proxied):
-    """The program kubectl does the same, also with networks in NO_PROXY."""
+    """`kubectl` obeys the same variables, also if NO_PROXY lists networks."""
     if proxy:
         monkeypatch.setenv("HTTPS_PROXY", proxy)
     monkeypatch.setenv("NO_PROXY", direct)

@@ -1,4 +1,4 @@
-"""The cache finds objects by name and label, shares none of them, and holds the version that was put last."""
+"""The cache finds objects by name and label, returns copies, and holds the last version of each object."""
 
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -12,13 +12,13 @@ labels = st.dictionaries(st.sampled_from([JOB_LABEL, "role"]), st.sampled_from("
 
 
 def make_object(name="a", namespace="n1", **labels):
-    """Return an object with labels; `job` is the label that is indexed."""
+    """Return an object with labels; `job` stands for the label that has an index."""
     marks = {JOB_LABEL if key == "job" else key: value for key, value in labels.items()}
     return {"metadata": {"name": name, "namespace": namespace, "labels": marks}}
 
 
 class Cache(RuleBasedStateMachine):
-    """Puts and drops in any order give the same results as a dict."""
+    """Insertions and removals in any order give the same results as in a dict."""
 
     def __init__(self):
         super().__init__()
@@ -27,7 +27,7 @@ class Cache(RuleBasedStateMachine):
 
     @rule(namespace=namespaces, name=names, labels=labels)
     def put(self, namespace, name, labels):
-        """Put a new object, or an old one with other labels."""
+        """Insert a new object, or a new version with other labels."""
         obj = {"metadata": {"name": name, "namespace": namespace, "labels": labels}}
 
         assert self.store.put(obj) == (self.model.get((namespace, name)) != obj)
@@ -35,12 +35,12 @@ class Cache(RuleBasedStateMachine):
 
     @rule(namespace=namespaces, name=names)
     def drop(self, namespace, name):
-        """Drop an object."""
+        """Remove an object."""
         assert self.store.drop(namespace, name) == self.model.pop((namespace, name), None)
 
     @rule(namespace=st.none() | namespaces, wanted=labels)
     def select(self, namespace, wanted):
-        """A selection is the same with and without the index."""
+        """A selection by labels gives the same objects with and without the index."""
         found = self.store.select(namespace, wanted)
 
         assert found == [
@@ -51,7 +51,7 @@ class Cache(RuleBasedStateMachine):
 
     @invariant()
     def holds_what_was_put(self):
-        """The cache holds these objects and no others."""
+        """The cache holds exactly the objects of the model."""
         assert self.store.keys() == self.model.keys()
         assert len(self.store) == len(self.model)
         assert all(self.store.get(*key) == obj for key, obj in self.model.items())
@@ -62,7 +62,7 @@ TestCache = Cache.TestCase
 
 
 def test_what_a_reader_changes_nobody_else_sees():
-    """Otherwise a change by one reader would give wrong data to the next."""
+    """If readers shared an object, one reader's change would give wrong data to the next reader."""
     store = Store()
     store.put(make_object(job="x"))
 
@@ -72,7 +72,7 @@ def test_what_a_reader_changes_nobody_else_sees():
 
 
 def test_objects_outside_of_namespaces_are_found_without_one():
-    """Nodes have no namespace."""
+    """Cluster-scoped objects such as nodes have no namespace."""
     store = Store()
     store.put({"metadata": {"name": "node"}})
 
@@ -80,7 +80,7 @@ def test_objects_outside_of_namespaces_are_found_without_one():
 
 
 def test_nothing_remains_of_what_was_dropped():
-    """An operator that has seen a million jobs must not have grown."""
+    """An operator that has seen a million jobs must not use more memory than a new one."""
     store = Store()
     for number in range(1000):
         store.put(make_object(f"o{number}", f"n{number}", job=f"j{number}"))
@@ -91,7 +91,7 @@ def test_nothing_remains_of_what_was_dropped():
 
 
 def test_an_object_whose_job_label_changes_is_returned_as_it_was_before():
-    """Both jobs are reconciled: the one that lost the object, and the one that got it."""
+    """Both jobs must be reconciled: the job that lost the object and the job that received it."""
     store = Store()
     store.put(make_object(job="x"))
 

@@ -1,4 +1,4 @@
-"""Waits between attempts double up to a cap, and are spread by chance."""
+"""Waits between attempts double up to a cap; a random part spreads the attempts of different clients."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +11,7 @@ chances = st.floats(min_value=0, max_value=1, exclude_max=True)
 
 @given(failures=st.integers(min_value=-1, max_value=10**9), chance=chances)
 def test_a_wait_is_never_shorter_than_half_the_first_nor_longer_than_the_cap(failures, chance):
-    """A thousand failures in a row cause neither an overflow nor an endless wait."""
+    """A thousand consecutive failures must cause neither an overflow nor an endless wait."""
     backoff = Backoff(first_s=0.5, cap_s=30, chance=lambda: chance)
 
     assert 0.25 <= backoff.wait_s(failures) <= 30
@@ -19,14 +19,14 @@ def test_a_wait_is_never_shorter_than_half_the_first_nor_longer_than_the_cap(fai
 
 @given(failures=st.integers(min_value=1, max_value=100))
 def test_without_chance_each_wait_is_twice_the_one_before_until_the_cap(failures):
-    """A lasting problem must cost the API server fewer and fewer requests."""
+    """During a lasting problem the API server receives fewer and fewer requests."""
     backoff = Backoff(first_s=0.5, cap_s=30, chance=lambda: 0.0)
 
     assert backoff.wait_s(failures + 1) == min(2 * backoff.wait_s(failures), 30)
 
 
 def test_two_clients_that_fail_together_do_not_come_back_together():
-    """The random part shortens a wait by up to half."""
+    """A random part shortens each wait by up to half, so the retries of many clients are spread."""
     early = Backoff(first_s=1, cap_s=60, chance=lambda: 0.99)
     late = Backoff(first_s=1, cap_s=60, chance=lambda: 0.0)
 

@@ -1,4 +1,4 @@
-"""The work queue holds each name once, gives it to one worker at a time, and loses none."""
+"""The work queue holds each name once, gives it to only one worker at a time, and loses no name."""
 
 import threading
 import time
@@ -15,14 +15,14 @@ KEYS = st.sampled_from("abc")
 
 
 class Workers(RuleBasedStateMachine):
-    """Adding, working, failing and waiting in any order, compared with a model of plain sets."""
+    """Workers add, take, finish and retry keys in any order; a model of plain sets predicts the result."""
 
     def __init__(self):
         super().__init__()
         self.now = 0.0
         self.queue = WorkQueue(again=Backoff(first_s=2, cap_s=8, chance=lambda: 0.0), clock=lambda: self.now)
         self.working: set[str] = set()
-        self.owed: set[str] = set()  # added, and not taken by a worker since
+        self.owed: set[str] = set()  # added, and not yet taken by a worker
         self.due: dict[str, float] = {}
 
     @rule(key=KEYS)
@@ -39,7 +39,7 @@ class Workers(RuleBasedStateMachine):
 
     @rule(seconds=st.floats(min_value=0, max_value=10))
     def time_passes(self, seconds):
-        """Let time pass; keys that are due are then expected from the queue."""
+        """Advance the clock; the queue must then offer the keys that are due."""
         self.now += seconds
 
     @rule()
@@ -71,7 +71,7 @@ class Workers(RuleBasedStateMachine):
 
     @invariant()
     def the_depth_is_what_a_worker_could_take(self):
-        """The metric counts waiting keys, not those in work."""
+        """The metric counts waiting keys, without the keys that workers hold."""
         self._fall_due()
         assert self.queue.depth == len(self.owed - self.working)
 
@@ -86,7 +86,7 @@ TestWorkers = Workers.TestCase
 
 
 def test_names_are_handed_out_in_the_order_in_which_they_came():
-    """A job that changes all the time must not delay the others."""
+    """A job that changes constantly must not delay other jobs."""
     queue = WorkQueue()
     for key in "abab":
         queue.add(key)
@@ -95,7 +95,7 @@ def test_names_are_handed_out_in_the_order_in_which_they_came():
 
 
 def test_a_crowd_in_one_lane_delays_no_other_lane():
-    """A tenant with a thousand jobs gets one turn per round, as every other tenant does."""
+    """In each round every tenant gets one turn, also a tenant with a thousand jobs."""
     queue = WorkQueue(lane=lambda key: key[0])
     for key in ("a1", "a2", "a3", "b1", "b2", "c1"):
         queue.add(key)
@@ -107,7 +107,7 @@ def test_a_crowd_in_one_lane_delays_no_other_lane():
 
 
 def test_a_worker_that_waits_is_woken_by_work_that_falls_due():
-    """A worker must not have to poll for it."""
+    """A waiting worker must not have to poll the queue."""
     queue = WorkQueue()
     taken = []
     worker = threading.Thread(target=lambda: taken.append(queue.get(10)))
@@ -136,7 +136,7 @@ def test_closing_sends_every_worker_home_at_once():
 
 
 def test_nothing_is_handed_out_after_closing():
-    """The next leader does the rest: it reconciles every object anyway."""
+    """The remaining work is not lost: the next leader reconciles every object."""
     queue = WorkQueue()
     queue.add("a")
     queue.close()
@@ -145,7 +145,7 @@ def test_nothing_is_handed_out_after_closing():
 
 
 def test_success_makes_the_next_failure_the_first():
-    """A job that failed yesterday must not wait a minute today."""
+    """A job that failed yesterday must not wait a minute after its first failure today."""
     queue = WorkQueue(again=Backoff(first_s=1, cap_s=60, chance=lambda: 0.0))
     assert [queue.retry("a"), queue.retry("a")] == [1, 2]
 
@@ -155,7 +155,7 @@ def test_success_makes_the_next_failure_the_first():
 
 
 def test_the_time_that_a_name_waited_is_reported():
-    """The latency of the queue is a metric."""
+    """The operator exports the latency of the queue as a metric."""
     now, waited = [0.0], []
     queue = WorkQueue(waited=waited.append, clock=lambda: now[0])
     queue.add("a")
@@ -167,7 +167,7 @@ def test_the_time_that_a_name_waited_is_reported():
 
 
 def test_four_threads_do_every_change_and_never_one_name_together():
-    """The state machine shows the same for one thread; this test uses real ones."""
+    """The state machine above uses one thread; this test uses four."""
     queue, busy, done, together = WorkQueue(), set(), [], []
     lock = threading.Lock()
 

@@ -1,4 +1,4 @@
-"""The images that come with a node are archives that every container engine can read."""
+"""The images for a cluster's node are archives that every container engine can load."""
 
 import hashlib
 import json
@@ -12,7 +12,7 @@ from tests.cluster.archive import Image, write_archive
 
 @pytest.fixture
 def image(tmp_path):
-    """Return an image of one program, with a link to it and a library two folders deep."""
+    """Return an image with one program, a link to the program, and a library two folders deep."""
     program = tmp_path / "program"
     program.write_bytes(b"\x7fELF")
     library = tmp_path / "library"
@@ -33,12 +33,12 @@ def contents(path):
 
 
 def blob(files, descriptor):
-    """Return the target of a descriptor."""
+    """Return the content to which a descriptor refers."""
     return files["blobs/sha256/" + descriptor["digest"].removeprefix("sha256:")]
 
 
 def test_every_digest_is_that_of_the_content(image, tmp_path):
-    """An engine refuses an image whose digests are wrong."""
+    """A container engine refuses an image whose digests are wrong."""
     write_archive(image, tmp_path / "image.tar")
 
     blobs = {name: data for name, data in contents(tmp_path / "image.tar").items() if "/sha256/" in name}
@@ -48,7 +48,7 @@ def test_every_digest_is_that_of_the_content(image, tmp_path):
 
 
 def test_the_descriptors_lead_from_the_index_to_the_layer(image, tmp_path):
-    """Index, manifest, configuration and layer name each other, with the right sizes."""
+    """Index, manifest, configuration and layer refer to each other with the right digests and sizes."""
     write_archive(image, tmp_path / "image.tar")
     files = contents(tmp_path / "image.tar")
 
@@ -65,7 +65,7 @@ def test_the_descriptors_lead_from_the_index_to_the_layer(image, tmp_path):
 
 
 def test_the_layer_holds_files_links_and_each_folder_once(image, tmp_path):
-    """A folder that is missing or doubled makes some engines refuse the layer."""
+    """Some container engines refuse a layer in which a folder is missing or occurs twice."""
     write_archive(image, tmp_path / "image.tar")
     files = contents(tmp_path / "image.tar")
     manifest = json.loads(blob(files, json.loads(files["index.json"])["manifests"][0]))
@@ -81,7 +81,7 @@ def test_the_layer_holds_files_links_and_each_folder_once(image, tmp_path):
 
 
 def test_same_files_give_the_same_bytes(image, tmp_path):
-    """An archive is cached under a key of its content, so no time and no owner may be in it."""
+    """The cache key of an archive comes from its content, so it must not contain times or owners."""
     write_archive(image, tmp_path / "first.tar")
     write_archive(image, tmp_path / "second.tar")
 

@@ -1,4 +1,4 @@
-"""The state that `make e2e` leaves: its own script runs with programs that record their calls."""
+"""The state after `make e2e`: the real e2e.sh runs with fake programs that record their calls."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ from tests.waiting import eventually
 
 CLUSTER = Path(__file__).parents[2] / "cluster"
 END_S = 30
-CLEANING_S = 0.3  # time in which interrupted tests clean up; nothing else may be removed meanwhile
+CLEANING_S = 0.3  # duration of the cleanup of interrupted tests; the cluster must exist until its end
 INTERRUPTED = 130
 TOLD = 'echo "$(basename "$0")" >>"$CALLS"\n'
 PROGRAMS = {
@@ -25,8 +25,8 @@ PROGRAMS = {
     "tools/images.sh": "echo stub=stub.tar",
     "bin/kubectl": "",
 }
-# The shebang line names the interpreter itself, because a checkout's path may have a space and the line may
-# not. As with pytest, Ctrl-C interrupts the tests only where that was not disabled, and they then clean up.
+# The shebang line names the interpreter and not the checkout's virtual environment, whose path may contain
+# a space. Like pytest, this program cleans up after Ctrl-C, unless the signal is ignored.
 TESTS = f"""#!{os.path.realpath(sys.executable)} -IS
 import os, signal, sys, time
 
@@ -47,7 +47,7 @@ except KeyboardInterrupt:
 
 
 class E2e:
-    """A copy of the script in its own folder; `calls` are the calls that it made, in order."""
+    """A copy of e2e.sh in its own folder; `calls` lists the calls that it made, in order."""
 
     def __init__(self, folder):
         self.cache = folder / "cache"
@@ -61,9 +61,9 @@ class E2e:
 
     @contextmanager
     def started(self, tests_end, **environment):
-        """Run the script and kill all its processes at the end.
+        """Run the script, and kill all its processes at the end.
 
-        The tests exit with `tests_end`, or run on if it is empty.
+        The tests exit with the code `tests_end`; if it is empty, they run until they are interrupted.
         """
         kept = {name: value for name, value in os.environ.items() if name in {"PATH", "HOME", "LANG"}}
         own = {"PALAESTRA_CACHE": str(self.cache), "CALLS": str(self._calls), "TESTS_END": tests_end}
@@ -90,7 +90,7 @@ class E2e:
         return self._calls.read_text().split() if self._calls.exists() else []
 
     def stands(self, *, by_e2e):
-        """Create the files of a running cluster, which a person or a killed run of the script has started."""
+        """Create the files of a running cluster that a person, or a killed run of the script, started."""
         state = self.cache / "kind"
         state.mkdir(parents=True)
         (state / "way").touch()
@@ -106,13 +106,13 @@ class E2e:
 
 @pytest.fixture
 def e2e(tmp_path):
-    """The script, with no cluster yet."""
+    """Return the script without a running cluster."""
     return E2e(tmp_path)
 
 
 @pytest.mark.parametrize("code", ["0", "1"])
 def test_the_cluster_goes_however_the_tests_end(e2e, code):
-    """The caller gets the exit code of the tests."""
+    """The script returns the exit code of the tests and removes the cluster that it started."""
     assert e2e.run(code) == int(code)
 
     assert e2e.calls == ["up.sh", "tests", "down.sh"]
@@ -131,7 +131,7 @@ def terminate(process):
 
 @pytest.mark.parametrize("stop", [ctrl_c, terminate])
 def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop):
-    """The tests are interrupted only once: a second interruption would cut their cleanup short."""
+    """The tests are interrupted only once, because a second interruption would stop their cleanup."""
     with e2e.started(tests_end="") as process:
         eventually(lambda: "tests" in e2e.calls)
         stop(process)
@@ -157,7 +157,7 @@ def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
 
 
 def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
-    """The cluster, which was started meanwhile, is removed too."""
+    """The script starts the cluster during the build of the images, so it must remove the cluster too."""
     (tmp_path / "tools/images.sh").write_text("#!/bin/sh\nexit 1\n")
 
     assert e2e.run() == 1
@@ -166,7 +166,7 @@ def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
 
 
 def test_what_a_killed_run_left_behind_goes_first(e2e):
-    """A mark shows that the killed run had started the cluster, so nobody needs it."""
+    """The file `by-e2e` shows that the killed run started the cluster, so nobody uses it."""
     e2e.stands(by_e2e=True)
 
     assert e2e.run() == 0
@@ -175,7 +175,7 @@ def test_what_a_killed_run_left_behind_goes_first(e2e):
 
 
 def test_a_cluster_that_stood_before_is_left(e2e):
-    """A person has started it."""
+    """A person started this cluster and may still use it."""
     e2e.stands(by_e2e=False)
 
     assert e2e.run("1") == 1
@@ -184,7 +184,7 @@ def test_a_cluster_that_stood_before_is_left(e2e):
 
 
 def test_a_cluster_that_is_to_be_kept_is_not_taken_by_the_next_run(e2e):
-    """With KEEP=1 the cluster belongs to the person."""
+    """With KEEP=1 the cluster belongs to the person who ran the script."""
     assert e2e.run(KEEP="1") == 0
     assert e2e.run() == 0
 

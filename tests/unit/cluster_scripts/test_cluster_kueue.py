@@ -1,4 +1,4 @@
-"""The chart from tests/cluster/kueue.sh runs unchanged, with the image that comes with it."""
+"""The chart that tests/cluster/kueue.sh installs is Kueue's own, except for the name of its image."""
 
 import shutil
 import subprocess
@@ -34,7 +34,7 @@ viewer:
 
 
 def made(folder):
-    """Return the chart of the module as kueue.sh changes it."""
+    """Return the folder of Kueue's chart after the changes of kueue.sh."""
     shutil.copytree(definitions(KUEUE[0], "charts/kueue"), folder / "chart", copy_function=shutil.copyfile)
     (folder / "kueue").touch()
     files = (folder / "kueue", folder / "chart/values.yaml", folder / "image.tar")
@@ -43,7 +43,7 @@ def made(folder):
 
 
 def test_the_chart_names_the_image_that_is_made_with_it(tmp_path):
-    """The module's chart names a staging image that is always pulled; a node could not pull it."""
+    """Kueue's own chart names a staging image that is always pulled, which a node here could not do."""
     objects = yaml.safe_load_all(helm("template", "kueue", str(made(tmp_path))))
     deployments = [each["spec"]["template"]["spec"] for each in objects if each["kind"] == "Deployment"]
 
@@ -52,7 +52,7 @@ def test_the_chart_names_the_image_that_is_made_with_it(tmp_path):
 
 
 def test_nothing_else_of_the_values_changes():
-    """The image of another part and all comments stay."""
+    """The images of other components and all comments stay the same."""
     before, after = VALUES.splitlines(), released(VALUES).splitlines()
 
     changed = [new for old, new in zip(before, after, strict=True) if old != new]
@@ -61,6 +61,6 @@ def test_nothing_else_of_the_values_changes():
 
 
 def test_values_without_that_image_are_an_error():
-    """Another release of Kueue may name its image in another place, and its chart would stay unchanged."""
+    """Another release of Kueue may name its image elsewhere; without the error its chart would not change."""
     with pytest.raises(LookupError, match="has no repository of an image below controllerManager"):
         released("controllerManager: {}\n")

@@ -1,4 +1,4 @@
-"""The scripts of the cluster find the remains of a killed run, and report missing programs."""
+"""The cluster's scripts find the remains of a killed run, and report missing programs."""
 
 import os
 import shutil
@@ -33,20 +33,20 @@ def run(tmp_path):
 
 @pytest.fixture
 def shell(run):
-    """Return a function that runs a line of bash with the functions of settings.sh and processes.sh."""
+    """Return a function that runs a line of bash after it loads settings.sh and processes.sh."""
     return lambda line: run("bash", "-c", f"set -euo pipefail; . ./settings.sh; . ./processes.sh; {line}")
 
 
 @pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")
 def test_shellcheck_finds_nothing(run):
-    """The program shellcheck knows the pitfalls of quoting better than people do."""
+    """The linter shellcheck finds quoting mistakes that reviewers overlook."""
     result = run("shellcheck", "-x", *SCRIPTS)
 
     assert result.stdout == ""
 
 
 def test_a_recorded_process_is_found_while_it_runs(shell):
-    """The record stays valid after exec, so the engine can be found again."""
+    """The record stays valid after `exec`, so a script can find the cluster's container engine again."""
     result = shell("""
         (record_process "$CACHE.pid"; exec sleep 60) & started=$!
         wait_until 10 test -f "$CACHE.pid"
@@ -69,7 +69,7 @@ def test_another_process_with_the_recorded_id_is_left_alone(shell):
 
 
 def test_waiting_ends_at_its_deadline(shell):
-    """A cluster that hangs is an error, not an endless wait."""
+    """If a cluster hangs, the script reports an error and does not wait for ever."""
     assert shell("wait_until 1 false || echo late").stdout.strip() == "late"
 
 
@@ -86,7 +86,7 @@ def test_a_lock_is_not_passed_on_to_what_is_started(shell):
 
 
 def test_the_remains_of_a_cluster_are_an_error(run, tmp_path):
-    """The removal of a cluster ends with this check: a remaining process or folder is an error."""
+    """The removal of a cluster ends with leftovers.sh, which reports remaining processes and folders."""
     state = tmp_path / "cache/kind"
     state.mkdir(parents=True)
     (state / "way").touch()
@@ -103,7 +103,7 @@ def test_the_remains_of_a_cluster_are_an_error(run, tmp_path):
 
 
 def test_the_key_of_a_folder_changes_with_its_content_only(shell):
-    """Otherwise an outdated node image would be used, or a good one built again."""
+    """With a wrong key, a script would use an outdated node image or build a current one again."""
     result = shell(
         """
         mkdir -p "$CACHE"; HERE=$CACHE; mkdir a; echo 1 >a/x; echo 2 >a/y
@@ -135,7 +135,7 @@ def test_asking_for_built_programs_builds_nothing(run):
 def test_an_error_has_a_remedy(run, command, environment, message):
     """The message names the object, the fact and the remedy."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
-        pytest.skip("Go is installed beside the system's programs")
+        pytest.skip("Go is installed next to the system's programs")
 
     result = run(*command, **environment)
 
@@ -143,9 +143,9 @@ def test_an_error_has_a_remedy(run, command, environment, message):
     assert message in result.stderr
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can change to another user")
 def test_missing_packages_are_one_line_to_type_for_who_is_not_root(run):
-    """Nothing is installed without consent, and nothing is half done."""
+    """The script installs nothing without consent; it prints the one command to run."""
     nobody = ("setpriv", "--reuid", "65534", "--clear-groups")
     if run(*nobody, "test", "-r", CLUSTER / "settings.sh").returncode:
         pytest.skip("another user can't read this checkout")

@@ -1,4 +1,4 @@
-"""All files of the cluster name the same programs, versions, images and addresses."""
+"""All files of the test cluster name the same programs, versions, images and addresses."""
 
 import ipaddress
 import re
@@ -21,7 +21,7 @@ def go_mod(module):
 
 
 def image_names(tmp_path):
-    """Return the names of all images that come with a node, without building them."""
+    """Return the names of all images that a node is created with, without building them."""
     for folder in ("usr/lib/x86_64-linux-gnu/xtables", "usr/sbin"):
         (tmp_path / folder).mkdir(parents=True)
     kubernetes = images.version_of("kubernetes", "k8s.io/kubernetes")
@@ -31,7 +31,7 @@ def image_names(tmp_path):
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_module_has_the_packages_of_the_list_as_its_tools(module):
-    """`go mod tidy` keeps what a tool line names and drops everything else."""
+    """`go mod tidy` keeps the dependencies of a `tool` line and removes all others."""
     text = go_mod(module)
     block = re.search(r"^tool \((.*?)^\)", text, re.MULTILINE | re.DOTALL)
     tools = set(block[1].split()) if block else set(re.findall(r"^tool (\S+)$", text, re.MULTILINE))
@@ -40,7 +40,7 @@ def test_a_module_has_the_packages_of_the_list_as_its_tools(module):
 
 
 def test_the_parts_of_kubernetes_are_all_of_one_release():
-    """Staging modules of different releases compile together, but do not work."""
+    """Staging modules of different releases compile together, but the programs fail at run time."""
     release = images.version_of("kubernetes", "k8s.io/kubernetes").removeprefix("v1.")
 
     replaced = re.findall(
@@ -52,13 +52,13 @@ def test_the_parts_of_kubernetes_are_all_of_one_release():
 
 
 def test_a_version_that_no_module_asks_for_is_an_error():
-    """A wrong name must not give an image without a version."""
+    """Without the error a misspelled module would give an image without a version."""
     with pytest.raises(LookupError, match=r"programs/etcd/go\.mod does not ask for example\.org/other"):
         images.version_of("etcd", "example.org/other")
 
 
 def test_the_images_that_a_node_names_are_brought_along(tmp_path):
-    """A node would pull an image whose name has another version, and it cannot pull anything."""
+    """A node would try to pull an image of another version, and a node here cannot reach a registry."""
     node = "".join(path.read_text() for path in sorted((CLUSTER / "node").rglob("*")) if path.is_file())
     named = set(re.findall(r"(?:registry\.k8s\.io|palaestra\.dev)/[\w./-]+:v?\d[\w.-]*", node))
 
@@ -67,14 +67,14 @@ def test_the_images_that_a_node_names_are_brought_along(tmp_path):
 
 
 def test_kubeadm_is_configured_with_the_bundled_etcd(tmp_path):
-    """The default of kubeadm is another version."""
+    """By default kubeadm would use another version of etcd, which the node does not have."""
     tag = re.search(r"imageTag: ([\w.-]+)\}", (CLUSTER / "node/kind-patches.yaml").read_text())[1]
 
     assert f"registry.k8s.io/etcd:{tag}" in image_names(tmp_path)
 
 
 def test_the_page_about_queues_installs_the_kueue_that_is_tested():
-    """Another version may have other kinds, and was never tested."""
+    """A user must not install a version of Kueue with which no test ran."""
     page = (CLUSTER.parents[1] / "docs/howto/queues.md").read_text()
     version = images.version_of("kueue", "sigs.k8s.io/kueue").removeprefix("v")
 
@@ -82,7 +82,7 @@ def test_the_page_about_queues_installs_the_kueue_that_is_tested():
 
 
 def test_kueue_runs_as_nobody(tmp_path):
-    """Its chart refuses an image that runs as root, so the image here also runs as another user."""
+    """The security context of Kueue's chart refuses an image that runs as root."""
     image = manager(tmp_path / "kueue")
 
     assert image.name == f"registry.k8s.io/kueue/kueue:{images.version_of('kueue', 'sigs.k8s.io/kueue')}"
@@ -90,7 +90,7 @@ def test_kueue_runs_as_nobody(tmp_path):
 
 
 def test_every_address_is_from_the_block_kept_for_benchmarks():
-    """Addresses of a private network could clash with those of this machine's network."""
+    """An address of a private network could be in use in the network of this machine."""
     text = "".join(
         path.read_text()
         for path in sorted(CLUSTER.rglob("*"))

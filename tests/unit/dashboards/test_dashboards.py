@@ -1,4 +1,4 @@
-"""The dashboards and alerts, as far as they can be tested without Prometheus."""
+"""The dashboards and alerts, as far as tests can check them without Prometheus."""
 
 import json
 import re
@@ -17,12 +17,12 @@ COLUMNS = 24
 
 @pytest.fixture(params=DASHBOARDS, ids=lambda path: path.stem)
 def dashboard(request):
-    """Each dashboard as Grafana loads it."""
+    """Return each dashboard as Grafana loads it."""
     return json.loads(request.param.read_text())
 
 
 def test_a_panel_asks_a_question_and_says_what_to_do(dashboard):
-    """The person on call at night has not built the dashboard."""
+    """The person on call did not build the dashboard and needs an explanation of each panel."""
     for panel in panels(dashboard):
         assert panel["title"].endswith("?")
         assert len(panel["description"]) > 60, panel["title"]
@@ -45,7 +45,7 @@ def test_panels_stand_beside_each_other_and_have_numbers_of_their_own(dashboard)
 
 
 def test_a_row_is_filled(dashboard):
-    """A gap means that a panel was forgotten."""
+    """A gap in a row shows that the author forgot a panel."""
     width = {}
     for panel in panels(dashboard):
         width[panel["gridPos"]["y"]] = width.get(panel["gridPos"]["y"], 0) + panel["gridPos"]["w"]
@@ -54,7 +54,7 @@ def test_a_row_is_filled(dashboard):
 
 
 def test_a_query_uses_no_variable_that_its_dashboard_lacks(dashboard):
-    """Grafana sends a variable that it cannot replace unchanged, and the panel stays empty."""
+    """Grafana sends an unknown variable to Prometheus unchanged, and the panel stays empty."""
     values = values_of(dashboard, "30s", "1h")
 
     for panel in panels(dashboard):
@@ -74,7 +74,7 @@ def test_every_metric_that_is_queried_is_documented():
 
 
 def test_a_query_keeps_no_label_that_its_metrics_lack_and_names_none_that_it_drops():
-    """Prometheus accepts a missing label, and Grafana shows nothing in its place."""
+    """For a label that does not exist, Prometheus reports no error and Grafana shows an empty legend."""
     labels = labels_told()
     suffixes = re.compile("_(bucket|sum|count)$")
 
@@ -94,7 +94,7 @@ def labels_told():
 
 
 def test_an_alert_leads_to_what_to_do_about_it():
-    """The reader of a notification has only its link."""
+    """The receiver of a notification has only its link to find the remedy."""
     headings = re.findall(r"^## (\w+)$", (ROOT / "docs/howto/alerts.md").read_text(), re.MULTILINE)
 
     for rule in alerts():

@@ -1,7 +1,8 @@
-"""A scene holds a TrainingJob, its objects in an API server, and clocks that only tests move.
+"""A scene has a TrainingJob, its objects in a fake API server, and clocks that only tests move.
 
-`scene.step()` is one reconcile: it applies the decisions to the scene's own objects, as an API server would.
-A test plays the part of Kubernetes (pods, ends of Jobs) with the scene's methods.
+`scene.step()` is one reconcile: it executes the decided actions on the scene's objects, as the operator and
+an API server would. With the scene's other methods, a test does what Kubernetes does: it creates pods and
+ends Jobs.
 """
 
 from collections.abc import Callable
@@ -34,8 +35,7 @@ from tests.jobs import make_job
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
-# The world is minimal, because no decision depends on its content, and each decision generates the worlds
-# that are missing.
+# The world is minimal: no decision depends on its content, and each decision generates the missing worlds.
 WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
 GROUPS = (
     {"name": "collect", "role": "Collect", "world": WORLD},
@@ -50,7 +50,7 @@ LISTS = {
 
 
 class Scene:
-    """One TrainingJob `job` in an API server's memory."""
+    """One TrainingJob `job` and its objects, in memory."""
 
     def __init__(self, **spec: Any) -> None:
         named = {"namespace": "default", "uid": UID, "generation": 1}
@@ -58,7 +58,7 @@ class Scene:
         self.now = START  # the operator's wall clock, which somebody may set
         self.clock_s = 1000.0  # the operator's monotonic clock
         self.record = ReconcileRecord()
-        self.behind_s = 0.0  # how far the node's clock is behind the API server's
+        self.behind_s = 0.0  # delay of the node's clock behind the API server's
         self.server_s = 0.0  # the API server's clock, minus START
         self.layout = ClusterLayout(
             images=Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
@@ -74,7 +74,7 @@ class Scene:
         self.switchers: dict[str, str] = {}
         self.unadmitted: dict[str, str] = {}
         self.deleted = False
-        self.budget = False  # whether a disruption budget allows no eviction
+        self.budget = False  # whether a disruption budget forbids evictions
         self.pods_made = 0
 
     @property
@@ -91,7 +91,7 @@ class Scene:
         return next(each for each in self.objects["jobs"] if each["metadata"]["name"] == f"job-{index}")
 
     def decide(self) -> Decision:
-        """Return the decision on the current state; nothing is changed."""
+        """Return the decision on the current state, without executing it."""
         job = accept(deepcopy(self.raw))
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
         known = {"polled": self.polled, "denied": self.denied, "switchers": self.switchers}
@@ -102,7 +102,7 @@ class Scene:
         return decide(job, observed, prepare(job, observed, self.layout), times)
 
     def step(self, seconds: float = 0) -> Decision:
-        """Let time pass, decide once and carry it out."""
+        """Let time pass, decide once and execute the decision."""
         self.pass_(seconds)
         decision = self.decide()
         for action in decision.actions:
@@ -141,7 +141,7 @@ class Scene:
         return (START + timedelta(seconds=self.server_s + seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
 
     def node_stamp(self) -> str:
-        """Return the current time as a kubelet or a pod writes it."""
+        """Return the current time of the node's clock, as a kubelet or a pod writes it."""
         return self.stamp(-self.behind_s)
 
     def delete(self, pod: dict[str, Any], grace_s: int = 60) -> None:
@@ -177,7 +177,7 @@ class Scene:
         return pod
 
     def container(self, pod: dict[str, Any], name: str, **state: Any) -> None:
-        """Set the state of a container: running, waiting="Reason: words", code, reason, message, restarts."""
+        """Set the state of a container: running, waiting="Reason: message", code, message and so on."""
         field = "containerStatuses" if name == "trainer" else "initContainerStatuses"
         entry: dict[str, Any] = {"name": name, "restartCount": state.get("restarts", 0), "state": {}}
         ended = {
@@ -204,7 +204,7 @@ class Scene:
         pod["status"]["phase"] = "Failed" if code else "Succeeded"
 
     def take(self, pod: dict[str, Any], words: str = "preempted") -> None:
-        """Let the cluster evict a pod, which interrupts its trainer."""
+        """Let the cluster evict a pod, which interrupts its trainer with exit code 75."""
         self.end(pod, 75)
         pod["status"]["conditions"] = [
             {"type": "DisruptionTarget", "status": "True", "reason": "Preempted", "message": words}
@@ -222,7 +222,7 @@ class Scene:
         self.job(index).setdefault("status", {})["failed"] = number
 
     def poll(self, pod: dict[str, Any], **status: Any) -> None:
-        """Record a status of a pod's trainer, as polled now."""
+        """Record a response of a pod's trainer to a poll at the current time."""
         told = {"step": 0, "target": 100, "episodes": 0, "phase": "training", "attempt": 1} | status
         self.polled[pod["metadata"]["uid"]] = Polled(status=TrainerStatus(**told), at_s=self.clock_s)
 
@@ -267,14 +267,14 @@ def _merge(target: dict[str, Any], patch: dict[str, Any]) -> None:
 def make_scene() -> Callable[..., Scene]:
     """`make_scene(replicas=2)` returns a job that no operator has reconciled.
 
-    Keywords are fields of its spec.
+    The keywords are fields of its spec.
     """
     return Scene
 
 
 @pytest.fixture(scope="session")
 def accepted() -> Callable[..., Scene]:
-    """`accepted(replicas=2)` returns a job whose objects were created; it has no pod yet."""
+    """`accepted(replicas=2)` returns a job whose objects exist, without a pod."""
 
     def make(**spec: Any) -> Scene:
         scene = Scene(**spec)
@@ -300,7 +300,7 @@ def training() -> Callable[..., tuple[Scene, dict[str, Any]]]:
 
 @pytest.fixture(scope="session")
 def last_word() -> Callable[..., str]:
-    """`last_word(step=5)` returns a termination message."""
+    """`last_word(step=5)` returns a termination message of a trainer."""
 
     def write(**word: Any) -> str:
         return Termination(**({"step": 0, "reason": "Unexpected: it"} | word)).to_message()
@@ -310,7 +310,7 @@ def last_word() -> Callable[..., str]:
 
 @pytest.fixture(scope="session")
 def simulator() -> Callable[..., SimulatorStatus]:
-    """`simulator(state="failed")` returns a trainer's status of collect-0."""
+    """`simulator(state="failed")` returns the status of collect-0 as a trainer reports it."""
 
     def make(**told: Any) -> SimulatorStatus:
         return SimulatorStatus(**({"name": "collect-0", "role": "Collect", "state": "ready"} | told))

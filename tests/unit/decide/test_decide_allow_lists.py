@@ -1,6 +1,6 @@
-"""A job may freely set fields that affect only itself.
+"""A job may set fields that affect only its own pods.
 
-Fields that affect other people's pods must be allowed.
+An administrator must allow each field that affects pods of other users.
 """
 
 from dataclasses import replace
@@ -47,11 +47,11 @@ def expressions(key, operator, *values):
 
 
 def allow(value):
-    """Return the remedy that names a value of the chart."""
+    """Return the remedy that names one of the chart's values."""
     return f"allow it with the chart's value jobs.{value}, or create a new TrainingJob without it"
 
 
-# Fields that a job may not set by itself: scheduling, the value that allows it, field, fact and remedy.
+# Fields that an administrator must allow: scheduling, the value that allows it, field and fact, and remedy.
 REFUSED = {
     "a priority": (
         {"priorityClassName": "urgent"},
@@ -138,7 +138,7 @@ FREE = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it(make_scene, name):
-    """The author may be somebody who may not create pods; no object of the job is created."""
+    """If the author lacks the permission to create such pods, the operator must not create them for her."""
     scheduling, _, fact, remedy = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
 
@@ -152,7 +152,7 @@ def test_what_affects_others_is_held_with_its_field_and_the_value_that_allows_it
 
 @pytest.mark.parametrize("name", [name for name, (_, allowed, *_) in REFUSED.items() if allowed])
 def test_what_the_installation_allows_starts_the_job(make_scene, name):
-    """The administrator restarts the operator with the value."""
+    """An administrator sets the chart's value, which restarts the operator; the held job then starts."""
     scheduling, allowed, *_ = REFUSED[name]
     scene = make_scene(scheduling=scheduling)
     scene.settle()
@@ -165,7 +165,7 @@ def test_what_the_installation_allows_starts_the_job(make_scene, name):
 
 @pytest.mark.parametrize("name", FREE)
 def test_what_a_job_asks_for_itself_is_free(make_scene, name):
-    """Kubernetes' own documentation shows these fields."""
+    """The documentation of Kubernetes recommends these fields, and they affect only the job's own pods."""
     scene = make_scene(scheduling=FREE[name])
 
     decision = scene.settle()
@@ -184,7 +184,7 @@ def test_what_a_job_asks_for_itself_is_free(make_scene, name):
     ],
 )
 def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_scene, resources, free):
-    """Kubernetes' ExtendedResourceToleration does the same in clusters that enable it."""
+    """The admission plugin ExtendedResourceToleration of Kubernetes adds the same toleration."""
     scene = make_scene(scheduling={"tolerations": [GPU]}, trainer={"resources": resources})
 
     scene.settle()
@@ -194,7 +194,7 @@ def test_a_job_that_requests_a_gpu_tolerates_the_taint_of_nodes_with_gpus(make_s
 
 @pytest.mark.parametrize("key", ["node.kubernetes.io/unschedulable", "memory"])
 def test_a_resource_of_every_node_opens_no_taint(make_scene, key):
-    """A scheduler ignores unknown resources of kubernetes.io."""
+    """A scheduler ignores unknown resources of kubernetes.io, so a request for one proves nothing."""
     asks = {"resources": {"requests": {key: "1"}}}
     scene = make_scene(scheduling={"tolerations": [{"key": key, "operator": "Exists"}]}, trainer=asks)
 
@@ -215,7 +215,7 @@ def test_a_resource_of_every_node_opens_no_taint(make_scene, key):
     ],
 )
 def test_a_selector_of_pods_of_others_is_refused(make_scene, selector):
-    """The installation allows example.com/team; the selector must require that label, not exclude it."""
+    """The installation allows the label example.com/team, but these selectors also match pods without it."""
     scene = make_scene(scheduling=required("podAntiAffinity", labelSelector=selector))
     scene.layout = replace(scene.layout, allowed=Allowed(anti_affinity_labels=("example.com/team",)))
 
@@ -233,7 +233,7 @@ def test_a_selector_of_pods_of_others_is_refused(make_scene, selector):
     ],
 )
 def test_an_empty_name_hides_no_other(make_scene, scheduling):
-    """An API server refuses the pod for it today; the check must not depend on that."""
+    """Today the API server refuses a pod with an empty name; the check must not depend on that."""
     scene = make_scene(scheduling=scheduling)
 
     scene.settle()
@@ -258,7 +258,7 @@ VALUES = st.recursive(
 
 @given(st.dictionaries(st.sampled_from(["podAffinity", "podAntiAffinity"]), VALUES, max_size=2))
 def test_no_affinity_breaks_the_check(affinity):
-    """An affinity is a free object, so its values may have any type."""
+    """An affinity is a free object, so its values may have any type and must not crash the operator."""
     job = validate(make_job(scheduling={"affinity": affinity}))
 
     not_allowed(job, Allowed())

@@ -1,4 +1,4 @@
-"""The health check for Argo CD in docs/howto/gitops.md, run unchanged in the Lua version of Argo CD."""
+"""The health check for Argo CD in docs/howto/gitops.md, run unchanged with Argo CD's version of Lua."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.pages import blocks
 
 @pytest.fixture
 def health():
-    """`health(scene)` returns the status and the message that Argo CD shows for a scene's job."""
+    """`health(scene)` returns the status and the message that Argo CD shows for the job of a scene."""
     lua = lua51.LuaRuntime(unpack_returned_tuples=True)
     check = lua.eval(f"function(obj)\n{CHECK}\nend")
 
@@ -24,7 +24,7 @@ def health():
 
 
 def test_a_job_that_no_operator_has_seen_is_progressing(make_scene, health):
-    """Otherwise each new job would be healthy for a moment, and a sync wave would continue."""
+    """If a new job counted as healthy for a moment, Argo CD would start the next sync wave too early."""
     scene = make_scene()
 
     assert health(scene) == ("Progressing", "the operator has not seen this generation yet")
@@ -35,7 +35,7 @@ def test_a_job_that_no_operator_has_seen_is_progressing(make_scene, health):
 
 
 def test_a_job_that_starts_is_progressing_with_its_reason(accepted, health):
-    """The page of the application shows the message."""
+    """Argo CD shows the message on the page of the application."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
     scene.settle()
@@ -44,7 +44,7 @@ def test_a_job_that_starts_is_progressing_with_its_reason(accepted, health):
 
 
 def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, health):
-    """The application page then shows the remedy, and nobody has to open the TrainingJob."""
+    """Argo CD's page shows the remedy, so a user need not open the TrainingJob."""
     scene = make_scene(storage={"existingClaim": "runs"})
     scene.settle()
 
@@ -52,14 +52,14 @@ def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, heal
 
 
 def test_a_job_that_trains_is_healthy(training, health):
-    """`helm --wait` has the same rule."""
+    """`helm --wait` also returns as soon as the job trains."""
     scene, _ = training()
 
     assert health(scene) == ("Healthy", "Running")
 
 
 def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
-    """Argo CD has the status Suspended for it, and a sync wave waits no longer."""
+    """Argo CD has a status Suspended, with which a sync wave does not wait for the job."""
     scene = make_scene(suspend=True)
     scene.settle()
 
@@ -67,7 +67,7 @@ def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
 
 
 def test_a_job_that_failed_is_degraded_also_without_the_condition(training, last_word, health):
-    """A definition that lacks it does not take it."""
+    """An older CustomResourceDefinition does not accept the condition Stalled."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

@@ -1,4 +1,4 @@
-"""The record of the last attempt keeps its reason, last lines and faults after its pod is gone."""
+"""The status keeps the reason, the last lines and the faults of the last attempt after its pod is deleted."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from palaestra_protocol.pod.status import FaultRecord
 
 
 def last(scene):
-    """Return number, exit code and reason of the last attempt."""
+    """Return the number, the exit code and the reason of the last attempt."""
     kept = scene.replica().last_attempt
     return (kept.attempt, kept.exit_code, kept.reason)
 
@@ -18,14 +18,14 @@ def disrupted(decision):
 
 
 def test_the_first_attempt_has_none_before_it(training):
-    """The first attempt has no predecessor, so the field is absent."""
+    """During the first attempt no attempt has ended, so the field is absent."""
     scene, _ = training()
 
     assert scene.replica().last_attempt is None
 
 
 def test_the_last_lines_and_the_faults_outlive_the_pod(training, last_word):
-    """A pod's logs die with it."""
+    """Kubernetes deletes the logs of a pod together with the pod."""
     scene, pod = training()
     fault = FaultRecord(
         time="2026-01-31T11:59:00Z", simulator="collect-0", kind="hung", fact="no answer in 5 s", step=7
@@ -54,9 +54,9 @@ def test_the_last_lines_and_the_faults_outlive_the_pod(training, last_word):
 
 
 def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(training):
-    """Kubernetes puts that into the termination message.
+    """Kubernetes copies the end of the log into the termination message.
 
-    The last ten lines are kept, each of them shortened.
+    The status keeps its last ten lines and shortens each of them.
     """
     scene, pod = training()
     lines = [f"line {i}" for i in range(30)] + ["", "x" * 500]
@@ -71,9 +71,9 @@ def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(train
 
 
 def test_restarts_that_only_a_poll_reported_are_kept_at_once(accepted, simulator):
-    """They are kept even if the trainer had ended before its pod was first seen.
+    """The restarts count even if the trainer had ended when the operator first saw its pod.
 
-    A second reconcile adds nothing.
+    A second reconcile does not count them again.
     """
     scene = accepted(backoffLimit=5)
     pod = scene.running_pod()
@@ -90,7 +90,7 @@ def test_restarts_that_only_a_poll_reported_are_kept_at_once(accepted, simulator
 
 
 def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_groups):
-    """The trainer never started, so it has no log."""
+    """The trainer never started and has no log, so the init container's log has the cause."""
     scene = accepted(simulators=command_groups)
     pod = scene.new_pod()
     scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
@@ -116,7 +116,7 @@ def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_gro
     ],
 )
 def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
-    """By exit code and last word."""
+    """The exit code and the trainer's termination message determine the reason."""
     scene, pod = training()
     scene.end(pod, code, last_word(reason=word))
 
@@ -126,7 +126,7 @@ def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, w
 
 
 def test_a_trainer_that_was_killed_for_its_memory_did_not_just_end_with_137(training):
-    """The remedy for too little memory differs from that for other ends with 137."""
+    """Other kills have exit code 137 too, but only this one needs more memory."""
     scene, pod = training()
     scene.end(pod, 137, reason="OOMKilled")
 
@@ -136,18 +136,18 @@ def test_a_trainer_that_was_killed_for_its_memory_did_not_just_end_with_137(trai
 
 
 def evict(scene, pod):
-    """Let a drain evict the pod; its trainer saves and stops."""
+    """Let a drain evict the pod; its trainer saves a checkpoint and stops."""
     scene.take(pod, "Eviction API: evicting")
 
 
 def preempt(scene, pod):
-    """Let the scheduler preempt the pod; its trainer is too slow to save."""
+    """Let the scheduler preempt the pod; its trainer does not save in time."""
     scene.take(pod, "preempted")
     scene.end(pod, 137)
 
 
-def lose_with_its_node(scene, pod):  # noqa: ARG001 - all are called alike
-    """Delete the Node object of a node that is off: the garbage collector deletes the pod as it was."""
+def lose_with_its_node(scene, pod):  # noqa: ARG001 - the test calls all of them with the same arguments
+    """Delete the Node object of a node that is off: the garbage collector then deletes the pod unchanged."""
     pod["status"]["phase"] = "Failed"
     pod["status"]["conditions"] = [
         {"type": "DisruptionTarget", "status": "True", "reason": "DeletionByPodGC", "message": "node is gone"}
@@ -155,7 +155,7 @@ def lose_with_its_node(scene, pod):  # noqa: ARG001 - all are called alike
 
 
 def remove(scene, pod):
-    """Remove the pod before an operator sees how it ended."""
+    """Remove the pod before an operator sees its end."""
     scene.objects["pods"].remove(pod)
 
 
@@ -168,7 +168,7 @@ def delete(scene, pod):
 @pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
 @pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
 def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, take, looks):
-    """This holds for every cause, and also if the operator sees only the next pod."""
+    """Each disruption counts once, whatever its cause, even if the operator sees only the next pod."""
     scene, pod = training(backoffLimit=0)
     take(scene, pod)
     told = disrupted(scene.settle(5)) if looks else []
@@ -186,7 +186,7 @@ def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, t
 
 
 def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
-    """Kubernetes counts it as a failure, because only a person has deleted the pod."""
+    """The Job counts a failure, because the pod has no condition DisruptionTarget: a person deleted it."""
     scene, pod = training()
     pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
     scene.end(pod, 137)
@@ -203,7 +203,7 @@ def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
 
 
 def test_two_disruptions_in_a_row_are_two_events(training):
-    """They are two although the replica only waited for a pod in between."""
+    """The replica did not train between the two disruptions, but each of them must emit an event."""
     scene, pod = training()
     evict(scene, pod)
     told = disrupted(scene.settle(5))
@@ -216,7 +216,7 @@ def test_two_disruptions_in_a_row_are_two_events(training):
 
 
 def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
-    """The operator was away for the other attempts."""
+    """The operator did not run while two attempts ended; the status has the later one."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: first"))
     scene.pass_(15)
@@ -231,7 +231,7 @@ def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
 
 
 def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, last_word):
-    """The pod that the status names was deleted; a failed one before it was not."""
+    """The last pod was deleted, but a failed pod of an earlier attempt still exists."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -249,7 +249,7 @@ def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, la
 
 
 def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
-    """The Job has counted its failure, so it is reported as a failure."""
+    """Somebody deleted the failed pod; the Job has counted its failure, so the status reports a failure."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.count_failures(1)
@@ -262,7 +262,7 @@ def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
 
 
 def test_a_suspended_attempt_ended_by_suspension(training):
-    """The pod was deleted because a user suspended the job."""
+    """Kubernetes deleted the pod because a user suspended the job, so no disruption is reported."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -275,7 +275,7 @@ def test_a_suspended_attempt_ended_by_suspension(training):
 
 
 def test_an_attempt_that_kueue_took_back_says_so(make_scene):
-    """Kueue suspends a Job to make room for another; the trainer has saved."""
+    """Kueue suspended the Job to admit another one; the trainer saved a checkpoint before it ended."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -295,7 +295,10 @@ def test_an_attempt_that_kueue_took_back_says_so(make_scene):
 
 
 def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(training, last_word):
-    """A replica has failed as soon as its Job is stopped; the last lines of its trainer are still kept."""
+    """A replica fails as soon as the operator stops its Job.
+
+    The last lines arrive when its trainer ends, and the status still gets them.
+    """
     scene, pod = training(activeDeadlineSeconds=60)
     scene.step(60)
     scene.settle()
@@ -315,7 +318,7 @@ def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(trainin
 
 
 def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(training):
-    """If somebody has deleted the pod, only the Job still has a message."""
+    """If somebody has deleted the pod, only the Job's condition still has the exit code."""
     scene, _ = training()
     scene.objects["pods"].clear()
     words = "Container trainer for pod default/x failed with exit code 81 matching FailJob rule at index 2"
@@ -327,7 +330,7 @@ def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(traini
 
 
 def test_the_end_of_an_attempt_is_kept_where_its_pod_goes_after_the_job_has_failed(training):
-    """The caches of Jobs and pods are updated in any order; the result must be the same."""
+    """The operator may see the changes of Jobs and pods in any order; the result must be the same."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
     scene.settle()

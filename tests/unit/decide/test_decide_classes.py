@@ -1,4 +1,4 @@
-"""Some problems end by themselves, some need a new pod, and few are final."""
+"""Some problems end by themselves, some need a new pod, and only few end the replica."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def replacements(decision):
 
 
 def forget(scene):
-    """Create the next pod, let its node forget the trainer, and decide until the operator finds that out."""
+    """Create the next pod, whose node never starts the trainer, and decide until the operator notices it."""
     pod = scene.running_pod()
     scene.container(pod, "trainer", waiting="PodInitializing")
     scene.settle()
@@ -27,7 +27,7 @@ def forget(scene):
 
 
 def end(scene, pod):
-    """Let an evicted pod end and disappear."""
+    """Let an evicted pod end, and delete it."""
     pod["status"]["phase"] = "Failed"
     scene.settle(5)
     scene.objects["pods"].remove(pod)
@@ -50,7 +50,7 @@ def end(scene, pod):
 def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
     training, last_word, container, state, reason
 ):
-    """The run is in its second pod and at step 3,000,000, and a registry is unavailable for a day."""
+    """A registry that is unavailable for a day must not end a run at step 3,000,000."""
     scene, pod = training()
     scene.end(pod, 75, last_word(step=3_000_000))
     scene.settle(5)
@@ -65,7 +65,7 @@ def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
 
 
 def test_a_name_that_no_image_can_have_is_final(accepted):
-    """No registry will ever have such a name."""
+    """The name is not valid in any registry, so a retry cannot help."""
     scene = accepted()
     scene.container(scene.new_pod(), "sim-collect-0", waiting="InvalidImageName: bad")
 
@@ -73,7 +73,7 @@ def test_a_name_that_no_image_can_have_is_final(accepted):
 
 
 def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(training, simulator):
-    """The trainer has a restart budget; the operator does not end the job by a clock of its own."""
+    """The trainer has a restart budget for simulators, so the operator does not stop the replica itself."""
     scene, pod = training()
     told = {"phase": "starting", "simulators": (simulator(state="failed", last_fault="did not come up"),)}
     scene.poll(pod, **told)
@@ -91,7 +91,7 @@ def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(tra
 
 @pytest.mark.parametrize("seconds", [None, 100])
 def test_the_wait_for_a_first_step_is_bounded_and_names_what_it_waits_for(accepted, seconds):
-    """A typo in an image must not hold quota for ever."""
+    """A job with a typo in its image must not hold quota for ever."""
     spec = {} if seconds is None else {"startTimeoutSeconds": seconds}
     scene = accepted(**spec)
     scene.container(scene.new_pod(), "trainer", waiting="ErrImagePull: not found")
@@ -106,7 +106,7 @@ def test_the_wait_for_a_first_step_is_bounded_and_names_what_it_waits_for(accept
 
 
 def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
-    """For example, no pod may ever be made for the Job."""
+    """For example, Kubernetes may never create a pod for the Job."""
     scene = accepted(startTimeoutSeconds=100)
 
     assert stops(scene.step(100)) == ["StartTimeout"]
@@ -114,7 +114,10 @@ def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
 
 @pytest.mark.parametrize("before_s", [0, 1, 59])
 def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_the_same(accepted, before_s):
-    """A restarted kubelet has lost the reason for a moment; the user still has to fix the image."""
+    """A restarted kubelet does not report the pull error for a moment.
+
+    The user must still read that the image is wrong.
+    """
     scene = accepted(startTimeoutSeconds=100)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
@@ -129,7 +132,7 @@ def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_th
 
 
 def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
-    """The replica now waits for its first step without a known reason."""
+    """The image was pulled long before the timeout, so it is not the cause of the timeout."""
     scene = accepted(startTimeoutSeconds=1000)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
@@ -142,7 +145,7 @@ def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
 
 
 def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
-    """A job may wait in a queue for a week."""
+    """A job may wait in a queue for a week before it is admitted."""
     scene = make_scene(scheduling={"queueName": "robots"}, startTimeoutSeconds=100)
     scene.kueue = True
     scene.settle()
@@ -155,9 +158,9 @@ def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
 
 
 def test_a_trainer_that_runs_and_reports_nothing_waits_for_no_step(training):
-    """A program of the user's own may serve no status.
+    """A user's own program may serve no status.
 
-    The operator knows nothing of it, so it ends nothing.
+    The operator does not know its steps, so it must not stop the program.
     """
     scene, _ = training(startTimeoutSeconds=100)
 
@@ -166,7 +169,10 @@ def test_a_trainer_that_runs_and_reports_nothing_waits_for_no_step(training):
 
 
 def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
-    """The mark comes before the eviction. It counts as an attempt of the replica, but not against the Job."""
+    """The operator marks the Job before it evicts the pod.
+
+    The replica counts an attempt, but the Job counts no failure.
+    """
     scene = accepted()
     pod, decision = forget(scene)
 
@@ -184,9 +190,9 @@ def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
 
 
 def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
-    """The operator may have been killed between the mark and the eviction.
+    """The operator may be killed after it wrote the mark and before it evicted the pod.
 
-    The replacement is counted once.
+    After its restart the operator evicts the pod, and counts the replacement once.
     """
     scene = accepted()
     scene.budget = True
@@ -200,7 +206,7 @@ def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
 
 
 def test_a_disruption_budget_that_allows_no_eviction_is_reported(accepted):
-    """The eviction is retried; no pod is deleted against a budget."""
+    """The operator retries the eviction and does not delete the pod, which would ignore the budget."""
     scene = accepted()
     scene.budget = True
     forget(scene)
@@ -214,7 +220,7 @@ def test_a_disruption_budget_that_allows_no_eviction_is_reported(accepted):
 
 
 def test_a_pod_that_is_being_deleted_is_not_replaced_again(accepted):
-    """One eviction is enough."""
+    """A second eviction of the same pod would count a replacement that did not happen."""
     scene = accepted()
     forget(scene)
 
@@ -223,7 +229,7 @@ def test_a_pod_that_is_being_deleted_is_not_replaced_again(accepted):
 
 @pytest.mark.parametrize("limit", [0, 2])
 def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
-    """After that, the replica fails with the reason."""
+    """After `backoffLimit` replacements the replica fails, with the reason TrainerNotStarted."""
     scene = accepted(backoffLimit=limit)
     for _ in range(limit):
         pod, decision = forget(scene)
@@ -235,7 +241,10 @@ def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
 
 
 def test_dropped_restart_policies_are_found_out_at_once(accepted):
-    """Such a pod stays in Init for ever; a person may fix the webhook before the last retry."""
+    """A pod without these restart policies never starts its trainer.
+
+    A person may fix the webhook that dropped them before the last retry.
+    """
     scene = accepted()
     pod = scene.new_pod()
     del pod["spec"]["initContainers"][1]["restartPolicy"]
@@ -250,7 +259,7 @@ def test_dropped_restart_policies_are_found_out_at_once(accepted):
     ["", "x", "1", "1 pod-0", "-1 pod-0 Stalled: it", "1 pod-0 Stalled", "9999999999 pod-0 Stalled: it", 3],
 )
 def test_a_mark_that_is_not_ours_is_none(accepted, mark):
-    """Other programs may write that annotation too."""
+    """Another program may write any value into this annotation."""
     scene = accepted()
     scene.running_pod()
     scene.job()["metadata"]["annotations"] = {"palaestra.dev/replaced": mark}
@@ -260,14 +269,14 @@ def test_a_mark_that_is_not_ours_is_none(accepted, mark):
 
 
 def take(scene, pod, seconds=5):
-    """Let the cluster evict a pod, which is gone soon."""
+    """Let the cluster evict a pod, and let time pass until it is gone."""
     scene.take(pod)
     scene.settle(seconds)
 
 
 @pytest.mark.parametrize(("limit", "pods"), [(None, 6), (2, 2), (0, None)])
 def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, limit, pods):
-    """The limit counts from the first reported step; 0 means no limit."""
+    """`noProgressLimit` counts evicted pods since the last progress; 0 means no limit."""
     spec = {} if limit is None else {"noProgressLimit": limit}
     scene, pod = training(**spec)
     scene.poll(pod, step=7)
@@ -284,7 +293,7 @@ def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, l
 
 
 def test_a_program_that_reports_nothing_is_never_without_progress(training):
-    """The operator does not know the progress of such a program."""
+    """The operator cannot know whether such a program makes progress, so it never stops the program."""
     scene, pod = training()
     for _ in range(20):
         take(scene, pod)
@@ -296,7 +305,7 @@ def test_a_program_that_reports_nothing_is_never_without_progress(training):
 
 
 def test_pods_whose_trainer_did_not_start_are_not_without_progress(training):
-    """A full cluster preempts pods while they pull their images."""
+    """A full cluster may preempt many pods while they pull their images."""
     scene, pod = training()
     scene.poll(pod, step=7)
     scene.settle()

@@ -1,6 +1,7 @@
-"""The clocks of the machines differ, so no difference between two of them ends anything.
+"""The clocks of different machines differ, so no deadline depends on the difference of two machines' times.
 
-`scene.behind_s` sets a node's clock back against the API server's; `scene.set_clock` moves the operator's.
+`scene.behind_s` is the delay of a node's clock behind the API server's; `scene.set_clock` moves the
+operator's clock.
 """
 
 import pytest
@@ -12,16 +13,16 @@ HOUR_S = 3600
 
 
 def stops(decision):
-    """Return the reasons of the replicas that a decision stops or gives a new pod."""
+    """Return the reasons of the replicas that a decision stops, or whose pods it replaces."""
     return [each.reason.value for each in decision.actions if isinstance(each, Stop | Replace)]
 
 
 @pytest.mark.parametrize("tells_ages", [True, False])
 @pytest.mark.parametrize("behind_s", [721, -721, 86_400])
 def test_a_node_whose_clock_is_off_does_not_end_a_trainer_that_steps(accepted, behind_s, tells_ages):
-    """Its times differ by minutes from the operator's clock.
+    """The times that the trainer reports differ from the operator's clock by minutes.
 
-    The age of a step, measured by the trainer, does not.
+    The trainer also reports the age of its last step, which does not depend on the node's clock.
     """
     scene = accepted(stallDeadlineSeconds=600)
     scene.behind_s = behind_s
@@ -39,7 +40,7 @@ def test_a_node_whose_clock_is_off_does_not_end_a_trainer_that_steps(accepted, b
 
 @pytest.mark.parametrize("behind_s", [115, 721])
 def test_a_node_whose_clock_is_behind_does_not_end_a_trainer_that_starts(accepted, simulator, behind_s):
-    """By the operator's clock, the container would have started minutes ago."""
+    """By the operator's clock the container seems to have started minutes ago."""
     scene = accepted()
     scene.behind_s = behind_s
     pod = scene.running_pod()
@@ -50,7 +51,7 @@ def test_a_node_whose_clock_is_behind_does_not_end_a_trainer_that_starts(accepte
 
 
 def test_a_node_whose_clock_is_behind_has_its_time_to_start_the_trainer(accepted):
-    """By their times, all sidecars have run for ten minutes."""
+    """By the operator's clock all sidecars seem to have run for ten minutes."""
     scene = accepted()
     scene.behind_s = 600
     scene.container(scene.running_pod(), "trainer", waiting="PodInitializing")
@@ -62,7 +63,7 @@ def test_a_node_whose_clock_is_behind_has_its_time_to_start_the_trainer(accepted
 
 @pytest.mark.parametrize("seconds", [900, -HOUR_S, 30 * 86_400])
 def test_setting_the_operators_clock_ends_nothing(training, seconds):
-    """A person may correct the clock, or a virtual machine may resume."""
+    """A person may correct the clock, or a virtual machine may continue after a pause."""
     scene, pod = training(stallDeadlineSeconds=600, activeDeadlineSeconds=HOUR_S)
     scene.poll(pod, step=1, last_progress_age_s=1.0)
     scene.settle(10)
@@ -76,7 +77,7 @@ def test_setting_the_operators_clock_ends_nothing(training, seconds):
 
 
 def test_setting_the_operators_clock_back_ends_what_is_over_all_the_same(training):
-    """Otherwise the deadline would be an hour longer."""
+    """With the wall clock, the deadline would pass an hour too late."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.set_clock(-HOUR_S)
 
@@ -84,7 +85,10 @@ def test_setting_the_operators_clock_back_ends_what_is_over_all_the_same(trainin
 
 
 def test_a_new_process_begins_every_wait_anew(training):
-    """A wait may get longer by that, but never shorter; the new process has another monotonic clock."""
+    """The new process has another monotonic clock.
+
+    A restart of the operator may make a wait longer, but never shorter.
+    """
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=50)
     scene.settle()
@@ -100,9 +104,9 @@ def test_a_new_process_begins_every_wait_anew(training):
 
 
 def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training):
-    """The trainer measured that age with its own monotonic clock.
+    """The trainer measures the age of its last step with its own monotonic clock.
 
-    A restart of the operator does not reset it.
+    A restart of the operator does not reset this age.
     """
     scene, pod = training(stallDeadlineSeconds=60)
     scene.restart()
@@ -112,7 +116,7 @@ def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training
 
 
 def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training):
-    """Only the time that was not written yet is lost, which extends the deadline."""
+    """A restart loses only the time since the last write of the status, which makes the deadline later."""
     scene, pod = training(activeDeadlineSeconds=100)
     scene.poll(pod, step=1)
     scene.settle(60)
@@ -129,7 +133,7 @@ def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training
 def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, ago_s):
     """The API server's clock may be an hour behind the operator's.
 
-    Only the length of the grace period is used.
+    So the operator uses the length of the grace period and ignores the deletion's time.
     """
     scene, pod = training()
     scene.server_s -= ago_s
@@ -144,7 +148,7 @@ def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, 
 
 
 def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(training, last_word):
-    """The time of a Job's end comes from the control plane's clock, so it is not compared."""
+    """The control plane's clock gives the time of a Job's end, so the operator does not compare this time."""
     scene, pod = training()
     scene.server_s -= HOUR_S
     scene.end_job("Complete")
@@ -159,7 +163,7 @@ def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(trainin
 
 @pytest.mark.parametrize("server_s", [-HOUR_S, HOUR_S])
 def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
-    """The time to live is counted from it, by the same clock."""
+    """`ttlSecondsAfterFinished` counts from the completion time, so both must come from one clock."""
     scene, pod = training(ttlSecondsAfterFinished=60)
     scene.server_s += server_s
     scene.end(pod, 0, last_word(step=100))
@@ -172,7 +176,7 @@ def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
 
 
 def kill(scene, pod, run):
-    """Let the kernel kill the simulator in a run of its container, which is running again."""
+    """Let the kernel kill the simulator in a run of its container, which the kubelet then restarts."""
     scene.container(pod, "sim-collect-0", running=True, restarts=run + 1)
     ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.node_stamp()}
     for each in pod["status"]["initContainerStatuses"]:
@@ -186,7 +190,7 @@ def kills(scene):
 
 
 def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(training):
-    """The second node's clock is behind, so its kill seems to be older than the last one."""
+    """The second node's clock is behind, so by its time its kill is older than the first one."""
     scene, pod = training()
     kill(scene, pod, 0)
     scene.settle(5)
@@ -206,7 +210,10 @@ def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(t
 
 
 def test_a_kill_is_counted_once_though_the_status_has_no_room_for_its_run(training):
-    """A large status keeps neither pod nor run; the count must not grow with each look."""
+    """A status at its size limit drops the pod and the run of a kill.
+
+    The count must not grow at each reconcile.
+    """
     scene, pod = training()
     kill(scene, pod, 0)
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""When a deadline of a replica has passed, one patch with the reason stops it or replaces its pod."""
+"""One patch with the reason stops a replica whose deadline has passed, or replaces its pod."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def replaced(decision):
 
 
 def test_a_stop_is_one_patch_that_outlives_its_writer(training):
-    """The annotation and the deadline are in one patch, because an operator may be killed between two."""
+    """An operator that is killed between two patches would stop the Job and lose the reason."""
     scene, _ = training(activeDeadlineSeconds=60)
 
     (stop,) = scene.step(60).actions
@@ -29,7 +29,7 @@ def test_a_stop_is_one_patch_that_outlives_its_writer(training):
 
 
 def test_a_replica_has_failed_once_its_job_carries_the_mark(training):
-    """It has not failed before that, because the patch may fail."""
+    """The patch may fail, so the status reports the failure only after the Job has the annotation."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
     assert scene.status.phase is Phase.RUNNING
@@ -41,7 +41,7 @@ def test_a_replica_has_failed_once_its_job_carries_the_mark(training):
 
 
 def test_suspended_time_does_not_count_for_the_active_deadline(training):
-    """The job was active for one of ten minutes."""
+    """The job was suspended for ten of eleven minutes, in which it could not train."""
     scene, _ = training(activeDeadlineSeconds=120)
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
@@ -57,7 +57,7 @@ def test_suspended_time_does_not_count_for_the_active_deadline(training):
 
 
 def test_time_in_which_a_hold_keeps_a_job_from_being_planned_does_not_count(make_scene):
-    """The job does not train then, so a Secret that is created an hour later finds it with its whole time."""
+    """A job cannot train without its Secret, so the deadline starts when somebody has created the Secret."""
     secret = {"env": [{"name": "TOKEN", "secretKeyRef": {"name": "keys", "key": "token"}}]}
     scene = make_scene(activeDeadlineSeconds=60, trainer=secret)
     scene.settle()
@@ -74,7 +74,7 @@ def test_time_in_which_a_hold_keeps_a_job_from_being_planned_does_not_count(make
 
 
 def test_the_active_deadline_may_be_raised_and_is_woken_for(training):
-    """This field may change."""
+    """A user may change this field while the job runs; the next reconcile then moves to the new deadline."""
     scene, _ = training(activeDeadlineSeconds=60)
     assert scene.step(10).wake_after_s == 50
 
@@ -84,7 +84,7 @@ def test_the_active_deadline_may_be_raised_and_is_woken_for(training):
 
 
 def test_a_stalled_trainer_gets_a_new_pod_when_its_watchdog_has_not_ended_it(training):
-    """The stall time is the trainer's own; it first gets a grace period to end itself (exit code 82)."""
+    """The trainer's own watchdog should exit with code 82. The operator acts only after a grace period."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, last_progress_age_s=179.0)
 
@@ -93,7 +93,7 @@ def test_a_stalled_trainer_gets_a_new_pod_when_its_watchdog_has_not_ended_it(tra
 
 
 def test_a_trainer_that_cannot_be_reached_is_not_stalled(training):
-    """Its state is unknown; it may well train."""
+    """The operator does not know the state of this trainer, which may well train."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, last_progress_age_s=0.0)
 
@@ -103,7 +103,7 @@ def test_a_trainer_that_cannot_be_reached_is_not_stalled(training):
 def test_an_environment_that_steps_and_teaches_nothing_is_stalled(training):
     """The trainer responds, but its step count does not change.
 
-    The deadline measures progress, not liveness.
+    The deadline measures progress, not only whether the process is alive.
     """
     scene, pod = training(stallDeadlineSeconds=60)
     found = []
@@ -117,7 +117,7 @@ def test_an_environment_that_steps_and_teaches_nothing_is_stalled(training):
 
 
 def test_an_environment_that_never_stepped_is_stalled_too(training):
-    """The trainer reports that it trains, but has no step."""
+    """The trainer reports the phase `training`, but stays at step 0."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=0)
     scene.settle()
@@ -128,7 +128,7 @@ def test_an_environment_that_never_stepped_is_stalled_too(training):
 
 
 def test_a_run_that_comes_forward_slowly_is_not_stalled(training):
-    """One step in a minute is progress."""
+    """One step a minute is slow, but it is progress."""
     scene, pod = training(stallDeadlineSeconds=60)
     for step in range(1, 20):
         scene.pass_(60)
@@ -139,7 +139,7 @@ def test_a_run_that_comes_forward_slowly_is_not_stalled(training):
 
 @pytest.mark.parametrize("tells_ages", [True, False])
 def test_an_evaluation_that_steps_is_progress(training, tells_ages):
-    """An evaluation does not train by intention, but one without steps makes no progress."""
+    """An evaluation does not change the training's step count; only its own steps show progress."""
     scene, pod = training(stallDeadlineSeconds=60)
     for _ in range(30):
         scene.pass_(60)
@@ -156,7 +156,7 @@ def test_an_evaluation_that_steps_is_progress(training, tells_ages):
 
 
 def test_the_next_attempt_has_the_whole_time_again(training, last_word):
-    """The next attempt continues at the step at which the last one ended."""
+    """The next attempt starts at the old step count, so the wait for progress must start again."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.poll(pod, step=50, last_progress_age_s=0.5)
     scene.settle()
@@ -172,9 +172,9 @@ def test_the_next_attempt_has_the_whole_time_again(training, last_word):
 
 
 def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
-    """A trainer that always exits with 75 would be retried for ever, because Kubernetes has no limit for it.
+    """Kubernetes has no limit for pods that exit with 75, so it would retry such a trainer for ever.
 
-    The operator does not wait for the last retry: Kubernetes waits five minutes before each new pod by then.
+    The operator stops after the sixth pod: Kubernetes would by then wait five minutes before each new pod.
     """
     scene = accepted()
     pods = 0
@@ -190,7 +190,7 @@ def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
 
 
 def test_pods_that_fill_their_storage_again_and_again_are_reported_with_the_cause(accepted):
-    """Kubernetes does not count an eviction as a failure, whatever its cause is."""
+    """Kubernetes counts no eviction as a failure, so only the operator can stop these retries."""
     scene = accepted()
     while scene.status.phase is not Phase.FAILED:
         pod = scene.running_pod()
@@ -205,7 +205,7 @@ def test_pods_that_fill_their_storage_again_and_again_are_reported_with_the_caus
 
 
 def test_pods_that_are_taken_while_they_come_forward_are_not_capped(accepted, last_word):
-    """A cluster of spot nodes trains too."""
+    """A cluster of spot nodes evicts many pods, but the training advances."""
     scene = accepted()
     for number in range(20):
         pod = scene.running_pod()
@@ -217,7 +217,7 @@ def test_pods_that_are_taken_while_they_come_forward_are_not_capped(accepted, la
 
 
 def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_scene):
-    """The Job was created just before the status was written, and the operator had not seen it yet."""
+    """The operator had just created the Job, and its cache did not have the Job when the deadline passed."""
     scene = make_scene(activeDeadlineSeconds=60)
     scene.settle()
     jobs, scene.objects["jobs"] = scene.objects["jobs"], []
@@ -232,7 +232,10 @@ def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_sc
 
 @pytest.mark.parametrize("how", ["unreachable", "deleted", "ended"])
 def test_a_crash_loop_of_before_is_not_held_against_a_pod_that_trained(training, how):
-    """A new operator has no poll of the trainer yet, and sidecars end with their pod."""
+    """An operator that has just started has not polled the trainer yet.
+
+    The sidecars of an ending pod exit with errors, which look like a crash loop.
+    """
     scene, pod = training()
     scene.poll(pod, phase="training", step=50)
     scene.settle(5)

@@ -1,4 +1,7 @@
-"""A suspended Job of a stopped replica is deleted, so that no queue can admit it later and preempt others."""
+"""The operator deletes the suspended Job of a stopped replica, so that no queue admits the Job later.
+
+An admission would preempt other Jobs for a replica that has already failed.
+"""
 
 import pytest
 
@@ -11,7 +14,7 @@ DISCARD = Discard(job="job-1", replica=1)
 
 @pytest.fixture
 def over(make_scene):
-    """A job whose deadline has passed: replica 0 trains, replica 1 waits to be admitted."""
+    """Return a job whose deadline has passed: replica 0 trains, replica 1 waits in a queue."""
     scene = make_scene(replicas=2, activeDeadlineSeconds=DEADLINE_S)
     scene.settle()
     scene.running_pod(0)
@@ -22,7 +25,7 @@ def over(make_scene):
 
 
 def test_it_is_marked_then_reported_then_deleted(over):
-    """Each step is stored in the cluster before the next, so the operator may be killed between them."""
+    """Each step is stored in the cluster before the next one, so the operator may be killed in between."""
     marked, told, deleted = (over.step().actions for _ in range(3))
 
     assert [(type(each), each.replica) for each in marked] == [(Stop, 0), (Stop, 1)]
@@ -33,7 +36,7 @@ def test_it_is_marked_then_reported_then_deleted(over):
 
 
 def test_an_operator_that_was_killed_after_the_mark_goes_on(over):
-    """The mark on the Job has the reason; the status is written before the Job is deleted."""
+    """The Job's annotation has the reason, so the next operator writes the status and deletes the Job."""
     before = over.raw["status"]
     over.step()
     over.raw["status"] = before  # the status was never written
@@ -46,7 +49,7 @@ def test_an_operator_that_was_killed_after_the_mark_goes_on(over):
 
 
 def test_what_was_deleted_is_never_planned_again(over):
-    """The status records that the replica has ended."""
+    """The status shows that the replica has ended, so the operator does not create its Job again."""
     over.settle()
 
     assert [each["metadata"]["name"] for each in over.objects["jobs"]] == ["job-0"]
@@ -55,7 +58,7 @@ def test_what_was_deleted_is_never_planned_again(over):
 
 
 def test_a_job_that_runs_is_only_stopped(over):
-    """Its pods get time to save, and its deadline applies."""
+    """The pods of this Job get time to save a checkpoint before the Job's deadline ends them."""
     over.settle()
 
     assert over.job(0)["spec"]["activeDeadlineSeconds"] == 1
@@ -63,7 +66,7 @@ def test_a_job_that_runs_is_only_stopped(over):
 
 
 def test_a_job_that_was_admitted_after_its_mark_is_not_deleted(over):
-    """It ends by its deadline, as any other Job does."""
+    """The Job has a deadline of one second and ends by it, like any other stopped Job."""
     over.step()
     over.job(1)["spec"]["suspend"] = False
 
@@ -71,7 +74,7 @@ def test_a_job_that_was_admitted_after_its_mark_is_not_deleted(over):
 
 
 def test_a_job_that_is_suspended_after_its_mark_is_deleted(over):
-    """A queue may suspend it again in the second that it has left."""
+    """A queue may suspend the Job again before its deadline of one second has passed."""
     over.settle()
     over.job(0)["spec"]["suspend"] = True
 

@@ -1,4 +1,4 @@
-"""Edits of the operator's objects by others are reported once each, and not reverted."""
+"""If somebody edits an object of the operator, the operator emits one event and does not revert the edit."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def edited(decision):
 
 
 def test_what_is_as_it_was_made_is_no_edit(training):
-    """Defaults of the API server and writes of the operator itself are not edits."""
+    """Defaults of the API server and the operator's own writes are not edits by others."""
     scene, _ = training()
     scene.job()["spec"] |= {"parallelism": 1, "completions": 1}
     scene.objects["policies"][0]["metadata"]["generation"] = 1
@@ -29,7 +29,7 @@ def test_what_is_as_it_was_made_is_no_edit(training):
     ],
 )
 def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
-    """A Job with parallelism 0 makes no pod, and nobody would know the reason."""
+    """A Job with parallelism 0 creates no pod; without the event nobody would find the cause."""
     scene, _ = training()
     scene.job()["spec"] |= change
 
@@ -40,7 +40,7 @@ def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
 
 
 def test_an_edit_of_the_network_policy_is_said_and_left_alone(training):
-    """The network policy is the second layer that protects the pods from others."""
+    """The NetworkPolicy protects the pods from other pods, so an administrator must know about its edit."""
     scene, _ = training()
     scene.objects["policies"][0]["metadata"]["generation"] = 2
 
@@ -53,7 +53,7 @@ def test_an_edit_of_the_network_policy_is_said_and_left_alone(training):
 
 
 def test_an_edit_is_to_be_written_once(training):
-    """Every change of any object causes a reconcile."""
+    """Each change of any object causes a reconcile, which would repeat the event."""
     scene, _ = training()
     scene.job()["spec"]["parallelism"] = 0
 
@@ -63,7 +63,7 @@ def test_an_edit_is_to_be_written_once(training):
 
 
 def test_our_own_stop_is_no_edit(training):
-    """The operator sets the deadline by which the Job ends."""
+    """To stop a Job, the operator itself sets the Job's deadline."""
     scene, _ = training(activeDeadlineSeconds=60)
     scene.step(60)
 

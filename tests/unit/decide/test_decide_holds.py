@@ -1,4 +1,4 @@
-"""Each hold keeps a job from starting for a reason; a person can remove most of them, and then it starts."""
+"""A hold keeps a job from starting and has a reason; when a person removes the cause, the job starts."""
 
 import re
 from dataclasses import replace
@@ -23,7 +23,7 @@ def config_map(data=None, labels=None):
 
 
 def held(scene):
-    """Return reason and message of the condition Accepted, which must be False."""
+    """Return the reason and the message of the condition Accepted, which must be False."""
     accepted = scene.status.conditions[0]
     assert (accepted.type.value, accepted.status.value) == ("Accepted", "False")
     return accepted.reason, accepted.message
@@ -117,7 +117,7 @@ def held(scene):
     ],
 )
 def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there, reason, message):
-    """The message has field, fact and remedy; the job stays Pending and may start later."""
+    """The message has a field, a fact and a remedy; the job stays Pending and starts after the remedy."""
     scene = make_scene(**spec)
     scene.there = there
 
@@ -148,7 +148,7 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
 def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next(
     make_scene, spec, kind, name
 ):
-    """A person who follows the message must not get a second message about a label."""
+    """A person who creates the object as the message asks must not get a second message about a label."""
     scene = make_scene(**spec)
     scene.settle()
     label = re.search(r'with the label (\S+): "(\S+)"', held(scene)[1])
@@ -161,7 +161,7 @@ def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next
 
 
 def test_a_job_starts_when_its_world_appears(make_scene):
-    """The job needs no change."""
+    """Nobody has to change or restart the job."""
     scene = make_scene(simulators=WORLD)
     scene.settle()
 
@@ -179,7 +179,7 @@ Robot { name "one" supervisor TRUE controller "ros" }
 
 
 def test_a_world_that_is_none_can_be_mended_in_its_config_map(make_scene):
-    """The world is read again until the job is accepted."""
+    """The operator reads the ConfigMap again until it accepts the job."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": "no world"})
     scene.settle()
@@ -192,7 +192,7 @@ def test_a_world_that_is_none_can_be_mended_in_its_config_map(make_scene):
 
 
 def test_what_nobody_can_mend_fails_at_once(make_scene):
-    """A spec does not change."""
+    """The world is in the spec, which nobody can change."""
     scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "no world"}}, GROUPS[1]])
 
     decision = scene.settle()
@@ -204,7 +204,7 @@ def test_what_nobody_can_mend_fails_at_once(make_scene):
 
 
 def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
-    """The password is compromised, because everybody who may read TrainingJobs has seen it."""
+    """Every user who may read TrainingJobs can see the password, so it is already compromised."""
     option = {"name": "my:Tracker", "options": {"uri": "http://me:secret@tracking.example.com"}}
     scene = make_scene(trainer={"algorithm": {"callbacks": [option]}})
 
@@ -220,7 +220,7 @@ def test_a_password_in_the_spec_fails_at_once_and_is_not_repeated(make_scene):
 
 
 def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scene):
-    """The job's own ConfigMap has a copy."""
+    """The job's own ConfigMap has a copy of the world."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()
@@ -234,7 +234,7 @@ def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scen
 
 
 def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
-    """Missing objects are held as before; running replicas continue."""
+    """The replica whose Job is missing is held; the replica that runs continues."""
     scene = make_scene(simulators=WORLD, replicas=2)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()
@@ -251,7 +251,7 @@ def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
 
 @pytest.mark.parametrize("attempt", METADATA, ids=[each.name for each in METADATA])
 def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scene, attempt):
-    """The author may be somebody who may not create pods."""
+    """The author may lack the permission to create pods, and other programs obey labels and annotations."""
     scene = make_scene(scheduling={attempt.path.rpartition(".")[2]: attempt.value})
 
     decision = scene.settle()
@@ -281,7 +281,7 @@ def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scen
     ],
 )
 def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, key, holds):
-    """A part of a domain may belong to somebody else."""
+    """A subdomain may belong to somebody else, so allowing a domain does not allow its subdomains."""
     scene = make_scene(scheduling={"podAnnotations": {key: "x"}})
     scene.layout = replace(scene.layout, allowed=Allowed(pod_annotations=allowed))
 
@@ -291,7 +291,10 @@ def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, 
 
 
 def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_longer_are(make_scene):
-    """The administrator restarts the operator with the value; an accepted job is not checked again."""
+    """An administrator restarts the operator with the new value.
+
+    The operator does not check an accepted job again.
+    """
     scene = make_scene(scheduling={"podLabels": {"example.com/team": "robots"}})
     scene.settle()
     assert held(scene)[0] == "PodMetadataNotAllowed"
@@ -311,7 +314,7 @@ def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_lo
 
 @pytest.mark.parametrize("deleting", [False, True])
 def test_a_job_of_somebody_else_is_left_alone(make_scene, deleting):
-    """A Job has the expected name, but may be of an earlier TrainingJob whose objects are being deleted."""
+    """A Job of this name may belong to an earlier TrainingJob, whose objects are still being deleted."""
     scene = make_scene()
     scene.step()
     metadata = {"name": "job-0", "uid": "x", "ownerReferences": [{"uid": "other"}]}

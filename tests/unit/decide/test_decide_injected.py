@@ -1,4 +1,4 @@
-"""A mesh or an agent adds a container to a pod, before the trainer or next to it."""
+"""A service mesh or an agent adds a container to a pod, before the trainer or next to it."""
 
 import pytest
 
@@ -31,7 +31,7 @@ def with_proxy(training):
 
 
 def end_trainer(scene, pod, code, message=""):
-    """End the trainer; the proxy, and so the pod, keeps running."""
+    """End the trainer; the proxy keeps running, so the pod does not end."""
     proxy = pod["status"]["containerStatuses"][0]
     scene.container(pod, "trainer", code=code, message=message)
     others = [each for each in pod["status"]["containerStatuses"] if each is not proxy]
@@ -39,7 +39,7 @@ def end_trainer(scene, pod, code, message=""):
 
 
 def test_a_pod_that_a_proxy_keeps_alive_says_so(with_proxy, last_word):
-    """Its simulators keep running, and no Job ends."""
+    """The pod's simulators keep running and its Job does not end, so the user needs the reason."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
 
@@ -51,7 +51,7 @@ def test_a_pod_that_a_proxy_keeps_alive_says_so(with_proxy, last_word):
 
 
 def test_a_job_ends_with_its_trainer_and_its_pod_is_ended_after_a_bound(with_proxy, last_word):
-    """The trainer determines the result, although the API server reports the Job as failed."""
+    """The trainer's exit code decides the result, even if the API server reports the Job as failed."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
     scene.settle()
@@ -70,7 +70,7 @@ def test_a_job_ends_with_its_trainer_and_its_pod_is_ended_after_a_bound(with_pro
 
 @pytest.mark.parametrize(("code", "reason"), [(80, "SimulatorBudgetSpent"), (2, "ConfigurationRefused")])
 def test_an_end_that_is_not_retried_is_the_trainers_too(with_proxy, last_word, code, reason):
-    """The Job's own rule applies only after all containers have ended."""
+    """The Job's failure policy applies only after all containers have ended, which the proxy prevents."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, code, last_word(reason=f"{reason}: it"))
     scene.settle()
@@ -81,7 +81,7 @@ def test_an_end_that_is_not_retried_is_the_trainers_too(with_proxy, last_word, c
 
 
 def test_a_trainer_that_is_retried_gets_a_new_pod_and_counts_once(with_proxy):
-    """The eviction of the pod ends the proxy."""
+    """Only an eviction of the pod ends the proxy, so that the next pod can start."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 1)
     scene.settle()
@@ -93,7 +93,7 @@ def test_a_trainer_that_is_retried_gets_a_new_pod_and_counts_once(with_proxy):
 
 
 def test_a_proxy_that_fails_after_the_trainer_was_done_fails_no_training(with_proxy, last_word):
-    """A proxy that a signal stops makes the whole pod fail, and its Job would retry."""
+    """A proxy that exits with an error makes its pod fail, and the Job would train again."""
     scene, pod = with_proxy()
     end_trainer(scene, pod, 0, last_word(step=100))
     pod["status"]["phase"] = "Failed"
@@ -104,7 +104,7 @@ def test_a_proxy_that_fails_after_the_trainer_was_done_fails_no_training(with_pr
 
 
 def test_a_job_that_failed_because_of_a_proxy_has_succeeded(with_proxy, last_word):
-    """With `backoffLimit: 0` the Job fails before the operator sees the pod's end."""
+    """With `backoffLimit: 0` the Job fails before the operator sees the end of the pod."""
     scene, pod = with_proxy(backoffLimit=0)
     end_trainer(scene, pod, 0, last_word(step=100))
     pod["status"]["phase"] = "Failed"
@@ -116,7 +116,7 @@ def test_a_job_that_failed_because_of_a_proxy_has_succeeded(with_proxy, last_wor
 
 
 def test_the_memory_of_a_proxy_is_not_that_of_a_simulator(training):
-    """A simulator's remedy would raise the wrong limit."""
+    """The remedy for a simulator would make the user raise the wrong memory limit."""
     scene, pod = training()
     pod["spec"]["initContainers"].insert(0, {**PROXY, "restartPolicy": "Always"})
     scene.container(pod, "istio-proxy", waiting="CrashLoopBackOff", code=137, reason="OOMKilled", restarts=3)

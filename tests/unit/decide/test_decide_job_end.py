@@ -1,4 +1,4 @@
-"""The end of a replica comes from its trainer's exit code, its last word and the Job's conditions."""
+"""The trainer's exit code, its termination message and the Job's conditions determine how a replica ended."""
 
 import pytest
 
@@ -15,7 +15,7 @@ from palaestra_protocol.pod.status import SuccessInterval
     ],
 )
 def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word, code, reason, begin):
-    """The message has the trainer's last word."""
+    """The message quotes the trainer's termination message."""
     scene, pod = training()
     scene.end(pod, code, last_word(step=40, reason="Why: because"))
     scene.end_job("Failed", 0, "PodFailurePolicy", "Container trainer ... matching FailJob rule")
@@ -29,7 +29,7 @@ def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word
 
 
 def test_the_exit_code_is_read_from_the_jobs_words_when_the_pod_is_gone(training):
-    """A user may have deleted the pod."""
+    """A user may have deleted the pod, but the message of the Job's condition has the exit code."""
     scene, _ = training()
     scene.objects["pods"].clear()
     words = (
@@ -43,7 +43,7 @@ def test_the_exit_code_is_read_from_the_jobs_words_when_the_pod_is_gone(training
 
 
 def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
-    """A limit of n allows n + 1 pods, which are attempts 1 to n + 1."""
+    """A limit of n allows n + 1 pods, which are the attempts 1 to n + 1."""
     scene = accepted(backoffLimit=2)
     attempts = []
     for number in (1, 2, 3):
@@ -65,7 +65,7 @@ def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
 
 
 def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(training):
-    """Exit code 137 alone does not explain the end, but the limit does."""
+    """Exit code 137 alone does not explain the end; the message must name the memory limit."""
     scene, pod = training(trainer={"resources": {"limits": {"memory": "2Gi"}}})
     scene.end(pod, 137, reason="OOMKilled")
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -77,7 +77,7 @@ def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(tra
 
 
 def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(training, last_word):
-    """The exit code is the same; only the last word has the cause."""
+    """Both have exit code 82; only the trainer's termination message has the cause."""
     scene, pod = training()
     scene.end(pod, 82, last_word(reason="SimulatorHung: collect-0: no answer within 600 s"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -89,7 +89,7 @@ def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(tra
 
 
 def test_a_full_volume_is_reported_with_its_remedy(training, last_word):
-    """A person can repair it, so the message says how."""
+    """A person can free space or request a larger volume, so the message must name this remedy."""
     scene, pod = training(backoffLimit=0)
     scene.end(pod, 1, last_word(reason="StorageFull: checkpoints/5: disk full"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -105,7 +105,7 @@ def test_a_full_volume_is_reported_with_its_remedy(training, last_word):
 
 @pytest.mark.parametrize("word", [True, False])
 def test_a_trainer_that_stalled_each_time_is_reported(training, last_word, word):
-    """The trainer's watchdog ends it with exit code 82."""
+    """The trainer's watchdog ends a stalled trainer with exit code 82, with or without a message."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.end(pod, 82, last_word(reason="Stalled: collect-0 hangs") if word else "")
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -117,7 +117,7 @@ def test_a_trainer_that_stalled_each_time_is_reported(training, last_word, word)
 
 
 def test_the_message_about_an_eviction_for_storage_quotes_the_kubelet(training):
-    """The pod's own status has that message."""
+    """The status of the pod has the kubelet's message, which names the full volume."""
     scene, pod = training()
     words = "Usage of EmptyDir volume exceeds the limit; ephemeral-storage"
     pod["status"] |= {"phase": "Failed", "reason": "Evicted", "message": words}
@@ -130,7 +130,7 @@ def test_the_message_about_an_eviction_for_storage_quotes_the_kubelet(training):
 
 
 def test_another_failure_of_the_job_is_quoted(training):
-    """A person may have set a deadline on the Job."""
+    """A person may have set a deadline on the Job, and the user must see this cause."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.end_job("Failed", 0, "DeadlineExceeded", "Job was active longer than specified deadline")
@@ -143,7 +143,10 @@ def test_another_failure_of_the_job_is_quoted(training):
 
 
 def test_a_job_fails_when_that_is_certain(training, last_word):
-    """FailureTarget comes before Failed, which waits for pods that never end on a lost node."""
+    """The condition FailureTarget comes before Failed.
+
+    On a lost node, Failed would never come, because the Job waits for its pods.
+    """
     scene, pod = training()
     scene.end(pod, 2, last_word())
     scene.end_job("FailureTarget", 0, "PodFailurePolicy")
@@ -154,9 +157,9 @@ def test_a_job_fails_when_that_is_certain(training, last_word):
 
 
 def test_why_it_was_stopped_comes_before_what_followed(training, last_word):
-    """Stopping interrupts the pod, and lets the Job exceed a deadline of one second.
+    """To stop a Job, the operator gives it a deadline of one second, which interrupts the pod.
 
-    Both are consequences.
+    The Job's deadline and the interruption are consequences and must not become the reason.
     """
     scene, pod = training(activeDeadlineSeconds=60)
     scene.step(60)
@@ -170,7 +173,7 @@ def test_why_it_was_stopped_comes_before_what_followed(training, last_word):
 
 
 def test_a_mark_that_nobody_knows_stops_all_the_same(training):
-    """A person or a newer release may have written it."""
+    """A person or a newer release may have written this annotation."""
     scene, _ = training()
     scene.job()["metadata"]["annotations"] = {"palaestra.dev/stopped": "Weather: rain"}
 
@@ -181,7 +184,7 @@ def test_a_mark_that_nobody_knows_stops_all_the_same(training):
 
 
 def test_success_is_reported_with_its_interval(training, last_word):
-    """Most people read only the message of the condition of an ended training."""
+    """When a training has ended, most people read only this message."""
     scene, pod = training()
     interval = SuccessInterval(low=0.9, high=0.98, episodes=100)
     scene.end(pod, 0, last_word(step=100, success_rate=0.95, success_interval=interval))
@@ -196,7 +199,7 @@ def test_success_is_reported_with_its_interval(training, last_word):
 
 
 def test_what_the_trainer_said_last_stays_in_the_status(training, last_word, simulator):
-    """The last report does not depend on polling; an ended training has no rate."""
+    """The trainer's termination message has the final values. A training that has ended has no speed."""
     scene, pod = training()
     scene.poll(pod, step=50, target=100, mean_return=1.5, steps_per_second=20.0, simulators=(simulator(),))
     scene.settle(1)
@@ -220,7 +223,7 @@ def complete(training, *, word="", **spec):
 
 
 def test_an_exit_code_0_without_a_report_is_no_complete_training(training, last_word):
-    """A library that calls exit(0) leaves no model; a program of the user's own reports nothing."""
+    """A library that calls `exit(0)` leaves no model. A user's own program need not report its end."""
     silent = complete(training)
     reported = complete(training, word=last_word(reason="Completed: the training is complete"))
     own = complete(training, trainer={"command": ["python", "train.py"]})

@@ -1,4 +1,4 @@
-"""The life of a job: which objects are created, in which order, and what the status and the events report."""
+"""The life of a job: its objects in the order of their creation, its status and its events."""
 
 from datetime import UTC, datetime
 
@@ -16,7 +16,7 @@ def kinds(decision):
 
 
 def test_nothing_is_created_before_the_status_holds_the_images(make_scene):
-    """After any write, an operator of another release may take over and must plan the same objects."""
+    """After any write an operator of another release may take over, which must plan the same objects."""
     scene = make_scene()
 
     first = scene.step()
@@ -34,7 +34,7 @@ MUJOCO = [
 
 
 def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
-    """This is the rule for every other image of the job."""
+    """MuJoCo follows the same rule as every other image of a job."""
     scene = make_scene(simulators=MUJOCO)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -46,7 +46,7 @@ def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
 
 
 def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
-    """The job was accepted with these images, and keeps them for its whole life."""
+    """The operator stored these images when it accepted the job, which keeps them for its whole life."""
     scene = make_scene(replicas=2)
     scene.step()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
@@ -58,7 +58,7 @@ def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
 
 
 def test_a_newer_release_leaves_what_is_there_alone(training):
-    """The running pods mount the old ConfigMaps, even if the new release would name them otherwise."""
+    """The running pods mount the old ConfigMaps, even if the new release would choose other names."""
     scene, _ = training()
     scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
     scene.objects["config_maps"][0]["metadata"]["name"] = "named-by-an-older-release"
@@ -69,7 +69,7 @@ def test_a_newer_release_leaves_what_is_there_alone(training):
 
 
 def test_a_config_map_that_somebody_deleted_is_made_again(training):
-    """The next pod of the Job mounts it."""
+    """The next pod of the Job needs the ConfigMap to start."""
     scene, _ = training()
     scene.objects["config_maps"].clear()
 
@@ -77,7 +77,7 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
 
 
 def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
-    """Planning a complete replica again would take time from other jobs."""
+    """To plan complete replicas again would delay the reconciles of other jobs."""
     scene = accepted(replicas=3)
     scene.objects["config_maps"].pop(1)
     job = accept(scene.raw)
@@ -88,7 +88,7 @@ def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
 
 
 def test_a_job_that_trains_says_so(training):
-    """The phase, the columns and the conditions show it."""
+    """The phase, the printer columns and the conditions agree."""
     scene, _ = training()
 
     held = {each.type.value: each.status.value for each in scene.status.conditions}
@@ -100,7 +100,7 @@ def test_a_job_that_trains_says_so(training):
 
 
 def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
-    """The status has the last report of each trainer."""
+    """The status has the values that each trainer reported last."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -117,7 +117,7 @@ def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
 
 
 def test_the_last_word_is_waited_for(training, last_word):
-    """Two watches report the Job's end and the pod's, in any order."""
+    """The ends of the Job and of its pod come from two watches, in any order."""
     scene, pod = training()
     scene.end_job("Complete")
     decision = scene.step(1)
@@ -131,7 +131,7 @@ def test_the_last_word_is_waited_for(training, last_word):
 
 
 def test_the_last_word_is_not_waited_for_for_ever(training):
-    """The pod may be gone, or remain on a lost node."""
+    """The pod may be deleted, or it may stay on a lost node and never report its end."""
     scene, _ = training()
     scene.end_job("Complete")
     scene.step()
@@ -142,7 +142,7 @@ def test_the_last_word_is_not_waited_for_for_ever(training):
 
 
 def test_a_replica_that_failed_does_not_stop_the_others(accepted):
-    """Each replica is a training of its own."""
+    """The replicas are independent trainings."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.settle()
@@ -157,7 +157,7 @@ def test_a_replica_that_failed_does_not_stop_the_others(accepted):
 
 
 def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, last_word):
-    """The message has the number of failed replicas and the reason of the first."""
+    """The message has the number of failed replicas, and the reason of the first one."""
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in (0, 1)]
     scene.end(pods[0], 81, last_word(reason="Diverged: NaN"))
@@ -173,7 +173,7 @@ def test_a_job_with_a_failed_replica_fails_when_the_last_has_ended(accepted, las
 
 
 def test_a_replica_that_has_ended_is_never_planned_again(training, last_word):
-    """A replica must not train again because its Job was deleted, by a person or by a cleanup."""
+    """If a person or a cleanup deletes the Job of a finished replica, the replica must not train again."""
     scene, pod = training(replicas=1)
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -198,7 +198,7 @@ def test_a_job_that_somebody_deleted_is_made_again_once_its_pods_are_gone(traini
 
 
 def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
-    """Kubernetes deletes the pods, and their time counts no longer."""
+    """Kubernetes deletes the pods of a suspended Job, and the job's active time stops."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
 
@@ -213,7 +213,7 @@ def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
 
 
 def test_resuming_goes_on_and_counts_on(training):
-    """The next pod is not counted as a disruption."""
+    """The next pod counts as a restart by suspension, not as a disruption."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
@@ -237,7 +237,7 @@ def test_resuming_goes_on_and_counts_on(training):
 
 
 def test_a_job_that_is_born_suspended_is_planned_suspended(accepted):
-    """Its objects exist and can be read, but it has no pod."""
+    """A user can inspect the objects of the job, but no pod runs."""
     scene = accepted(suspend=True)
 
     assert scene.job()["spec"]["suspend"] is True
@@ -246,7 +246,7 @@ def test_a_job_that_is_born_suspended_is_planned_suspended(accepted):
 
 
 def test_with_a_queue_suspension_is_left_to_kueue(make_scene):
-    """Whatever Kueue does to the Job, the operator writes nothing back."""
+    """Kueue suspends and resumes the Job, and the operator must not write `suspend`."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -260,9 +260,9 @@ def test_with_a_queue_suspension_is_left_to_kueue(make_scene):
 
 
 def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
-    """A namespace may have a default queue.
+    """Kueue may add the default queue of a namespace to a Job.
 
-    If Kueue suspends a Job there, resuming it would start a fight.
+    If the operator resumed such a Job, Kueue would suspend it again without end.
     """
     scene = accepted()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
@@ -273,7 +273,7 @@ def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
 
 
 def test_a_suspension_that_kueue_ignores_is_reported(training):
-    """In a queue only Kueue decides, even if it is the default queue of the namespace."""
+    """In a queue only Kueue suspends a Job, even in the default queue of the namespace."""
     scene, _ = training()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
     scene.raw["spec"]["suspend"] = True
@@ -285,7 +285,7 @@ def test_a_suspension_that_kueue_ignores_is_reported(training):
 
 
 def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
-    """The job is scheduled for that time, because no other change may cause a reconcile."""
+    """The operator schedules a reconcile for that time, because an ended job no longer changes."""
     scene, pod = training(ttlSecondsAfterFinished=60)
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -298,7 +298,7 @@ def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
 
 
 def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
-    """The field may change; the status has the generation that the operator has seen."""
+    """A user may set this field of an ended job; the status then has the new generation."""
     scene, pod = training()
     scene.end(pod, 0, last_word(step=100))
     scene.end_job("Complete")
@@ -313,7 +313,10 @@ def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
 
 
 def test_a_pod_that_only_says_to_be_the_replicas_is_waited_for(accepted, last_word):
-    """It may write to the volume, so it must end first; its report is ignored."""
+    """The pod has the labels of the replica, but not its owner.
+
+    It may write to the volume, so the operator waits for its end; it ignores the pod's report.
+    """
     scene = accepted()
     pod = scene.running_pod()
     scene.end(pod, 0, last_word(step=9, success_rate=1.0))

@@ -1,4 +1,4 @@
-"""A replica that has trained never begins at step 0 again unless a person asks for it."""
+"""A replica that has trained starts at step 0 again only if a person requests it."""
 
 import pytest
 
@@ -13,7 +13,7 @@ WORD = "palaestra.dev/restart-lost-runs"
 
 
 def trained(training, **spec):
-    """Return a scene whose replica has trained 21,812 steps and was then suspended."""
+    """Return a scene whose replica has trained 21,812 steps and is suspended."""
     scene, pod = training(**spec)
     scene.poll(pod, step=21812, last_checkpoint=SAVED)
     scene.settle()
@@ -44,7 +44,7 @@ def emptied(training):
 
 
 def test_a_trained_replica_without_its_claim_is_held(training):
-    """A new claim would be empty, and the training would silently begin at step 0."""
+    """With a new, empty claim the training would start at step 0 and nobody would notice."""
     scene = trained(training)
     scene.objects["claims"].clear()
 
@@ -62,7 +62,7 @@ def test_a_trained_replica_without_its_claim_is_held(training):
 
 
 def test_a_job_with_a_lost_run_needs_a_person(training):
-    """Programs that wait by kstatus must not wait for ever."""
+    """Programs that wait with kstatus must see `Stalled`, or they would wait for ever."""
     scene = trained(training)
     scene.objects["claims"].clear()
 
@@ -72,7 +72,10 @@ def test_a_job_with_a_lost_run_needs_a_person(training):
 
 
 def test_a_claim_that_is_lost_between_two_pods_suspends_the_job(training):
-    """The Job's next pod would wait for the claim, and train from step 0 as soon as it exists."""
+    """The next pod waits for the claim.
+
+    If somebody created an empty claim, the pod would train from step 0.
+    """
     scene, pod = training()
     scene.poll(pod, step=500)
     scene.settle()
@@ -87,7 +90,7 @@ def test_a_claim_that_is_lost_between_two_pods_suspends_the_job(training):
 
 
 def test_a_restored_claim_ends_the_hold(training):
-    """The run is available again."""
+    """The restored claim contains the run, so the training can resume."""
     scene = trained(training)
     claims = list(scene.objects["claims"])
     scene.objects["claims"].clear()
@@ -102,7 +105,10 @@ def test_a_restored_claim_ends_the_hold(training):
 
 
 def test_a_person_s_word_begins_at_step_zero_again(training):
-    """The status and an event report it; the earlier steps no longer count."""
+    """The annotation requests the restart.
+
+    The status and an event report the restart, and the status forgets the earlier steps.
+    """
     scene = trained(training)
     scene.objects["claims"].clear()
     resume(scene)
@@ -119,7 +125,7 @@ def test_a_person_s_word_begins_at_step_zero_again(training):
 
 
 def test_reports_of_the_pods_before_do_not_count_after_a_restart(training, last_word):
-    """An ended pod is listed until its Job ends, and its last word has the step of the lost run."""
+    """The ended pod exists until its Job ends, and its termination message has the step of the lost run."""
     scene, pod = training()
     scene.end(pod, 1, last_word(step=21812, last_checkpoint=SAVED))
     scene.settle()
@@ -134,7 +140,7 @@ def test_reports_of_the_pods_before_do_not_count_after_a_restart(training, last_
 
 
 def test_a_word_has_one_effect(training):
-    """The annotation stays on the job; another loss needs a new value."""
+    """The annotation stays on the job. After another loss, a person must set a new value."""
     scene = trained(training)
     scene.raw["metadata"]["annotations"] = {WORD: "before the loss"}
     scene.settle()
@@ -147,7 +153,7 @@ def test_a_word_has_one_effect(training):
 
 
 def test_an_emptied_run_directory_is_noticed(training):
-    """The trainer finds no record of earlier attempts, so it reports attempt 1."""
+    """The trainer found no record of earlier attempts, so it reports attempt 1."""
     scene, _ = emptied(training)
 
     decision = scene.step()
@@ -160,7 +166,7 @@ def test_an_emptied_run_directory_is_noticed(training):
 
 
 def test_an_emptied_run_waits_after_its_pod_has_saved(training, last_word):
-    """On suspension the trainer saves its few steps, which do not replace the lost ones."""
+    """When the Job is suspended, the trainer saves its few new steps, which do not replace the lost ones."""
     scene, pod = emptied(training)
     scene.settle()
     saved = CheckpointStatus(step=120, time="2026-01-31T12:00:00Z")
@@ -174,7 +180,7 @@ def test_an_emptied_run_waits_after_its_pod_has_saved(training, last_word):
 
 
 def test_a_restart_continues_with_what_an_emptied_run_directory_holds_then(training):
-    """A person may restore the files before the restart."""
+    """A person may have restored the files before she sets the annotation."""
     scene, _ = emptied(training)
     scene.settle()
     scene.objects["pods"].clear()
@@ -195,7 +201,7 @@ def test_a_restart_continues_with_what_an_emptied_run_directory_holds_then(train
     ],
 )
 def test_a_job_without_claims_of_its_own_lacks_none(make_scene, storage):
-    """An ephemeral run is deleted with its pod, and an existing claim is checked by its name."""
+    """An ephemeral run is deleted with its pod, and the operator checks an existing claim by its name."""
     scene = make_scene(storage=storage)
     scene.there["PersistentVolumeClaim", "runs"] = {
         "metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}
@@ -210,7 +216,7 @@ def test_a_job_without_claims_of_its_own_lacks_none(make_scene, storage):
 
 
 def test_a_replica_that_has_not_trained_gets_a_new_claim(training):
-    """An empty claim loses nothing."""
+    """A replica at step 0 loses nothing with its claim."""
     scene, _ = training()
     scene.objects["claims"].clear()
 
@@ -221,7 +227,10 @@ def test_a_replica_that_has_not_trained_gets_a_new_claim(training):
 
 
 def test_a_claim_of_a_replica_that_has_ended_is_not_looked_for(training, last_word):
-    """People delete the claims of finished jobs, and the operator would send a request every ten seconds."""
+    """People delete the claims of finished jobs.
+
+    The operator would request such a claim every ten seconds.
+    """
     scene, pod = training()
     scene.end(pod, 0, last_word(step=500, reason="Completed"))
     scene.end_job("Complete")

@@ -1,4 +1,4 @@
-"""A TrainingJob is created again under its name while a pod of the old one still terminates."""
+"""A user creates a TrainingJob again under its old name while a pod of the old job still terminates."""
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
@@ -9,7 +9,7 @@ CLAIM = {"kind": "PersistentVolumeClaim", "metadata": {"labels": {"palaestra.dev
 
 
 def made_again(make_scene, *, replica=0, **spec):
-    """Return a job whose replicas are to be created; a pod of its predecessor is on a lost node."""
+    """Return a job without objects; a pod of its predecessor is still on a lost node."""
     scene = make_scene(**spec)
     scene.there[("PersistentVolumeClaim", "shared")] = CLAIM
     old = make_scene(**spec)
@@ -29,21 +29,21 @@ def jobs(decision):
 
 
 def test_a_pod_of_an_earlier_job_holds_up_nothing(make_scene):
-    """The claim's name has the uid of its job, so the two never write to one volume."""
+    """A claim's name contains the uid of its job, so the two jobs never write to one volume."""
     scene, _ = made_again(make_scene, replicas=2)
 
     assert jobs(scene.settle()) == ["job-0", "job-1"]
 
 
 def test_a_pod_on_the_claim_that_both_name_holds_up_its_own_replica_only(make_scene):
-    """Two pods of one replica would write to one run; the other replicas are separate trainings."""
+    """Two pods of one replica number would write to one run directory; the other replicas have their own."""
     scene, _ = made_again(make_scene, replicas=2, **SHARED)
 
     assert jobs(scene.settle()) == ["job-1"]
 
 
 def test_a_replica_that_waits_for_an_old_pod_says_so(make_scene):
-    """A warning has pod, claim and node, because only a person can repair a lost node."""
+    """The warning names pod, claim and node, because only a person can repair a lost node."""
     scene, pod = made_again(make_scene, **SHARED)
 
     decision = scene.settle()
@@ -56,7 +56,7 @@ def test_a_replica_that_waits_for_an_old_pod_says_so(make_scene):
 
 
 def test_the_replica_starts_when_the_old_pod_has_ended(make_scene):
-    """No other action is needed."""
+    """The replica starts by itself, without an action of the user."""
     scene, pod = made_again(make_scene, **SHARED)
     scene.settle()
     pod["status"]["phase"] = "Failed"

@@ -1,23 +1,23 @@
-"""Memory kills of containers are distinguished from crashes and counted, each with its limit."""
+"""Memory kills of containers are counted apart from crashes, each with the memory limit of its container."""
 
 import pytest
 
 from palaestra.decide import fitted
 from palaestra.observe.cache_trim import SIZE
 
-FULL = {"metadata": {"annotations": {SIZE: "1400000"}}}  # the spec leaves no room for its status
+FULL = {"metadata": {"annotations": {SIZE: "1400000"}}}  # the spec leaves almost no bytes for the status
 GROUP = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
 GROUPS = [GROUP, {"name": "evaluate", "role": "Evaluate"}]
 
 
 @pytest.fixture
 def scene_and_pod(training):
-    """Return a job that trains, with a limit for its collecting simulator, and its pod."""
+    """Return a job that trains, whose collecting simulator has a memory limit, and its pod."""
     return training(simulators=GROUPS)
 
 
 def kill(scene, pod, name="sim-collect-0", restarts=1):
-    """Let the kernel kill a container; the kubelet has already restarted it when the operator looks."""
+    """Let the kernel kill a container; the kubelet restarts it before the next reconcile."""
     ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.stamp()}
     scene.container(pod, name, running=True, restarts=restarts)
     for each in pod["status"]["initContainerStatuses"]:
@@ -31,12 +31,12 @@ def told(decision):
 
 
 def kills(scene):
-    """Return container, count and limit of each memory kill."""
+    """Return the container, the count and the limit of each memory kill."""
     return [(each.container, each.times, each.limit) for each in scene.replica().memory_kills]
 
 
 def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and_pod):
-    """On cgroup v2 the kernel kills the whole container, and the first restart has no delay."""
+    """The kubelet restarts a killed container the first time without a delay, so the kill is easy to miss."""
     scene, pod = scene_and_pod
     kill(scene, pod)
 
@@ -52,7 +52,7 @@ def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and
 
 
 def test_each_kill_is_counted_once(scene_and_pod):
-    """It is counted once over all attempts, however often the operator reconciles."""
+    """The count includes all attempts and does not depend on the number of reconciles."""
     scene, pod = scene_and_pod
     kill(scene, pod)
     first = told(scene.settle(1))
@@ -71,7 +71,7 @@ def test_each_kill_is_counted_once(scene_and_pod):
 
 
 def test_a_kill_is_one_event_also_where_the_status_has_no_room(scene_and_pod):
-    """The status has no record of the kill, so each reconcile would report it again while the pod exists."""
+    """A full status drops the record of the kill, so each reconcile would report the kill again."""
     scene, pod = scene_and_pod
     kill(scene, pod)
     scene.settle(1)
@@ -89,7 +89,7 @@ def test_a_kill_is_one_event_also_where_the_status_has_no_room(scene_and_pod):
 
 
 def test_a_simulator_that_crashed_was_not_killed_for_its_memory(scene_and_pod):
-    """The exit code alone does not distinguish the two."""
+    """Both have exit code 137; only the reason `OOMKilled` shows a memory kill."""
     scene, pod = scene_and_pod
     scene.container(pod, "sim-collect-0", waiting="CrashLoopBackOff", code=137, restarts=3)
 
@@ -100,7 +100,7 @@ def test_a_simulator_that_crashed_was_not_killed_for_its_memory(scene_and_pod):
 
 
 def test_a_kill_that_is_the_replicas_reason_is_one_event(scene_and_pod):
-    """The kill is found both in the replica's reason and in the containers."""
+    """The operator finds the kill as the reason of the replica and in the container, but reports it once."""
     scene, pod = scene_and_pod
     scene.container(
         pod, "sim-collect-0", waiting="CrashLoopBackOff", code=137, reason="OOMKilled", restarts=1
@@ -113,7 +113,7 @@ def test_a_kill_that_is_the_replicas_reason_is_one_event(scene_and_pod):
 
 
 def test_without_a_limit_it_was_its_node_that_ran_short(scene_and_pod):
-    """A webhook may remove the limits."""
+    """A webhook may have removed the limits; the message must then name the node's memory as the cause."""
     scene, pod = scene_and_pod
     for each in pod["spec"]["initContainers"]:
         del each["resources"]["limits"]
@@ -125,7 +125,7 @@ def test_without_a_limit_it_was_its_node_that_ran_short(scene_and_pod):
 
 
 def test_the_trainers_kills_are_counted_too(training):
-    """Its pod fails and another is made, whose container starts to count at zero."""
+    """The pod of a killed trainer fails, and the restart count of the next pod's container starts at zero."""
     scene, pod = training(trainer={"resources": {"limits": {"memory": "1Gi"}}})
     scene.end(pod, 137, reason="OOMKilled")
     decision = scene.settle(1)
@@ -141,7 +141,7 @@ def test_the_trainers_kills_are_counted_too(training):
 
 
 def test_a_spent_budget_names_the_memory_that_its_simulators_lacked(training, last_word):
-    """If the kernel kills one process, the trainer sees only a dead simulator."""
+    """The trainer sees only dead simulators; the message must add the memory limit as the cause."""
     scene, pod = training()
     for each in pod["spec"]["initContainers"]:
         each["resources"] = {"limits": {"memory": "150Mi"}}

@@ -1,4 +1,4 @@
-"""A trainer that starts slowly, and one that the kubelet ends because a probe failed."""
+"""A trainer that starts slowly, and a trainer that the kubelet ends after a failed probe."""
 
 import pytest
 
@@ -26,19 +26,19 @@ def start_slowly(accepted):
 
 
 def end_by_probe(scene, pod, words=LIVENESS, code=75):
-    """Let the kubelet end the trainer of a pod, and emit the event with the reason."""
+    """Let the kubelet end the trainer of a pod, and emit an event with the reason."""
     scene.end(pod, code, SIGNALLED)
     event = {"involvedObject": {"uid": pod["metadata"]["uid"]}, "reason": "Killing", "message": words}
     scene.objects["events"].append({**event, "lastTimestamp": scene.stamp()})
 
 
 def running(scene):
-    """Return the condition for which `kubectl wait` waits."""
+    """Return the status of the condition that `kubectl wait` reads."""
     return next(each.status.value for each in scene.status.conditions if each.type == "Running")
 
 
 def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
-    """The import of PyTorch takes minutes on a busy node, and nothing is trained meanwhile."""
+    """On a busy node, importing PyTorch takes minutes, in which the trainer does not train."""
     scene, _ = start_slowly()
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "Starting")
@@ -48,7 +48,7 @@ def test_a_trainer_that_has_not_answered_yet_starts(start_slowly):
 
 @pytest.mark.parametrize("answer", ["to the kubelet", "to the operator"])
 def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
-    """The kubelet's report and the operator's own poll may come in any order."""
+    """The trainer responds to the kubelet's probe or to the operator's poll, in any order."""
     scene, pod = start_slowly()
     if answer == "to the kubelet":
         pod["status"]["containerStatuses"][0]["started"] = True
@@ -60,7 +60,7 @@ def test_a_trainer_runs_once_it_has_answered(start_slowly, answer):
 
 
 def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly):
-    """A trainer that hangs in an import has not started."""
+    """A trainer that hangs in an import never does a first step."""
     scene, _ = start_slowly(startTimeoutSeconds=600)
 
     scene.settle(601)
@@ -71,7 +71,7 @@ def test_the_start_timeout_counts_while_a_trainer_has_not_answered(start_slowly)
 
 @pytest.mark.parametrize(("words", "probe"), [(LIVENESS, "liveness"), (STARTUP, "startup")])
 def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words, probe):
-    """The pod does not show who sent the signal; only the kubelet's event does."""
+    """The pod does not show the sender of the signal; only the kubelet's event does."""
     scene, pod = training()
     end_by_probe(scene, pod, words)
 
@@ -84,13 +84,13 @@ def test_a_trainer_that_its_probe_ended_says_so_with_the_remedy(training, words,
 
 
 def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training):
-    """The Job ignores exit code 75, so it would replace such pods for ever."""
+    """The Job counts no failure for exit code 75. Without the operator's count it would retry for ever."""
     scene, pod = training()
     end_by_probe(scene, pod)
 
     decision = scene.settle()
     scene.settle(60)
-    scene.objects["events"].clear()  # the operator requests no events of an older pod
+    scene.objects["events"].clear()  # the operator does not request the events of an older pod
     scene.running_pod()
     scene.settle()
 
@@ -102,7 +102,7 @@ def test_a_trainer_that_its_probe_ended_counts_once_and_evicts_nothing(training)
 
 
 def test_probes_end_a_replica_after_backoff_limit_retries(training):
-    """The limit counts retries, so n + 1 pods are allowed, as for a pod that fails by itself."""
+    """The limit n counts retries, so n + 1 pods run, as for a trainer that fails by itself."""
     scene, pod = training(backoffLimit=2)
     for _ in range(2):
         end_by_probe(scene, pod)
@@ -119,7 +119,10 @@ def test_probes_end_a_replica_after_backoff_limit_retries(training):
 
 
 def test_a_trainer_that_its_probe_killed_keeps_its_reason_when_the_next_pod_is_there(training):
-    """The Job counts exit code 137 itself; the event is about an older pod by then, and is not read again."""
+    """The Job counts exit code 137 itself.
+
+    The operator does not read the event of the older pod again, so the status must keep the reason.
+    """
     scene, pod = training()
     end_by_probe(scene, pod, code=137)
     decision = scene.settle()
@@ -136,7 +139,7 @@ def test_a_trainer_that_its_probe_killed_keeps_its_reason_when_the_next_pod_is_t
 
 
 def test_a_deleted_pod_was_not_ended_by_its_probe(training):
-    """The kubelet's event only reports that it stops the container, not that a probe failed."""
+    """For a deleted pod the kubelet also emits `Killing`, but without a failed probe in its message."""
     scene, pod = training()
     scene.delete(pod)
     end_by_probe(scene, pod, "Stopping container trainer")
@@ -149,7 +152,7 @@ def test_a_deleted_pod_was_not_ended_by_its_probe(training):
 
 @pytest.mark.parametrize("saved", [False, True])
 def test_the_next_pod_resumes_only_where_there_is_a_checkpoint(training, saved):
-    """An attempt that ended before it began has saved nothing."""
+    """An attempt that ended before its first checkpoint has saved nothing."""
     scene, pod = training()
     checkpoint = CheckpointStatus(step=5, time="2026-01-31T12:00:00Z") if saved else None
     scene.poll(pod, step=5, last_checkpoint=checkpoint)

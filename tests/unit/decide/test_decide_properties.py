@@ -1,4 +1,4 @@
-"""These properties hold for every job, whatever objects a cluster has and in whatever order they appear."""
+"""Properties that hold for every job, for any objects in the cluster and any order of their appearance."""
 
 from copy import deepcopy
 from datetime import UTC, datetime, timedelta
@@ -115,7 +115,7 @@ def conditions(*kinds):
 
 @st.composite
 def pods(draw, planned):
-    """Return a pod of a replica, however odd."""
+    """Return a pod of a replica, which may have invalid fields."""
     template = planned["spec"]["template"]
     number = draw(st.integers(0, 3))
     spec = trimmed({"kind": "Pod", **deepcopy(template)})["spec"]
@@ -186,7 +186,7 @@ events = st.fixed_dictionaries(
 
 @st.composite
 def clusters(draw, planned):
-    """Return the objects that a cluster may have of a job."""
+    """Return objects of a job that a cluster may have."""
     jobs = []
     for each in planned.replicas.values():
         if draw(st.booleans()):
@@ -227,14 +227,14 @@ SPEC = {
 
 
 def raw(status=None):
-    """Return the job of all these tests."""
+    """Return the job that all these tests use, with a given status."""
     metadata = {"name": "job", "uid": "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e", "generation": 1}
     head = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": metadata}
     return head | {"spec": SPEC} | ({"status": status} if status is not None else {})
 
 
 def one(obj, objects, times=None):
-    """Return one decision."""
+    """Return the decision on an object."""
     job = accept(obj)
     observed = observe(job, objects)
     times = times or Times(now=START, clock_s=CLOCK_S)
@@ -261,7 +261,7 @@ def decisions(history):
 @settings(max_examples=30)
 @given(histories)
 def test_deciding_again_says_nothing_new(history):
-    """The operator is level-triggered: the new status with the same objects gives the same status."""
+    """The operator is level-triggered: a second decision on the same objects changes no status."""
     for _, objects, times, decision in decisions(history):
         again = one(raw(as_data(decision.status)), objects, times)
 
@@ -273,7 +273,7 @@ def test_deciding_again_says_nothing_new(history):
 @settings(max_examples=30)
 @given(histories)
 def test_an_end_is_an_end(history):
-    """No job and no replica leaves a terminal phase or is planned again."""
+    """A terminal phase never changes, and the operator never plans an ended replica again."""
     for before, _, _, decision in decisions(history):
         ended = {each.index for each in before.replicas if each.phase in TERMINAL}
         now_ended = {each.index for each in decision.status.replicas if each.phase in TERMINAL}
@@ -288,7 +288,7 @@ def test_an_end_is_an_end(history):
 @settings(max_examples=30)
 @given(histories)
 def test_counts_never_fall_and_always_add_up(history):
-    """The number of the attempt is one more than the sum of the restarts of all causes."""
+    """The attempt number is one more than the sum of the restarts of all causes."""
     for before, _, _, decision in decisions(history):
         for old, new in zip(before.replicas, decision.status.replicas, strict=False):
             was, now = old.restarts, new.restarts
@@ -303,16 +303,16 @@ def test_counts_never_fall_and_always_add_up(history):
 
 
 def kept(replica):
-    """Return the number of the remembered attempt, or 0."""
+    """Return the number of the attempt in `lastAttempt`, or 0."""
     return replica.last_attempt.attempt if replica.last_attempt else 0
 
 
 @settings(max_examples=30)
 @given(histories)
 def test_phase_and_conditions_tell_the_same(history):
-    """At most one of these conditions is true, and it is that of the phase.
+    """At most one condition of a phase is true, and it belongs to the current phase.
 
-    The same holds for Reconciling and Stalled.
+    At most one of Reconciling and Stalled is true.
     """
     for _, _, _, decision in decisions(history):
         status = decision.status
@@ -341,7 +341,7 @@ def test_what_is_written_is_within_the_bounds_of_the_definition(history):
 @settings(max_examples=30)
 @given(st.lists(garbage, max_size=3), st.lists(garbage, max_size=3))
 def test_garbage_is_as_good_as_nothing(things, others):
-    """One invalid object must not delay any other."""
+    """One invalid object must not keep the operator from reconciling the others."""
     objects = Objects(jobs=things, pods=others, claims=things, events=others, config_maps=things)
 
     assert one(raw(), objects).status.phase is Phase.PENDING

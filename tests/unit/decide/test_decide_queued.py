@@ -13,7 +13,7 @@ AGAIN = "; it continues when it is admitted again"
 
 @pytest.fixture
 def queued(make_scene):
-    """A job in a queue that has not been admitted."""
+    """Return a job that waits in a queue and was never admitted."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()
@@ -21,13 +21,13 @@ def queued(make_scene):
 
 
 def say(scene, words):
-    """Set the reason in the Job's Workload why it is not admitted."""
+    """Set the message with which Kueue explains in the Workload why it does not admit the Job."""
     scene.unadmitted = {scene.job()["metadata"]["uid"]: words}
     return scene.settle()
 
 
 def test_the_status_has_the_words_of_kueue(queued):
-    """Authors of jobs may have no permission to read Workloads."""
+    """The author of a job may lack the permission to read Workloads."""
     decision = say(queued, SHORT)
 
     assert (queued.status.phase, queued.replica().reason) == (Phase.SUSPENDED, "Queued")
@@ -39,7 +39,7 @@ def test_the_status_has_the_words_of_kueue(queued):
 
 
 def admit_and_take_back(scene, last_word):
-    """Let Kueue admit the job, and then preempt its pod."""
+    """Let Kueue admit the job and then preempt its pod."""
     scene.job()["spec"]["suspend"] = False
     pod = scene.running_pod()
     scene.settle()
@@ -50,7 +50,7 @@ def admit_and_take_back(scene, last_word):
 
 
 def test_long_words_leave_the_rest_of_the_message_whole(queued, last_word):
-    """Kueue lists every flavor that it tried."""
+    """Kueue's message lists every flavor that it tried, so the operator shortens only this part."""
     admit_and_take_back(queued, last_word)
 
     say(queued, "x" * 600)
@@ -63,7 +63,7 @@ def test_long_words_leave_the_rest_of_the_message_whole(queued, last_word):
 
 @pytest.mark.parametrize("words", [SHORT, "LocalQueue robots doesn't exist"])
 def test_an_operator_that_was_restarted_keeps_the_words_until_it_has_asked(words, queued):
-    """Otherwise each restart would write the status of a thousand waiting jobs twice."""
+    """If a restart removed the messages, the operator would write each waiting job's status twice."""
     say(queued, words)
     before = queued.raw["status"]
 
@@ -75,7 +75,7 @@ def test_an_operator_that_was_restarted_keeps_the_words_until_it_has_asked(words
 
 
 def test_words_that_no_longer_hold_are_dropped(queued):
-    """The operator has read the Workload, and it has no reason now."""
+    """The operator has read the Workload again, which has no message now."""
     say(queued, SHORT)
 
     say(queued, "")
@@ -84,7 +84,7 @@ def test_words_that_no_longer_hold_are_dropped(queued):
 
 
 def test_words_of_the_time_before_a_pod_are_not_kept(queued, last_word):
-    """The job was admitted since then; it now waits for another reason."""
+    """Kueue has admitted the job since that message, so the new wait has another cause."""
     say(queued, SHORT)
     queued.unadmitted = {}
 
@@ -94,7 +94,7 @@ def test_words_of_the_time_before_a_pod_are_not_kept(queued, last_word):
 
 
 def test_the_end_of_an_attempt_has_no_words_about_the_next(queued, last_word):
-    """The reason of the preemption and the reason of the new wait are two things."""
+    """Kueue's message explains the new wait, not the preemption that ended the attempt."""
     admit_and_take_back(queued, last_word)
 
     say(queued, SHORT)
@@ -104,9 +104,9 @@ def test_the_end_of_an_attempt_has_no_words_about_the_next(queued, last_word):
 
 
 def test_a_workload_that_was_not_read_is_reported_once(queued):
-    """The same holds for missing pods: the operator requests the events of at most 4,000 Jobs.
+    """The operator reads the Workloads of only a limited number of waiting Jobs.
 
-    Only the Workload has the reason; `kubectl describe` of the Job or the TrainingJob does not show it.
+    The message then names `kubectl describe workload`: only the Workload has the cause.
     """
     say(queued, SHORT)
     queued.unadmitted = {}

@@ -1,4 +1,4 @@
-"""A job is read whole only when it is planned, and a plan needs the verdicts on its worlds."""
+"""The operator reads a whole job only to plan it, and plans it only after its worlds were checked."""
 
 from dataclasses import replace
 
@@ -25,14 +25,14 @@ def config_map(data=None, labels=None):
 
 
 def observed(scene):
-    """Return the job of a scene, its observed state, and the layout."""
+    """Return the job of a scene, its observed state and the layout."""
     job = accept(scene.raw)
     sources = {each: scene.there.get((each.kind.value, each.name)) for each in references(job)}
     return job, replace(observe(job, Objects(**scene.objects)), sources=sources), scene.layout
 
 
 def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accepted):
-    """A cache holds only digests, and each full read transfers a megabyte."""
+    """The cache holds only digests of large fields; a whole read may transfer a megabyte."""
     to_plan, planned, waits = make_scene(), accepted(), make_scene(simulators=WORLD)
 
     assert wants_whole(*observed(to_plan), Lacking.TEXTS)
@@ -42,12 +42,12 @@ def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accep
 
 
 def test_a_job_that_lacks_references_is_read_whole_even_while_it_waits(make_scene):
-    """The object that it waits for may be among the missing references."""
+    """The cached job lacks references, one of which may name the object that the job waits for."""
     assert wants_whole(*observed(make_scene(simulators=WORLD)), Lacking.FIELDS)
 
 
 def test_a_job_that_has_failed_is_not_read_again(make_scene):
-    """A refused job never gets an object."""
+    """The operator never creates objects for a refused job, so it does not need the whole job."""
     scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "no world"}}, GROUPS[1]])
     scene.settle()
 
@@ -55,7 +55,7 @@ def test_a_job_that_has_failed_is_not_read_again(make_scene):
 
 
 def test_a_claim_that_only_the_initial_policy_names_counts_as_there(make_scene):
-    """The operator does not create that claim, so a Job that mounts it is complete."""
+    """The operator does not create this claim, so a Job that mounts it lacks no object."""
     scene = make_scene(trainer=INITIAL)
     scene.there[("PersistentVolumeClaim", "runs")] = {"metadata": {"name": "runs", "labels": OPEN}}
     scene.settle()
@@ -78,7 +78,7 @@ COSTLY = "spec.simulators[0].world.inline: its check takes more than its budget"
     ],
 )
 def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
-    """Another process has checked the world, so its bytes are not read here."""
+    """Another process checks the world, so the decision uses its verdict and does not read the world."""
     scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "not read"}}, GROUPS[1]])
     job = accept(scene.raw)
     [world] = worlds_to_check(job, observe(job, Objects()), scene.layout)
@@ -92,7 +92,7 @@ def test_the_verdict_on_a_world_decides(make_scene, verdict, reason, phase):
 
 
 def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
-    """The owner of the ConfigMap could otherwise cause a costly check with every change of it."""
+    """If the job could be retried, each change of the ConfigMap would cause another costly check."""
     scene = make_scene(simulators=WORLD)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     job = accept(scene.raw)
@@ -107,7 +107,7 @@ def test_a_costly_world_of_a_config_map_is_final_too(make_scene):
 
 
 def test_a_job_whose_worlds_wait_is_not_read_again(make_scene):
-    """The job may be large, and nothing else is decided before its worlds are checked."""
+    """The job may be large, and the operator decides nothing before the worlds are checked."""
     scene = make_scene(simulators=WORLD)
     job = accept(scene.raw)
     observed = replace(observe(job, Objects()), worlds_wait=True)

@@ -1,4 +1,4 @@
-"""`Reconciling` and `Stalled` are the conditions that kstatus reads for `helm --wait`, Flux and Argo CD."""
+"""kstatus reads the conditions `Reconciling` and `Stalled` for `helm --wait`, Flux and Argo CD."""
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import ConditionStatus, Phase
@@ -11,21 +11,21 @@ NO_WORLD = [
 
 
 def gaps(status):
-    """Return reason and message of `Reconciling` and `Stalled` by type; both must be true."""
+    """Return the reason and the message of `Reconciling` and `Stalled`, if present, which must be true."""
     found = {each.type.value: each for each in status.conditions[5:]}
     assert all(each.status is ConditionStatus.TRUE for each in found.values())
     return {kind: (each.reason, each.message) for kind, each in found.items()}
 
 
 def test_a_job_that_trains_is_as_its_spec_asks(training):
-    """A job runs for hours: `helm --wait` returns before its end, as it does for a Kubernetes Job."""
+    """A job runs for hours, so `helm --wait` returns when it trains, as for a Kubernetes Job."""
     scene, _ = training()
 
     assert gaps(scene.status) == {}
 
 
 def test_a_job_that_has_succeeded_is_as_its_spec_asks(training, last_word):
-    """The job stays in the Git repository after its end."""
+    """The job stays in the Git repository after its end, where it must count as complete."""
     scene, pod = training()
     scene.end(pod, 0, last_word(reason="Completed: the training is complete"))
     scene.end_job("Complete")
@@ -36,7 +36,7 @@ def test_a_job_that_has_succeeded_is_as_its_spec_asks(training, last_word):
 
 
 def test_a_job_whose_pod_cannot_start_is_on_its_way(accepted):
-    """An image is often pushed a moment later, and the cluster retries by itself."""
+    """An image is often pushed a moment later, and the kubelet retries the pull by itself."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
     scene.settle()
@@ -45,7 +45,7 @@ def test_a_job_whose_pod_cannot_start_is_on_its_way(accepted):
 
 
 def test_a_job_that_lacks_a_world_is_stalled_until_the_world_is_there(make_scene):
-    """`helm install --wait` returned after a tenth of a second, and the release counted as deployed."""
+    """Without `Stalled`, `helm install --wait` returned at once, and the release counted as deployed."""
     scene = make_scene(simulators=NO_WORLD)
     scene.settle()
 
@@ -60,7 +60,7 @@ def test_a_job_that_lacks_a_world_is_stalled_until_the_world_is_there(make_scene
 
 
 def test_a_job_that_failed_is_stalled_with_the_whole_reason(training, last_word):
-    """Helm and Flux print only this message."""
+    """Helm and Flux print only the message of this condition."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")
@@ -72,7 +72,7 @@ def test_a_job_that_failed_is_stalled_with_the_whole_reason(training, last_word)
 
 
 def test_a_job_that_was_refused_is_stalled(make_scene):
-    """A spec does not change, so the job can never start."""
+    """Nobody can change the spec, so the job can never start."""
     scene = make_scene()
 
     status = reject(scene.raw, JobRefused(Reason.INVALID_SPEC, "spec.seed: too large"), scene.now).status
@@ -82,7 +82,7 @@ def test_a_job_that_was_refused_is_stalled(make_scene):
 
 
 def test_a_job_that_is_to_be_suspended_is_as_its_spec_asks_once_its_pod_is_gone(training):
-    """A release with `suspend: true` is complete only after the checkpoint is written."""
+    """A release with `suspend: true` must be complete only after the trainer has written its checkpoint."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.raw["metadata"]["generation"] = 2
@@ -103,7 +103,7 @@ def test_a_job_that_is_to_be_suspended_is_as_its_spec_asks_once_its_pod_is_gone(
 
 
 def test_a_job_that_waits_in_a_queue_is_on_its_way(make_scene):
-    """Its author wants a training, and the queue will admit it sooner or later."""
+    """The author wants a training, and Kueue will admit the job sooner or later."""
     scene = make_scene(scheduling={"queueName": "trainings"})
     scene.kueue = True
     scene.settle()
@@ -113,7 +113,7 @@ def test_a_job_that_waits_in_a_queue_is_on_its_way(make_scene):
 
 
 def test_a_condition_that_goes_on_keeps_its_time(accepted):
-    """Flux shows the time since which a condition holds."""
+    """Flux shows since when a condition holds, so a reconcile must not reset this time."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
     scene.settle()
@@ -125,7 +125,7 @@ def test_a_condition_that_goes_on_keeps_its_time(accepted):
 
 
 def test_a_job_in_a_queue_is_on_its_way_whatever_its_spec_says_of_a_suspension(training):
-    """A queue for a whole namespace ignores `suspend`: the job starts as soon as Kueue admits it."""
+    """In the default queue of a namespace, `suspend` has no effect: the job starts when Kueue admits it."""
     scene, _ = training(suspend=False)
     scene.raw["spec"]["suspend"] = True
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
@@ -143,7 +143,7 @@ def test_a_job_in_a_queue_is_on_its_way_whatever_its_spec_says_of_a_suspension(t
 
 
 def test_a_job_that_failed_before_the_condition_was_known_gets_it(training, last_word):
-    """Its failure is final; without the condition it would count as complete for ever."""
+    """A failed job without the condition would count as complete for ever."""
     scene, pod = training()
     scene.end(pod, 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")

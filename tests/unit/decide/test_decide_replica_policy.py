@@ -1,13 +1,13 @@
-"""Three lists are the order in which a replica is checked; docs/explain/judging.md shows them."""
+"""Three lists give the order in which the operator checks a replica; docs/explain/judging.md shows them."""
 
 from palaestra.decide.replica_policy import REASONS, CheckKind
 from tools.judging import page
 
 
 def test_the_page_has_a_row_for_each_check_in_its_order():
-    """A row has number, class, name and the first line of the docstring.
+    """A row has the number, the class, the name and the first line of the docstring of a check.
 
-    Test_golden.py compares it with the file.
+    Test_golden.py compares the table with the page.
     """
     rows = page.table().splitlines()[2:]
 
@@ -16,7 +16,7 @@ def test_the_page_has_a_row_for_each_check_in_its_order():
 
 
 def test_the_first_line_of_a_check_fits_into_a_cell():
-    """A bar would break the row, and a check without a docstring would have an empty cell."""
+    """A vertical bar would break the row, and a check without a docstring would have an empty cell."""
     firsts = [check.__doc__.strip().splitlines()[0] for _, check in page.CHECKS if check.__doc__]
 
     assert len(firsts) == len(page.CHECKS)
@@ -29,5 +29,5 @@ def test_each_check_is_in_one_list_once():
 
 
 def test_the_last_reason_always_holds():
-    """Whatever state a replica has, its status must report one."""
+    """A replica in any state must get a reason, so the last check of the list always applies."""
     assert REASONS[-1][0] is CheckKind.SHOWN

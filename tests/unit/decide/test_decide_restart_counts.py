@@ -1,15 +1,15 @@
-"""The counts of attempts and restarts are exact, whatever the operator has seen, and never decrease."""
+"""The counts of attempts and restarts are exact even if the operator missed changes, and never decrease."""
 
 
 def restarts(scene):
-    """Return the attempt, and the restarts by trainer, disruption, suspension and simulator."""
+    """Return the attempt, and the restarts by trainer, disruption and suspension."""
     replica = scene.replica()
     counts = replica.restarts
     return replica.attempt, counts.trainer, counts.disruption, counts.suspension
 
 
 def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
-    """The last failure causes no restart."""
+    """No pod follows the last failure, so a failure alone is not a restart."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -24,7 +24,7 @@ def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
 
 
 def test_a_pod_that_was_taken_is_a_disruption(training):
-    """A disruption does not count against backoffLimit."""
+    """The Job does not count a disruption against `backoffLimit`."""
     scene, pod = training()
     scene.take(pod)
     scene.pass_(5)
@@ -36,7 +36,7 @@ def test_a_pod_that_was_taken_is_a_disruption(training):
 
 
 def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
-    """The pod is gone without a trace, and another one exists."""
+    """The deleted pod left no record, but a newer pod exists."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(5)
@@ -48,7 +48,7 @@ def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
 
 
 def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
-    """The Job has counted it as a failure."""
+    """Somebody deleted the failed pod, but its Job has counted the failure."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.count_failures(1)
@@ -61,7 +61,7 @@ def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
 
 
 def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
-    """The pods are sufficient; pods and Jobs come from two watches."""
+    """Pods and Jobs come from two watches; the failed pod already shows the failure."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.pass_(15)
@@ -76,7 +76,7 @@ def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
 
 
 def test_a_pod_that_is_seen_late_is_not_needed_either(training):
-    """The Job's count is kept until the pod is seen to be replaced."""
+    """The operator keeps the Job's count until it sees the next pod."""
     scene, pod = training()
     scene.count_failures(1)
     scene.settle()
@@ -92,7 +92,7 @@ def test_a_pod_that_is_seen_late_is_not_needed_either(training):
 
 
 def test_what_happened_while_nobody_looked_is_counted(training, last_word):
-    """Failed pods stay in the cluster; the record in the run directory has the others."""
+    """Failed pods stay in the cluster, and the run directory has a record of all attempts."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -108,7 +108,7 @@ def test_what_happened_while_nobody_looked_is_counted(training, last_word):
 
 
 def test_a_record_that_cannot_be_true_is_not_believed(training):
-    """A pod may write anything into its record."""
+    """A pod may report any attempt number, which must not become the count."""
     scene, pod = training()
     scene.poll(pod, attempt=2**53)
 
@@ -118,7 +118,7 @@ def test_a_record_that_cannot_be_true_is_not_believed(training):
 
 
 def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simulator):
-    """A trainer counts within its attempt; its last word may have more restarts than the last poll."""
+    """A trainer counts only its own attempt; its termination message may add restarts since the last poll."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(restarts=2), simulator(name="evaluate-0", restarts=1)))
     scene.settle()
@@ -139,7 +139,7 @@ def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simula
 
 
 def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_word, simulator):
-    """The failed pods still have their termination messages."""
+    """The operator never polled these pods, but their termination messages have the counts."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(restarts=1),))
     scene.settle()
@@ -155,7 +155,7 @@ def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_wor
 
 
 def test_a_new_attempt_does_not_show_step_0(training, last_word):
-    """The trainer reports step 0 until it has read its run directory; the status keeps the known step."""
+    """A new trainer reports step 0 until it has read the run directory; the status keeps the known step."""
     scene, pod = training()
     scene.end(pod, 75, last_word(step=50, attempt=1))
     scene.settle(5)

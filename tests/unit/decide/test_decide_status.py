@@ -1,4 +1,4 @@
-"""The parts of the status that people read: columns, conditions, events."""
+"""The parts of a status that people read: columns, conditions and events."""
 
 import json
 
@@ -20,7 +20,7 @@ from palaestra_protocol.pod.status import (
 
 
 def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
-    """A job has advanced as far as its last replica."""
+    """A job has advanced only as far as its slowest replica."""
     scene = accepted(replicas=3)
     for index, (step, rate) in enumerate([(30, 0.9), (20, 0.5)]):
         scene.poll(scene.running_pod(index), step=step, success_rate=rate)
@@ -31,7 +31,7 @@ def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
 
 
 def test_what_is_not_known_is_absent_and_never_zero(training):
-    """People would believe a rate of 0."""
+    """A reader would take a success rate of 0 for a measured value."""
     scene, _ = training()
 
     status, replica = scene.status, scene.replica()
@@ -39,7 +39,7 @@ def test_what_is_not_known_is_absent_and_never_zero(training):
 
 
 def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
-    """The last known step stays true, but the speed is unknown."""
+    """If the trainer does not respond, its last step is still correct, but its current speed is unknown."""
     scene, pod = training()
     scene.poll(pod, step=30, steps_per_second=20.0, mean_return=1.0)
     scene.settle()
@@ -52,7 +52,7 @@ def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
 
 
 def test_figures_have_the_four_decimals_that_people_read(training):
-    """`kubectl get` prints the value as it is stored, and nobody wants to read 0.3333333333333333."""
+    """`kubectl get` prints the stored value, and nobody wants to read 0.3333333333333333."""
     scene, pod = training()
     scene.poll(pod, step=30, success_rate=1 / 3, mean_return=-0.0770739148936, steps_per_second=251.23456)
 
@@ -64,7 +64,7 @@ def test_figures_have_the_four_decimals_that_people_read(training):
 
 
 def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
-    """The next attempt has no interval before its first evaluation."""
+    """The next attempt reports no interval before its first evaluation."""
     scene, pod = training()
     scene.poll(pod, step=30, success_rate=0.9, success_interval=SuccessInterval(low=0.7, high=1, episodes=20))
     scene.settle()
@@ -77,7 +77,7 @@ def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
 
 
 def test_the_status_lists_simulators(training, simulator):
-    """Each simulator has its last faults on one line."""
+    """The last fault of each simulator is shown on one line."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
 
@@ -90,7 +90,10 @@ def test_the_status_lists_simulators(training, simulator):
 
 
 def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
-    """All replicas have the same worlds; the report remains after the pod that made it is gone."""
+    """All replicas have the same worlds, so the job has one list.
+
+    The list stays after the pod that reported it is deleted.
+    """
     scene = accepted(replicas=2)
     pods = [scene.running_pod(index) for index in range(2)]
     scene.poll(pods[0])
@@ -106,7 +109,7 @@ def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
 
 
 def test_the_status_shows_goodput_and_faults(training, simulator):
-    """In whole seconds, if the trainer reports them."""
+    """The values are in whole seconds, and absent until the trainer reports them."""
     scene, pod = training()
     scene.poll(pod, step=1)
     scene.settle()
@@ -126,13 +129,13 @@ def test_the_status_shows_goodput_and_faults(training, simulator):
 
 
 def test_every_cause_and_every_kind_of_fault_has_a_field():
-    """The operator reads the values of a trainer by name."""
+    """The operator copies a trainer's values by name, so a missing field would lose a value."""
     assert {to_camel(cause) for cause in Cause} == {to_camel(name) for name in Goodput.model_fields}
     assert {kind.value for kind in FaultKind} == set(Faults.model_fields)
 
 
 def test_a_status_of_two_replicas_stays_small(accepted, simulator):
-    """People read it and an API server stores it, so this test gives every field its longest value."""
+    """People read the status and an API server stores it; here every text has its longest value."""
     scene = accepted(replicas=2)
     fact = "x" * 500
     faults = tuple(
@@ -159,7 +162,7 @@ def test_a_status_of_two_replicas_stays_small(accepted, simulator):
 
 
 def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
-    """The time is as the trainer wrote it; an impossible date is left out."""
+    """The status has the time that the trainer wrote; a checkpoint with an impossible date is ignored."""
     scene, pod = training()
     scene.poll(pod, last_checkpoint=CheckpointStatus(step=5, time="2026-01-31T11:59:00+01:00"))
     scene.settle()
@@ -172,7 +175,7 @@ def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
 
 
 def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(training, last_word):
-    """Its simulators are still being stopped; nothing is retried, and nothing starts."""
+    """Kubernetes still stops the simulators of the pod, so the operator neither retries nor starts a pod."""
     scene, pod = training()
     scene.container(pod, "trainer", code=0, message=last_word(step=100))
 
@@ -183,7 +186,7 @@ def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(t
 
 
 def test_a_condition_keeps_the_time_at_which_it_last_changed(training):
-    """A new message is not a transition."""
+    """A new message alone is not a transition of the condition."""
     scene, pod = training()
     before = scene.status.conditions[1]
     scene.poll(pod, step=1)
@@ -199,7 +202,7 @@ def messages(scene):
 
 
 def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits(accepted):
-    """`kubectl describe` printed the same 300 characters four times, which hid the important lines."""
+    """With the same 300 characters in four conditions, `kubectl describe` hid the important lines."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
 
@@ -217,7 +220,7 @@ def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits
 
 
 def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(accepted, last_word):
-    """For the same reason; `palaestra watch` and the event get the message there."""
+    """`palaestra watch` and the event take the message from these conditions; the others refer to it."""
     scene = accepted()
     scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))
     scene.end_job("Failed", 0, "PodFailurePolicy")
@@ -230,14 +233,14 @@ def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(acc
 
 
 def test_every_condition_keeps_the_reason_in_one_word(accepted):
-    """Programs that read any condition, and the column of `kubectl get`, still find the reason."""
+    """Programs that read any condition, and the column of `kubectl get`, need the reason."""
     scene = accepted()
 
     assert {each.reason for each in scene.status.conditions[1:]} == {"Starting"}
 
 
 def test_the_start_is_that_of_the_first_pod_and_stays(training):
-    """The time remains after that pod is gone."""
+    """`startTime` must stay after the first pod is deleted."""
     scene, _ = training()
     first = scene.status.start_time
     scene.objects["pods"].clear()
@@ -251,14 +254,14 @@ def test_the_start_is_that_of_the_first_pod_and_stays(training):
 
 
 def test_an_ephemeral_run_is_named_in_a_condition(accepted):
-    """A user may have chosen it by mistake."""
+    """A user who chose `ephemeral` by mistake must see that the run will be deleted."""
     scene = accepted(storage={"ephemeral": True})
 
     assert scene.status.conditions[0].message.endswith("; the run is ephemeral and goes with its pod")
 
 
 def test_each_action_and_each_change_is_one_event(make_scene):
-    """Creating all objects of a replica is one event, and no event repeats."""
+    """The creation of all objects of a replica is one event, and no event is repeated."""
     scene = make_scene()
 
     told = [(each.reason.value, each.replica) for each in scene.settle().events]
@@ -267,7 +270,7 @@ def test_each_action_and_each_change_is_one_event(make_scene):
 
 
 def test_suspending_suspended_and_resumed_are_an_event_each(training):
-    """The first says that the pod saves a checkpoint, the second that it has ended."""
+    """`Suspending` shows that the pod saves a checkpoint; `Suspended` shows that the pod has ended."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
     suspending = [each.reason.value for each in scene.settle().events]
@@ -283,7 +286,7 @@ def test_suspending_suspended_and_resumed_are_an_event_each(training):
 
 @pytest.mark.parametrize("replicas", [1, 2])
 def test_a_job_whose_replicas_all_fail_alike_says_why(accepted, last_word, replicas):
-    """The message must have the common reason, not only the fact that they failed."""
+    """The message must have the common reason, not only the number of failed replicas."""
     scene = accepted(replicas=replicas)
     for index in range(replicas):
         scene.end(scene.running_pod(index), 81, last_word(reason="Diverged: NaN"))
@@ -297,7 +300,7 @@ def test_a_job_whose_replicas_all_fail_alike_says_why(accepted, last_word, repli
 
 
 def test_nothing_is_planned_where_nothing_is_missing(training):
-    """Two hundred jobs are reconciled every ten seconds, and their worlds are generated only once."""
+    """With two hundred jobs, the operator must not generate their worlds again every ten seconds."""
     scene, _ = training()
     job = accept(scene.raw)
     prepared = prepare(job, observe(job, Objects(**scene.objects)), scene.layout)

@@ -1,4 +1,4 @@
-"""A change that people wait for is written at once; progress is written every half minute."""
+"""The operator writes changes that people wait for at once, and progress every half minute."""
 
 from copy import deepcopy
 
@@ -31,19 +31,22 @@ def changed(change):
 
 
 def test_what_is_equal_is_not_written():
-    """Without a change, the operator sends no request."""
+    """An unchanged status must cause no request to the API server."""
     assert write_in_s(OLD, deepcopy(OLD), None) is None
 
 
 def test_an_empty_list_is_not_written():
-    """`kubectl describe` prints a heading with nothing below it."""
+    """For an empty list, `kubectl describe` would print a heading without content."""
     written = as_data(Status(replicas=(ReplicaStatus(index=0),)))
 
     assert [name for name, value in written["replicas"][0].items() if value == []] == []
 
 
 def test_a_list_that_an_older_definition_adds_is_no_change():
-    """Otherwise the operator would write the status again and again."""
+    """An API server with an older definition adds empty lists.
+
+    As a change, they would cause endless writes.
+    """
     added = deepcopy(OLD)
     added["replicas"][0]["memoryKills"] = []
 
@@ -51,9 +54,9 @@ def test_a_list_that_an_older_definition_adds_is_no_change():
 
 
 def test_active_time_is_written_with_what_else_changes():
-    """On its own it would cause a write every half minute for a waiting job.
+    """Active time changes constantly, so on its own it would cause a write every half minute.
 
-    With progress it costs nothing.
+    Together with progress it causes no extra write.
     """
     active = {"activeSeconds": 30, "activeSince": "2026-01-31T12:00:30Z"}
 
@@ -100,14 +103,14 @@ def queued(words):
     ],
 )
 def test_amounts_that_change_with_each_job_of_the_queue_are_written_as_progress(words, wait_s):
-    """A new shortage is news, but its amount changes whenever another job comes or goes."""
+    """A newly missing resource is written at once. Its amount changes whenever another job comes or goes."""
     old = queued("cpu in flavor any-machine, 425m more needed")
 
     assert write_in_s(old, queued(words), 5) == wait_s
 
 
 def test_a_number_in_another_message_is_news():
-    """An example is the number of crashes of a sidecar."""
+    """For example, the message has the number of crashes of a sidecar, which a user must see at once."""
     old = changed({"reason": "SidecarCrashLoop", "message": "crashed 3 times"})
 
     assert write_in_s(old, changed({"reason": "SidecarCrashLoop", "message": "crashed 4 times"}), 5) == 0
@@ -128,7 +131,7 @@ def test_a_number_in_another_message_is_news():
     ],
 )
 def test_what_people_wait_for_is_written_at_once(change):
-    """These are phases, reasons, attempts and the first values of a training."""
+    """People wait for phases, reasons, attempts and the first values of a training."""
     assert write_in_s(OLD, changed(change), 0) == 0
 
 
@@ -136,5 +139,5 @@ def test_what_people_wait_for_is_written_at_once(change):
     "old", [None, {}, "text", {"replicas": "none"}, {"replicas": ["none"]}, {"replicas": [{"index": 0}]}]
 )
 def test_whatever_the_api_server_holds_is_compared(old):
-    """The old status may be absent, or overwritten by somebody."""
+    """The old status may be absent, or another program may have overwritten it."""
     assert write_in_s(old, OLD, 0) == 0

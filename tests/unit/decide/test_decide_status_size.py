@@ -1,4 +1,4 @@
-"""A status and its spec are one object of the API server, and etcd limits its size."""
+"""etcd limits the size of an object, and the status and the spec of a job are one object."""
 
 import json
 from datetime import UTC, datetime
@@ -18,7 +18,7 @@ KEPT = ("index", "phase", "reason", "attempt", "pod", "restarts", "furthestStep"
 
 
 def replica(index, phase="Running", *, simulators=32, text="x", long=200, kills=0):
-    """Return a replica in which every text is as long as allowed."""
+    """Return a replica in which every text has its longest allowed value."""
     fault = {"time": TIME, "simulator": "collect-0", "kind": "dead", "fact": text * long, "step": 3}
     kill = {"times": 2, "limit": "512Mi", "last": TIME, "pod": "u" * 36, "run": 1}
     return {
@@ -45,7 +45,7 @@ def replica(index, phase="Running", *, simulators=32, text="x", long=200, kills=
 
 
 def whole(replicas):
-    """Return a status in the form in which it is written."""
+    """Return a status in the form in which the operator writes it."""
     told = {"type": "Running", "status": "True", "reason": "Training", "message": "x" * 1024}
     status = {
         "phase": "Running",
@@ -57,26 +57,26 @@ def whole(replicas):
 
 
 def counted(replica):
-    """Return the number and the time of the last memory kill of each container."""
+    """Return the count and the time of the last memory kill of each container."""
     return [(each["container"], each["times"], each["last"]) for each in replica.get("memoryKills", ())]
 
 
 def job(size=0, **annotations):
-    """Return a TrainingJob as a cache keeps it; its spec has `taken` bytes."""
+    """Return a TrainingJob from a cache that does not keep its spec, which had `size` bytes."""
     metadata = {"name": "job", "namespace": "default", "annotations": annotations}
     raw = {"kind": "TrainingJob", "metadata": metadata, "spec": {"world": "w" * size}}
     kept = trimmed(raw)
-    del kept["spec"]  # a cache may keep less of it
+    del kept["spec"]  # a cache may drop parts of the spec; here it drops all of it
     return kept
 
 
 def size(data):
-    """Return the number of bytes that are sent."""
+    """Return the number of bytes of the data as JSON."""
     return len(json.dumps(data).encode())
 
 
 def test_a_hundred_replicas_of_32_simulators_fit_with_the_largest_world():
-    """Uncut they have 3 MiB; the API server refused it, and the operator sent it again for ever."""
+    """The full status has 3 MiB. The API server refused it, and the operator sent it again for ever."""
     status = whole([replica(i) for i in range(100)])
     assert size(status) > MOST
 
@@ -86,14 +86,14 @@ def test_a_hundred_replicas_of_32_simulators_fit_with_the_largest_world():
 
 
 def test_a_status_that_fits_is_left_alone():
-    """Almost every status fits."""
+    """Almost every status fits, and must not lose details."""
     status = whole([replica(i) for i in range(10)])
 
     assert fitted(job(), status) is status
 
 
 def test_what_others_have_written_into_the_object_takes_room_too():
-    """`kubectl apply` stores the whole spec a second time, in an annotation that no cache keeps."""
+    """`kubectl apply` stores the whole spec a second time in an annotation, which the cache does not keep."""
     status = whole([replica(i) for i in range(40)])
 
     alone, beside = fitted(job(), status), fitted(job(**{"example.com/last": "x" * 250_000}), status)
@@ -102,7 +102,7 @@ def test_what_others_have_written_into_the_object_takes_room_too():
 
 
 def test_a_replica_that_failed_keeps_its_log_longest():
-    """Somebody reads it to find the cause; the log of a running replica comes again in half a minute."""
+    """A person reads this log to find the cause; a running replica sends its log again."""
     status = whole([replica(i, "Failed" if i == 7 else "Running") for i in range(100)])
 
     cut = fitted(job(1_000_000), status)
@@ -123,7 +123,7 @@ def test_a_replica_that_failed_keeps_its_log_longest():
 def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     phases, simulators, text, kills, taken
 ):
-    """This holds for whatever the schema allows, and a second cut changes nothing."""
+    """The schema allows any of these statuses. To shorten a shortened status again must change nothing."""
     status = whole(
         [replica(i, each, simulators=simulators, text=text, kills=kills) for i, each in enumerate(phases)]
     )
@@ -142,7 +142,7 @@ def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
 @pytest.mark.parametrize("phase", ["Running", "Succeeded"])
 @pytest.mark.parametrize("detail", ["simulators", "log", "faults"])
 def test_no_detail_of_a_failed_replica_goes_while_one_of_a_healthy_one_is_there(phase, detail):
-    """Details are cut in the reverse order of their value to a reader."""
+    """The operator first removes the details that are least useful to a reader."""
     status = whole([replica(i, phase if i % 2 else "Failed") for i in range(100)])
 
     for taken in range(0, 1_000_000, 50_000):

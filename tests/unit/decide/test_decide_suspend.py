@@ -1,4 +1,4 @@
-"""The operator's reaction when somebody else suspends or resumes one of its Jobs."""
+"""The operator's reaction when another user or program suspends or resumes one of its Jobs."""
 
 from copy import deepcopy
 
@@ -15,19 +15,22 @@ SUSPENDED = "palaestra.dev/suspended"
 
 
 def by_kueue(scene, *, suspend):
-    """Let Kueue suspend or resume the Job, and the operator find out that it was Kueue."""
+    """Let Kueue suspend or resume the Job, and let the operator see Kueue as the field's manager."""
     scene.job()["spec"]["suspend"] = suspend
     scene.switchers[scene.job()["metadata"]["uid"]] = "kueue"
 
 
 def without_annotation(scene):
-    """Let somebody remove the annotation of the Job, and its status be written."""
+    """Remove the annotation of the Job as another program may, and reconcile."""
     scene.job()["metadata"].pop("annotations", None)
     scene.settle()
 
 
 def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
-    """Kueue with manageJobsWithoutQueueName suspends it again at once, which made 22 patches a second."""
+    """Kueue with `manageJobsWithoutQueueName` suspends a resumed Job again.
+
+    This caused 22 patches a second.
+    """
     scene, _ = training()
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
@@ -40,7 +43,7 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
 
 
 def test_a_suspension_by_another_manager_emits_an_event(training, reasons):
-    """Otherwise a user would wait for the job and not know the reason."""
+    """Without the event a user would wait for the job and not know why it does not run."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
@@ -49,7 +52,7 @@ def test_a_suspension_by_another_manager_emits_an_event(training, reasons):
 
 
 def test_a_suspension_by_an_unknown_manager_is_reported_as_such(training):
-    """An API server need not record the manager of a field."""
+    """The API server need not record the manager of a field."""
     scene, _ = training()
     scene.job()["spec"]["suspend"] = True
     scene.objects["pods"].clear()
@@ -60,7 +63,7 @@ def test_a_suspension_by_an_unknown_manager_is_reported_as_such(training):
 
 
 def test_a_job_that_another_manager_resumes_is_left_running_and_reported(training):
-    """Its queue has admitted it, although its author has suspended it."""
+    """A queue has admitted the Job although its author suspended the TrainingJob."""
     scene, _ = training(suspend=False)
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -72,7 +75,7 @@ def test_a_job_that_another_manager_resumes_is_left_running_and_reported(trainin
 
 @pytest.mark.parametrize("suspended", [True, False])
 def test_the_author_is_heeded_whatever_somebody_else_has_set(suspended, training):
-    """The operator writes the value of the TrainingJob when it differs from the value that it wrote last."""
+    """The operator writes `suspend` when the author's value differs from the last value that it wrote."""
     scene, _ = training()
     by_kueue(scene, suspend=suspended)
     scene.settle()
@@ -87,7 +90,7 @@ def test_the_author_is_heeded_whatever_somebody_else_has_set(suspended, training
 
 
 def test_what_was_set_is_written_by_the_same_patch():
-    """An operator that is killed between two patches would take its own change for somebody else's."""
+    """With two patches, an operator killed in between would take its own change for another manager's."""
     mark = Suspended(pod="pod-0", lived=True)
 
     patch = SetSuspend(job="job-0", replica=0, suspend=True, mark=mark).patch
@@ -97,7 +100,10 @@ def test_what_was_set_is_written_by_the_same_patch():
 
 
 def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(training):
-    """Nobody knows any more what the operator set last; from then on the annotation is there again."""
+    """Without the annotation the operator does not know its last value.
+
+    It then writes the value of the spec once.
+    """
     scene, _ = training()
     without_annotation(scene)
     by_kueue(scene, suspend=True)
@@ -112,7 +118,7 @@ def test_a_job_without_its_annotation_is_made_as_its_spec_asks_once(training):
 
 
 def test_the_author_suspends_and_resumes_a_job_without_its_annotation(training):
-    """From then on it has the annotation."""
+    """The first write of the operator adds the annotation again."""
     scene, _ = training()
     without_annotation(scene)
     scene.raw["spec"]["suspend"] = True
@@ -153,14 +159,14 @@ USES = [
 
 
 def open_to_jobs(kind, name, labels=None):
-    """Return an object that a job may use, unless it is given other labels."""
+    """Return an object that jobs may use, or the same object with other labels."""
     found = deepcopy(THERE[(kind, name)])
     found["metadata"]["labels"] = {"palaestra.dev/for-jobs": "true"} if labels is None else labels
     return found
 
 
 def to_be_resumed(make_scene, kind, name, spec):
-    """Return a scene in which a suspended job that uses an object is about to be resumed."""
+    """Return a scene in which a suspended job is about to be resumed and needs the given object."""
     scene = make_scene(**spec)
     scene.there[(kind, name)] = open_to_jobs(kind, name)
     scene.settle()
@@ -175,7 +181,10 @@ def to_be_resumed(make_scene, kind, name, spec):
 @pytest.mark.parametrize("annotated", [True, False])
 @pytest.mark.parametrize(("kind", "name", "spec"), USES)
 def test_a_job_is_not_resumed_with_what_is_for_jobs_no_more(make_scene, annotated, kind, name, spec):
-    """A removed label applies to new pods, and the next pod of the job is new."""
+    """An administrator removed the label, so no new pod may use the object.
+
+    A resumed job creates a new pod.
+    """
     scene = to_be_resumed(make_scene, kind, name, spec)
     scene.there[(kind, name)] = open_to_jobs(kind, name, {})
     if not annotated:
@@ -196,7 +205,7 @@ def test_a_job_is_not_resumed_with_what_is_for_jobs_no_more(make_scene, annotate
 
 @pytest.mark.parametrize(("kind", "name", "spec"), USES)
 def test_only_a_world_may_be_gone_when_a_job_is_resumed(make_scene, kind, name, spec):
-    """The job's own ConfigMap has a copy of a world; without a Secret or a claim, pods would not start."""
+    """The job's own ConfigMap has a copy of the world, but pods cannot start without a Secret or a claim."""
     scene = to_be_resumed(make_scene, kind, name, spec)
     scene.there.clear()
 
@@ -206,7 +215,7 @@ def test_only_a_world_may_be_gone_when_a_job_is_resumed(make_scene, kind, name, 
 
 
 def test_suspending_asks_for_no_label(make_scene):
-    """Stopping is always allowed."""
+    """A user must always be able to suspend a job, even if the label of an object is missing."""
     scene = to_be_resumed(make_scene, "Secret", "keys", {"trainer": SECRET})
     scene.settle()
     scene.there.clear()
@@ -217,7 +226,7 @@ def test_suspending_asks_for_no_label(make_scene):
 
 @pytest.mark.parametrize("annotated", [True, False])
 def test_a_refused_patch_of_a_job_is_sent_again(training, annotated):
-    """The status that is written after the refusal must not make it look like somebody else's doing."""
+    """The API server may refuse the patch after the status is written; the operator must then retry it."""
     scene, _ = training()
     if not annotated:
         without_annotation(scene)
@@ -232,9 +241,9 @@ def test_a_refused_patch_of_a_job_is_sent_again(training, annotated):
 
 
 def test_a_job_is_suspended_once_its_pod_has_ended(training):
-    """Its trainer saves a checkpoint for up to a minute.
+    """The trainer saves a checkpoint for up to a minute.
 
-    A person who stops the node before that would lose it.
+    A person who reads `Suspended` too early and stops the node would lose this checkpoint.
     """
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
@@ -255,7 +264,7 @@ def test_a_job_is_suspended_once_its_pod_has_ended(training):
 
 
 def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, last_word):
-    """`kubectl wait --for=condition=Running` would return for a pod that is about to end."""
+    """`kubectl wait --for=condition=Running` must not return for a pod that is about to end."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -279,7 +288,7 @@ def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, l
 
 
 def test_a_suspended_pod_on_a_lost_node_is_reported_as_lost(training):
-    """Its trainer can save nothing; somebody must delete the Node object before the job can be resumed."""
+    """The trainer cannot save; before the job can be resumed, somebody must delete the Node object."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True
     scene.settle()

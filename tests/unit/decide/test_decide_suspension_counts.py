@@ -1,4 +1,7 @@
-"""A suspension that ended a pod is counted as such, whoever suspended the Job and however late it is seen."""
+"""A pod that a suspension ended counts as a restart by suspension.
+
+This holds for every program that suspends a Job, and also if the operator sees the suspension late.
+"""
 
 import pytest
 from hypothesis import given
@@ -8,20 +11,20 @@ from palaestra.decide import Stop
 
 
 def restarts(scene):
-    """Return the attempt, and the restarts by trainer, disruption, suspension and simulator."""
+    """Return the attempt, and the restarts by trainer, disruption and suspension."""
     replica = scene.replica()
     counts = replica.restarts
     return replica.attempt, counts.trainer, counts.disruption, counts.suspension
 
 
 def tell_suspension(scene, status):
-    """Set the condition by which the Job controller reports a suspension or its end."""
+    """Set the condition with which the Job controller reports a suspension or its end."""
     turned = {"type": "Suspended", "status": status, "lastTransitionTime": scene.stamp()}
     scene.job().setdefault("status", {})["conditions"] = [turned]
 
 
 def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
-    """The Job controller makes the pod and then takes the time; a second may pass between them."""
+    """The Job controller creates the pod first and then takes the time, which may be a second later."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -35,7 +38,7 @@ def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
 
 
 def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_its_end_is_dated(training):
-    """A busy Job controller may take the time of the resumption seconds after it has made the pod."""
+    """A busy Job controller may write a time of the resumption that is seconds after the pod's creation."""
     scene, _ = training()
     scene.job()["spec"]["suspend"] = True
     tell_suspension(scene, "True")
@@ -53,7 +56,7 @@ def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_
 
 
 def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(training):
-    """The pod would have been replaced anyway."""
+    """The eviction ended the pod before the suspension, so the suspension is not the cause."""
     scene, pod = training()
     scene.take(pod)
     scene.settle(5)
@@ -73,7 +76,7 @@ def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(t
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
     """Pods and Jobs come from two watches.
 
-    A resumption that is seen late must not count for the pod after that one.
+    A resumption that the operator sees late must not count again for the next pod.
     """
     scene, _ = training()
     scene.objects["pods"].clear()
@@ -94,7 +97,7 @@ def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
 
 
 def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training):
-    """The newest pod already existed when the Job was suspended."""
+    """The newest pod existed before the suspension, so something else ended its predecessor."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -108,7 +111,7 @@ def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training)
 
 
 def pause(scene, pod, *, resumes=True):
-    """Suspend the job and delete its pod, as its controller does; with `resumes` resume it at once."""
+    """Suspend the job and delete its pod, as the Job controller does; with `resumes`, resume it at once."""
     scene.raw["spec"]["suspend"] = True
     scene.settle()
     tell_suspension(scene, "True")
@@ -118,14 +121,14 @@ def pause(scene, pod, *, resumes=True):
 
 
 def resume(scene):
-    """Resume the job, and report it as the Job controller does."""
+    """Resume the job, and report the end of the suspension as the Job controller does."""
     scene.raw["spec"]["suspend"] = False
     scene.settle()
     tell_suspension(scene, "False")
 
 
 def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
-    """Times of the control plane are whole seconds; the mark on the Job names the pod that was ended."""
+    """The control plane writes whole seconds, so times cannot decide; the annotation names the ended pod."""
     scene, pod = training()
     pause(scene, pod)
     scene.running_pod()
@@ -136,7 +139,7 @@ def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
 
 
 def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_such(accepted):
-    """The cache of pods may be late; the patch that resumes the Job names the pod."""
+    """The operator's cache may get the pod late, so the patch that resumes the Job names the ended pod."""
     scene = accepted()
     scene.raw["spec"]["suspend"] = True
     scene.settle()
@@ -153,7 +156,7 @@ def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_suc
 
 @pytest.mark.parametrize("how", ["taken", "deleted", "gone", "interrupted"])
 def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, training, last_word):
-    """The pod would have been replaced anyway."""
+    """Something else had ended the pod, so the suspension is not the cause."""
     scene, pod = training()
     if how == "taken":
         scene.take(pod)
@@ -178,7 +181,7 @@ def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, trainin
 
 
 def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
-    """The trainer had ended, and the Job has counted the failure."""
+    """The trainer had failed before the suspension, and the Job has counted the failure."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -191,7 +194,7 @@ def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
 
 
 def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(training):
-    """The second suspension ended no pod, and does not turn the first into a disruption."""
+    """The second suspension ended no pod, and must not turn the first into a disruption."""
     scene, pod = training()
     pause(scene, pod)
     scene.raw["spec"]["suspend"] = True
@@ -205,7 +208,7 @@ def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(tr
 
 
 def test_a_mark_is_counted_once(training):
-    """The mark stays on the Job, but names another pod than the next one."""
+    """The annotation stays on the Job, but it does not name the next pod."""
     scene, pod = training()
     pause(scene, pod)
     taken = scene.running_pod()
@@ -220,7 +223,7 @@ def test_a_mark_is_counted_once(training):
 
 
 def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(training):
-    """The mark names an earlier pod, and Kueue writes no mark."""
+    """Kueue writes no annotation, and the old one names an earlier pod, so only the times decide."""
     scene, pod = training()
     pause(scene, pod)
     second = scene.running_pod()
@@ -240,9 +243,9 @@ ENDS = ("failure", "taken", "deleted", "suspended")
 
 @given(st.lists(st.tuples(st.sampled_from(ENDS), st.booleans()), max_size=6))
 def test_the_counts_are_those_of_what_happened(accepted, lives):
-    """Each pod of a replica ends in some way, and an operator sees only some of the ends.
+    """Each pod of a replica ends in some way, and the operator sees only some of the ends.
 
-    A pod that is deleted between two reconciles is still in the record of the run directory.
+    The run directory still has a record of a pod that was deleted between two reconciles.
     """
     scene = accepted(backoffLimit=100)
     truth = dict.fromkeys(ENDS, 0)
@@ -273,7 +276,7 @@ def test_the_counts_are_those_of_what_happened(accepted, lives):
     )
 )
 def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
-    """Together with the other causes they add up to the attempts, and no count decreases."""
+    """The counts of all causes add up to the attempts, and no count decreases."""
     scene = accepted(backoffLimit=100)
     truth, before, failures = dict.fromkeys(("failure", "taken", "paused"), 0), (0, 0, 0, 0), 0
     for end, seconds in lives:
@@ -286,7 +289,7 @@ def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
             pause(scene, pod)
         else:
             failures += _end(scene, pod, end, failures)
-            scene.pass_(10)  # the Job controller waits too before it makes the next pod
+            scene.pass_(10)  # the Job controller also waits before it creates the next pod
         truth["paused" if end == "late" else end] += 1
         counts = restarts(scene)
         assert counts[0] == 1 + sum(counts[1:])

@@ -1,10 +1,10 @@
-"""A job that was accepted continues, whatever a new rule says about its spec."""
+"""A job that an older release accepted continues, even if its spec breaks a new rule."""
 
 import pytest
 
 from palaestra.api.status import Phase
 
-# Fields that an operator does not accept in a new job.
+# Fields that this release does not accept in a new job.
 ANTI_AFFINITY = {
     "requiredDuringSchedulingIgnoredDuringExecution": [
         {"labelSelector": {}, "namespaceSelector": {}, "topologyKey": "kubernetes.io/os"}
@@ -22,7 +22,7 @@ ACCEPTED_EARLIER = {
 
 @pytest.fixture(params=ACCEPTED_EARLIER)
 def upgraded(request, make_scene):
-    """A job that trains, accepted by a release without the rule that its spec breaks."""
+    """Return a job that trains; an older release accepted it without the rule that its spec breaks."""
     scene = make_scene()
     scene.settle()
     scene.running_pod()
@@ -32,7 +32,7 @@ def upgraded(request, make_scene):
 
 
 def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
-    """This is the control: without it, the tests below would prove nothing."""
+    """This test shows that the rule exists; the tests below would pass without the rule."""
     scene = make_scene(**upgraded.raw["spec"])
 
     decision = scene.settle()
@@ -42,7 +42,7 @@ def test_a_new_job_like_it_is_not_accepted(upgraded, make_scene):
 
 
 def test_it_runs_on(upgraded):
-    """The upgraded operator changes nothing about it."""
+    """The upgraded operator does not touch the job's objects."""
     upgraded.restart()
 
     decision = upgraded.settle()
@@ -52,7 +52,7 @@ def test_it_runs_on(upgraded):
 
 
 def test_it_is_suspended_and_resumed(upgraded):
-    """Both change a field of the spec that may change."""
+    """A user can still change `suspend`, like every field that may change."""
     for generation, suspend in enumerate((True, False), 2):
         upgraded.raw["spec"]["suspend"] = suspend
         upgraded.raw["metadata"]["generation"] = generation
@@ -63,7 +63,10 @@ def test_it_is_suspended_and_resumed(upgraded):
 
 
 def test_its_replica_is_planned_again(upgraded):
-    """A user deleted its Job, and its spec is the same as at acceptance."""
+    """A user deleted the Job.
+
+    The spec is the same as when it was accepted, so the operator creates it again.
+    """
     upgraded.objects["pods"].clear()
     upgraded.objects["jobs"].clear()
 

@@ -1,6 +1,6 @@
-"""An object of the API server is either a TrainingJob or refused with its reason.
+"""The operator accepts an object as a TrainingJob or refuses it with a reason.
 
-Neither affects other objects.
+An invalid object never keeps the operator from reconciling others.
 """
 
 from datetime import UTC, datetime
@@ -28,14 +28,14 @@ def refused(obj):
 
 
 def test_a_right_job_is_read_with_its_generation_and_its_status():
-    """The status is the memory of all operators."""
+    """Each operator process continues from the status that an earlier one wrote."""
     job = accept(raw(status={"phase": "Running"}))
 
     assert (job.metadata.generation, job.status.phase) == (3, "Running")
 
 
 def test_a_mistake_that_only_the_models_find_is_reported_with_its_field():
-    """An API server cannot check free objects."""
+    """The API server cannot check the content of free objects, so the operator does."""
     problem = refused(raw(SAC))
 
     assert problem.reason == "InvalidSpec"
@@ -46,7 +46,7 @@ def test_a_mistake_that_only_the_models_find_is_reported_with_its_field():
 
 
 def test_such_a_job_has_failed_for_good():
-    """A spec does not change."""
+    """Nobody can change the spec, so the job can never become valid."""
     decision = reject(raw(SAC), refused(raw(SAC)), NOW)
 
     held = {each.type.value: each.status.value for each in decision.status.conditions}
@@ -56,7 +56,7 @@ def test_such_a_job_has_failed_for_good():
 
 
 def test_refusing_again_changes_nothing():
-    """The first refusal is in the status."""
+    """The status already has the first refusal, so a second reconcile must not write it again."""
     first = as_data(reject(raw(SAC), refused(raw(SAC)), NOW).status)
     again = raw(SAC, first)
 
@@ -66,14 +66,14 @@ def test_refusing_again_changes_nothing():
 
 
 def test_a_job_that_was_refused_once_is_never_started():
-    """Not even a release that would accept it starts it."""
+    """Even a release that would accept this spec must not start a job that has failed."""
     failed = as_data(reject(raw(SAC), refused(raw(SAC)), NOW).status)
 
     assert accept(raw(status=failed)).status.phase == "Failed"
 
 
 def test_it_is_deleted_after_its_time_to_live():
-    """The same holds for any other ended job."""
+    """A refused job has ended, so `ttlSecondsAfterFinished` applies as to any ended job."""
     spec = {**SAC, "ttlSecondsAfterFinished": 60}
     status = as_data(reject(raw(spec), refused(raw(spec)), NOW).status)
     obj = raw(spec, status)
@@ -86,7 +86,7 @@ def test_it_is_deleted_after_its_time_to_live():
 
 
 def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
-    """An upgrade with jobs running must not touch a pod."""
+    """An upgrade of the operator must not touch the pods of running jobs."""
     release = {"trainer": "t:1", "stub": "s:1", "mujoco": "m:1", "webots": "w:1"}
     obj = raw(SAC, {"phase": "Running", "release": release})
 
@@ -98,7 +98,7 @@ def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
 
 @pytest.mark.parametrize("status", [{"phase": "Dancing"}, {"activeSeconds": "4"}, "text"])
 def test_a_status_that_cannot_be_read_is_left_alone(status):
-    """The operator cannot know which replicas have ended, so it does nothing."""
+    """The operator cannot know which replicas have ended, so it changes nothing."""
     obj = raw(status=status)
 
     decision = reject(obj, refused(obj), NOW)
@@ -117,5 +117,5 @@ def test_a_status_that_cannot_be_read_is_left_alone(status):
     ],
 )
 def test_jobs_of_other_controllers_and_of_nobody_are_left_alone(spec, metadata, ours):
-    """The operator also leaves a job alone that is being deleted: it gets no new children."""
+    """The operator also ignores a job that is being deleted, which must not get new objects."""
     assert managed_here(raw(spec, **metadata)) is ours

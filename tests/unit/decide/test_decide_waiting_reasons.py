@@ -1,4 +1,4 @@
-"""Problems of a replica that has not failed are shown at once, with the message of their source."""
+"""The status shows at once why a replica waits, with the message of the program that reports the problem."""
 
 import pytest
 
@@ -27,9 +27,9 @@ def refused(scene, words, **event):
     ],
 )
 def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
-    """Quota, Pod Security, a webhook or a LimitRange may refuse them.
+    """A quota, Pod Security, a webhook or a LimitRange may refuse the pods.
 
-    Only an event on the Job has the reason.
+    Only an event on the Job has the cause.
     """
     scene = accepted()
     refused(scene, words)
@@ -67,7 +67,7 @@ EVERY = f"{MASTER}, {SIMULATORS} and {TRAINER}"
     ],
 )
 def test_a_pod_refused_for_its_sizes_names_the_fields_that_set_them(accepted, words, fields):
-    """A job has no field `ros-master` or `install-sidecar`, so the API server's message names no field."""
+    """The API server's message names containers such as `ros-master`, but a user can only set fields."""
     scene = accepted()
     refused(scene, f'Error creating: pods "job-0-x" is forbidden: {words}')
 
@@ -79,7 +79,7 @@ def test_a_pod_refused_for_its_sizes_names_the_fields_that_set_them(accepted, wo
 
 
 def test_a_pod_refused_for_a_webhooks_container_names_no_field_of_the_job(accepted):
-    """No field of a job sets the sizes of a mesh's proxy."""
+    """A webhook added this container, so no field of a job sets its resources."""
     scene = accepted()
     refused(scene, "failed quota: q: must specify limits.cpu for: istio-proxy")
 
@@ -89,7 +89,7 @@ def test_a_pod_refused_for_a_webhooks_container_names_no_field_of_the_job(accept
 
 
 def test_an_old_refusal_does_not_count(accepted):
-    """A pod was created since then."""
+    """The API server has accepted a pod since that event."""
     scene = accepted()
     refused(scene, "exceeded quota")
     scene.pass_(5)
@@ -119,7 +119,7 @@ def test_the_message_about_an_unschedulable_pod_quotes_the_scheduler(accepted):
     "waiting", ["ErrImagePull: not found", "ImagePullBackOff: Back-off", "InvalidImageName"]
 )
 def test_an_image_that_does_not_come_is_named_with_its_container(accepted, waiting):
-    """In a pod of four containers the user could not know whose image it is."""
+    """A pod has several containers, and the user must know whose image is wrong."""
     scene = accepted()
     scene.container(scene.new_pod(), "sim-collect-0", waiting=waiting)
 
@@ -131,7 +131,7 @@ def test_an_image_that_does_not_come_is_named_with_its_container(accepted, waiti
 
 
 def test_a_container_that_the_node_cannot_make_is_named(accepted):
-    """An example is a Secret without the key."""
+    """For example, a Secret may lack the key that the container uses."""
     scene = accepted()
     words = "couldn't find key token in Secret default/keys"
     scene.container(scene.new_pod(), "trainer", waiting=f"CreateContainerConfigError: {words}")
@@ -143,7 +143,7 @@ def test_a_container_that_the_node_cannot_make_is_named(accepted):
 
 
 def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
-    """The operator does not force-delete it: the pod may still write to the volume."""
+    """The pod may still write to the volume, so the operator must not force its deletion."""
     scene, pod = training()
     scene.delete(pod)
     assert scene.step().wake_after_s == 90
@@ -156,7 +156,7 @@ def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
 
 
 def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
-    """The trainer sees only that the simulator failed."""
+    """The trainer sees only a failed simulator; the memory kill is in the status of the container."""
     group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
     scene, pod = training(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
     scene.container(
@@ -174,7 +174,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
 
 
 def test_between_two_pods_the_message_says_how_the_last_one_failed(training, last_word):
-    """The message has the trainer's own last word."""
+    """The message quotes the trainer's termination message."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: KeyError"))
     scene.count_failures(1)
@@ -187,7 +187,7 @@ def test_between_two_pods_the_message_says_how_the_last_one_failed(training, las
 
 
 def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
-    """Kubernetes puts that into the termination message."""
+    """Kubernetes copies the end of the log into the termination message."""
     scene, pod = training()
     scene.end(pod, 1, "Traceback (most recent call last):\n  ...\nMemoryError\n")
 
@@ -197,7 +197,7 @@ def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
 
 
 def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(training):
-    """The next pod may need less memory for its buffer, or fail again."""
+    """The next pod may need less memory for its replay buffer, or fail again."""
     scene, pod = training()
     scene.end(pod, 137, reason="OOMKilled")
 
@@ -208,7 +208,7 @@ def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(traini
 
 
 def test_a_pod_that_the_cluster_took_is_no_failure(training):
-    """No warning is emitted either: clusters do that all the time."""
+    """Clusters evict pods all the time, so the operator emits no warning."""
     scene, pod = training()
     scene.take(pod, "preempted by a more important pod")
 
@@ -220,7 +220,7 @@ def test_a_pod_that_the_cluster_took_is_no_failure(training):
 
 
 def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, last_word):
-    """This happens when the ROS master was lost: the cluster has not evicted the pod."""
+    """The trainer stopped because the ROS master was lost; the cluster did not evict the pod."""
     scene, pod = training()
     scene.end(pod, 75, last_word(reason="MasterLost: it does not answer"))
 
@@ -231,7 +231,7 @@ def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, las
 
 
 def test_a_full_volume_is_reported_between_retries(training, last_word):
-    """A user may free some space before the last retry."""
+    """A user who reads the reason can free space before the last retry."""
     scene, pod = training()
     scene.end(pod, 1, last_word(reason="StorageFull: /run: no space left on device"))
 
@@ -241,7 +241,7 @@ def test_a_full_volume_is_reported_between_retries(training, last_word):
 
 
 def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accepted):
-    """Only an event on the pod has the cause; its status only shows that it starts."""
+    """Only an event on the pod has the cause; the pod's status only shows that it starts."""
     scene = accepted()
     pod = scene.new_pod()
     words = 'Multi-Attach error for volume "pvc-1": still attached to node-2'
@@ -264,7 +264,7 @@ def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accept
 
 
 def test_while_its_simulators_start_a_trainer_does_not_train(training):
-    """The trainer reports this phase itself; a trainer that serves no status counts as training."""
+    """The trainer reports this phase itself; a trainer without a status counts as training."""
     scene, pod = training()
     scene.poll(pod, phase="starting")
 
@@ -275,7 +275,7 @@ def test_while_its_simulators_start_a_trainer_does_not_train(training):
 
 @pytest.mark.parametrize("about", [0, None], ids=["of the replica", "of the whole job"])
 def test_the_message_about_a_refused_object_quotes_the_api_server(make_scene, about, reasons):
-    """A claim that exceeds its quota has no Job whose events could have the reason."""
+    """If a quota refuses the claim, no Job exists whose events could show the cause."""
     scene = make_scene()
     scene.step()
     scene.denied = {about: 'persistentvolumeclaims "job-0" is forbidden: exceeded quota: volumes'}
@@ -293,7 +293,7 @@ def test_the_message_about_a_refused_object_quotes_the_api_server(make_scene, ab
 
 
 def test_a_refusal_of_one_replica_is_not_reported_for_another(make_scene):
-    """Room for one claim is room for one replica."""
+    """The quota has enough space for the claim of only one replica."""
     scene = make_scene(replicas=2)
     scene.step()
     scene.denied = {1: "exceeded quota"}
@@ -304,7 +304,7 @@ def test_a_refusal_of_one_replica_is_not_reported_for_another(make_scene):
 
 
 def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, command_groups):
-    """The trainer never started, so it has no last word."""
+    """The trainer never started, so it wrote no termination message."""
     scene = accepted(backoffLimit=0, simulators=command_groups)
     pod = scene.new_pod()
     scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
@@ -320,7 +320,7 @@ def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, comm
 
 @pytest.mark.parametrize(("limit", "code"), [(0, 70), (3, 2), (3, 80), (3, 81)])
 def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, reasons, limit, code):
-    """No other pod follows, whatever the Job reports later."""
+    """No pod follows this one, whatever the Job reports later."""
     scene, pod = training(backoffLimit=limit)
     scene.end(pod, code, last_word())
 
@@ -331,7 +331,7 @@ def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, 
 
 
 def test_a_replica_on_a_lost_node_does_not_run(training):
-    """The node last reported that it runs, but its state is unknown."""
+    """The kubelet last reported a running pod, but its current state is unknown."""
     scene, pod = training()
     scene.delete(pod, 0)
     scene.settle()
@@ -347,7 +347,7 @@ def test_a_replica_on_a_lost_node_does_not_run(training):
 
 
 def test_a_pod_that_is_not_there_and_was_not_asked_about_says_so(make_scene):
-    """An empty message would suggest that nothing is wrong."""
+    """Without this message a user would think that nothing is wrong."""
     scene = make_scene()
     scene.settle()
     scene.objects["unasked"] = frozenset({scene.job()["metadata"]["uid"]})

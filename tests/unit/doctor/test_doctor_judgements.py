@@ -1,4 +1,4 @@
-"""The doctor's checks and their results."""
+"""The checks of `palaestra doctor` and their results."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -22,24 +22,24 @@ ROOT = Path(__file__).parents[3]
     [("v1.9.3", "wrong"), ("v1.32.9", "wrong"), ("v1.33.2+k3s1", "ok"), ("v2.0.0", "ok"), ("", "wrong")],
 )
 def test_a_version_is_judged_by_whether_it_has_sidecars_for_good(version, verdict):
-    """Sidecars are stable since 1.33, which the chart also requires."""
+    """Sidecar containers are stable since Kubernetes 1.33, which the chart also requires."""
     assert judged_version("nodes", version).verdict == verdict
 
 
 def test_versions_are_compared_as_numbers():
-    """1.9 is older than 1.33."""
+    """As text, "1.9" would be newer than "1.33"."""
     assert release("v1.9.3") < release("v1.33.0")
 
 
 def test_the_first_version_is_the_charts():
-    """The doctor must accept the versions on which Helm installs the chart."""
+    """The doctor must accept every version on which Helm installs the chart."""
     chart = yaml.safe_load((ROOT / "charts/palaestra/Chart.yaml").read_text())
 
     assert release(chart["kubeVersion"].removeprefix(">=")) == FIRST
 
 
 def test_a_pod_that_came_back_as_it_was_is_right():
-    """Webhooks may add containers."""
+    """A webhook may add containers to a pod, as service meshes do."""
     pod = trial_pod("lab", "trainer:1")
     pod["spec"]["initContainers"].insert(0, {"name": "added-by-a-mesh"})
 
@@ -47,7 +47,7 @@ def test_a_pod_that_came_back_as_it_was_is_right():
 
 
 def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
-    """All containers after it would wait for its end for ever."""
+    """The containers after it would wait for ever for the end of this init container."""
     pod = trial_pod("lab", "trainer:1")
     del pod["spec"]["initContainers"][0]["restartPolicy"]
 
@@ -70,13 +70,13 @@ def operator(**images):
 
 
 def test_images_that_are_named_by_digest_are_right():
-    """The image of a digest cannot change."""
+    """The content of an image with a digest cannot change."""
     assert judged_images(operator()).verdict is CheckStatus.RIGHT
 
 
 @pytest.mark.parametrize("part", PINNED)
 def test_an_image_that_is_named_by_tag_is_a_warning(part):
-    """A run that resumes after an interruption may get another image of the same tag."""
+    """A registry can change the image of a tag, so a resumed run may get another image."""
     found = judged_images(operator(**{part: "registry.example.com/image:1"}))
 
     assert found.verdict is CheckStatus.WARNING
@@ -85,7 +85,7 @@ def test_an_image_that_is_named_by_tag_is_a_warning(part):
 
 
 def test_images_of_an_operator_that_is_given_none_are_the_releases():
-    """The release's images are named by tag."""
+    """The operator then uses the images of its release, which have tags and no digests."""
     found = judged_images({"image": "operator" + DIGEST})
 
     assert found.fact.startswith("palaestra-trainer:")
@@ -94,7 +94,7 @@ def test_images_of_an_operator_that_is_given_none_are_the_releases():
 
 
 def test_a_definition_with_more_in_it_is_the_same():
-    """API servers fill in defaults."""
+    """An API server adds default values to the definition that it stores."""
     ours = crd()
     found = deepcopy(ours)
     found["spec"]["conversion"] = {"strategy": "None"}
@@ -103,7 +103,7 @@ def test_a_definition_with_more_in_it_is_the_same():
 
 
 def test_the_place_where_another_release_s_definition_differs_is_returned():
-    """The function returns the path of the first difference."""
+    """The path shows an administrator which field of the cluster's definition is outdated."""
     ours = crd()
     found = deepcopy(ours)
     del found["spec"]["versions"][0]["schema"]["openAPIV3Schema"]["properties"]["spec"]
@@ -114,7 +114,10 @@ def test_the_place_where_another_release_s_definition_differs_is_returned():
 
 
 def test_the_operators_rights_are_those_of_an_installation():
-    """A missing permission would be reported as wrong for ever, and nobody would notice one too many."""
+    """The doctor would report a permission that no role grants as missing for ever.
+
+    If the doctor did not check a permission, nobody would notice that the permission is missing.
+    """
     installed = yaml.safe_load_all((ROOT / "manifests/install.yaml").read_text())
     [role] = [
         each
@@ -136,7 +139,7 @@ def test_the_operators_rights_are_those_of_an_installation():
 
 
 def test_a_finding_is_a_line_and_its_remedy_another():
-    """A reader looks for the remedy first."""
+    """A reader can find the remedies by the arrow at the beginning of the line."""
     found = (
         right("nodes", "v1.36.0"),
         wrong("storage class", "the cluster has no storage class", "annotate one"),

@@ -1,4 +1,4 @@
-"""The doctor's report on missing permissions of the operator's account."""
+"""The doctor's report about permissions that the operator's account lacks."""
 
 import pytest
 
@@ -11,17 +11,17 @@ JOBS = ("batch", "jobs", "create")
 
 
 class Server:
-    """An API server that refuses some permissions; it may serve Workloads."""
+    """A fake API server that refuses given permissions and may serve Kueue's Workloads."""
 
     def __init__(self, refused, workloads=""):
         self._refused, self._workloads = refused, workloads
 
     def get(self, resource, namespace, name):
-        """Return an empty list: the operator has no Deployment."""
+        """Raise NotFound, as if the operator had no Deployment."""
         raise NotFound(404, "NotFound", f"{resource.plural} {namespace}/{name}")
 
     def serves(self, group_version):
-        """Return whether the server has Kueue in a version."""
+        """Return whether the server serves this version of Kueue's API."""
         return group_version == self._workloads
 
     def create(self, _, review):
@@ -32,13 +32,13 @@ class Server:
 
 
 def examined(*refused, workloads="kueue.x-k8s.io/v1beta2"):
-    """Return the doctor's results if the operator's account lacks some permissions."""
+    """Return the doctor's results for an operator whose account lacks the given permissions."""
     api = Server(refused, workloads)
     return list(operator_rights(Site(api=api, namespace="lab", operator_namespace="palaestra-system")))
 
 
 def test_a_role_that_cannot_read_workloads_is_a_warning_where_kueue_is():
-    """Without this right jobs train; only the words of Kueue are missing."""
+    """Without this permission jobs still train, but their status lacks Kueue's messages."""
     [found] = examined(WORKLOADS)
 
     assert found.verdict is CheckStatus.WARNING
@@ -48,14 +48,14 @@ def test_a_role_that_cannot_read_workloads_is_a_warning_where_kueue_is():
 
 @pytest.mark.parametrize("served", ["", "kueue.x-k8s.io/v1beta1"])
 def test_without_workloads_that_the_operator_reads_their_right_is_not_checked(served):
-    """The permission would have no effect, so a warning would only distract."""
+    """Without Kueue the permission has no effect, so a warning would only distract the reader."""
     [found] = examined(WORKLOADS, workloads=served)
 
     assert found.verdict is CheckStatus.RIGHT
 
 
 def test_a_right_that_training_needs_is_wrong_beside_the_warning():
-    """One remedy solves both problems; only the missing right changes the exit code."""
+    """One remedy solves both problems, but only the missing permission for Jobs changes the exit code."""
     found = examined(JOBS, WORKLOADS)
 
     assert [each.verdict for each in found] == [CheckStatus.WRONG, CheckStatus.WARNING]
@@ -63,7 +63,7 @@ def test_a_right_that_training_needs_is_wrong_beside_the_warning():
 
 
 def test_a_role_of_this_release_suffices():
-    """The role suffices with and without Kueue."""
+    """With all permissions the doctor reports neither an error nor a warning."""
     [found] = examined()
 
     assert found.verdict is CheckStatus.RIGHT

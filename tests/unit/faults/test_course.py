@@ -1,4 +1,4 @@
-"""A fault occurs once, at the request that the plan names."""
+"""The fault of a plan occurs once, at the request that the plan names."""
 
 import pytest
 
@@ -12,7 +12,7 @@ GET = Asked(verb="get", resource="jobs", name="job-0")
 
 
 def test_the_fault_comes_at_the_request_that_it_is_planned_for_and_once():
-    """Requests of other kinds are not counted."""
+    """The counter ignores requests of other kinds."""
     fault = Fault(kind=Kind.DROP, request="write", number=2)
     course = Course(fault)
 
@@ -27,7 +27,7 @@ def test_the_fault_comes_at_the_request_that_it_is_planned_for_and_once():
 
 
 def test_events_of_watches_are_counted_by_themselves():
-    """A watch is one request, but carries many changes."""
+    """A watch is a single request, but it delivers many changes."""
     fault = Fault(kind=Kind.CUT, request="change", number=2)
     course = Course(fault)
 
@@ -38,7 +38,7 @@ def test_events_of_watches_are_counted_by_themselves():
 
 
 def test_it_is_away_for_as_long_as_the_plan_says():
-    """The server is away exactly for that time."""
+    """The API server is unavailable from the faulty request until the planned time has passed."""
     now = [0.0]
     course = Course(Fault(kind=Kind.AWAY, request="get", number=1, seconds=3.0), lambda: now[0])
     assert not course.away
@@ -52,7 +52,7 @@ def test_it_is_away_for_as_long_as_the_plan_says():
 
 @pytest.mark.parametrize("asked", [PODS, Asked(verb="update", resource="leases", name="operator")])
 def test_watches_and_the_lease_do_not_end_the_quiet(asked):
-    """An idle operator sends these requests too."""
+    """An idle operator also sends these requests, so they do not show that it works."""
     now = [5.0]
     course = Course(None, lambda: now[0])
     course.request(GET)

@@ -1,4 +1,4 @@
-"""End states are compared, except for values that always differ between two runs."""
+"""The comparison of end states ignores the values that always differ between two runs."""
 
 from tests.faults.masks import differences, leaves, mask, shaped
 
@@ -15,14 +15,14 @@ STATE = {
 
 
 def test_times_uids_and_made_up_names_are_replaced_by_their_shape():
-    """Two runs never share these values."""
+    """Times, uids and generated names are different in every run."""
     assert shaped(f"{UID} at 2026-01-31T12:00:00Z in place-3-5959: pod job-0-x7k2p, 127.90.91.3") == (
         "<uid> at <time> in <namespace>: pod job-0-<pod>, <address>"
     )
 
 
 def test_leaves_are_named_by_what_a_list_member_is_called():
-    """The order of conditions does not matter."""
+    """A path contains the type of a condition instead of its index, so the order of conditions is ignored."""
     assert leaves(STATE) == {
         "/metadata/name": "job",
         "/metadata/uid": "<uid>",
@@ -39,7 +39,7 @@ def test_leaves_are_named_by_what_a_list_member_is_called():
 
 
 def test_what_differs_between_two_undisturbed_runs_is_masked():
-    """Nobody has to list the fields that a poll changes by chance."""
+    """A poll changes some fields by chance; the mask is measured, so nobody has to list these fields."""
     masked = mask({"/step": 3, "/phase": "Failed"}, {"/step": 4, "/phase": "Failed"})
 
     assert masked == {"/step"}
@@ -47,11 +47,11 @@ def test_what_differs_between_two_undisturbed_runs_is_masked():
 
 
 def test_a_counter_that_differs_is_said_with_both_values():
-    """The rig looks for bugs of the operator, such as a restart that is counted twice."""
+    """The fault tests search for bugs of the operator, such as a restart that is counted twice."""
     assert differences({"/trainer": 1}, {"/trainer": 2}, frozenset()) == ["/trainer: 2 in place of 1"]
 
 
 def test_what_is_missing_or_new_is_a_difference():
-    """A missing field differs even from one that is null."""
+    """A missing field differs from every value, even from null."""
     assert differences({"/a": None}, {}, frozenset()) == ["/a: nothing in place of None"]
     assert differences({}, {"/a": 1}, frozenset()) == ["/a: 1 in place of nothing"]

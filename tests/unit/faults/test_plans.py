@@ -1,4 +1,4 @@
-"""A number identifies a plan, and the plans disturb every request that they should."""
+"""A seed identifies a plan, and the plans together disturb every request that they should."""
 
 from collections import defaultdict
 
@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from tests.faults.plans import ROWS, Kind, plan, plans
 from tests.faults.requests import WRITE, asked
 
-LOST = {Kind.KILL_AFTER, Kind.DROP, Kind.DELAY}  # faults that come after the API server has done the request
+LOST = {Kind.KILL_AFTER, Kind.DROP, Kind.DELAY}  # faults after the API server has executed the request
 JOBS = "/apis/batch/v1/namespaces/team/jobs"
 
 
 @given(st.integers(0, 10_000))
 def test_a_seed_names_the_same_plan_again(seed):
-    """A failure can then be repeated; two different seeds never give one plan."""
+    """A person can repeat a failure by its seed; consecutive seeds of a workload give different faults."""
     workloads = ("ends", "pauses")
 
     assert plan(seed, workloads) == plan(seed, workloads)
@@ -22,7 +22,7 @@ def test_a_seed_names_the_same_plan_again(seed):
 
 
 def test_every_write_of_every_workload_meets_a_fault_before_and_one_after_it_is_carried_out():
-    """The soak claims this, and the test counts it."""
+    """docs/explain/reliability.md promises two faults for each write, so the test counts the faults."""
     counts = {"ends": {WRITE: 7}, "pauses": {WRITE: 12}}
     met = defaultdict(list)
     for it in plans(counts):
@@ -35,19 +35,19 @@ def test_every_write_of_every_workload_meets_a_fault_before_and_one_after_it_is_
 
 
 def test_writes_meet_every_fault_of_writes_in_turns():
-    """Eight consecutive writes are enough."""
+    """Eight consecutive writes are enough to meet every fault of writes."""
     found = {(it.fault.kind, it.fault.seconds) for it in plans({"pauses": {WRITE: 8}})}
 
     assert found == {(row.kind, row.seconds) for row in ROWS if row.request == WRITE}
 
 
 def test_every_kind_of_fault_has_a_row():
-    """A plan draws only kinds that have a row, so a kind without one would never be tested."""
+    """A plan draws only kinds that have a row in the table, so a kind without a row would never be tested."""
     assert {row.kind for row in ROWS} == set(Kind)
 
 
 def test_requests_are_named_as_rbac_names_them():
-    """A plan names the request that it disturbs, and a report names it in the same way."""
+    """Plans and reports use the same verbs and resources as RBAC rules."""
     patch = {"Content-Type": "application/merge-patch+json"}
     apply = {"Content-Type": "application/apply-patch+yaml"}
     status = "/apis/palaestra.dev/v1alpha1/namespaces/team/trainingjobs/job/status"
@@ -64,7 +64,7 @@ def test_requests_are_named_as_rbac_names_them():
 
 
 def test_requests_are_counted_by_kind():
-    """Events and the Lease do not count as writes: a lost one changes no job."""
+    """Events and Leases do not count as writes, because a lost one changes no job."""
     lease = "/apis/coordination.k8s.io/v1/namespaces/system/leases/operator"
 
     assert asked("POST", JOBS, {}).kind == "write"

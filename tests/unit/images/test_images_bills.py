@@ -1,4 +1,4 @@
-"""A bill of materials lists the content of an image, not the packages that somebody requested."""
+"""A bill of materials lists the packages that an image contains, not those that somebody requested."""
 
 import io
 import json
@@ -36,7 +36,7 @@ def add(archive, name, content):
 
 
 def layer(*files):
-    """Return a layer: the bytes of a tar archive of files, each with its path and its text."""
+    """Return a layer: the bytes of a tar archive with files, each with its path and its text."""
     written = io.BytesIO()
     with tarfile.open(fileobj=written, mode="w") as archive:
         for path, text in files:
@@ -45,13 +45,13 @@ def layer(*files):
 
 
 def metadata(name, version="1.2"):
-    """Return path and text of the metadata that an installed wheel has."""
+    """Return the path and the text of the metadata file of an installed wheel."""
     return f"{SITE}/{name}-{version}.dist-info/METADATA", METADATA.format(name=name, version=version)
 
 
 @pytest.fixture
 def image(tmp_path):
-    """Write an image of some layers as an engine saves it, and return it as `make images` does."""
+    """Return a function that writes an image with some layers, as an engine saves it."""
 
     def write(*layers):
         path = tmp_path / "operator-0123.tar"
@@ -66,14 +66,14 @@ def image(tmp_path):
 
 
 def listed(bill):
-    """Return the package URLs of a bill, and check that it has the required format."""
+    """Check the format of a bill, and return its package URLs."""
     text = bill.read_text()
     assert JsonStrictValidator(bills.VERSION).validate_str(text) is None
     return [component["purl"] for component in json.loads(text)["components"]]
 
 
 def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
-    """With it, a scanner finds the images that a new vulnerability affects."""
+    """With the bill, a scanner can find the images that a new vulnerability affects."""
     debian = layer(("var/lib/dpkg/status", STATUS))
     built = image(debian, layer(metadata("Ruamel.Yaml"), metadata("numpy", "2.5")))
 
@@ -90,7 +90,7 @@ def test_a_bill_of_an_image_lists_its_packages_of_debian_and_of_python(image):
 
 
 def test_a_package_that_a_later_layer_removes_is_not_listed(image):
-    """The trainer's image removes some packages that only its build needs."""
+    """The trainer's Dockerfile removes packages that only the build needs."""
     installed = layer(metadata("hatchling"), metadata("numpy"))
     removal = layer((f"{SITE}/.wh.hatchling-1.2.dist-info", ""))
 
@@ -100,7 +100,7 @@ def test_a_package_that_a_later_layer_removes_is_not_listed(image):
 
 
 def test_a_folder_that_a_later_layer_replaces_is_not_listed(image):
-    """The layer's whiteout file stands for the whole folder."""
+    """The whiteout file of the later layer hides the whole folder of the earlier one."""
     replacement = layer((f"{SITE}/.wh..wh..opq", ""), metadata("numpy", "2.5"))
 
     bill = bills.of_image(image(layer(metadata("numpy")), replacement))
@@ -109,7 +109,7 @@ def test_a_folder_that_a_later_layer_replaces_is_not_listed(image):
 
 
 def test_a_bill_is_the_same_for_the_same_image_and_goes_with_its_archive(image):
-    """Two bills can be compared, and no bill is left of a removed image."""
+    """A person can compare two bills, and the bill of a removed image is deleted."""
     built = image(layer(metadata("numpy")))
     first = bills.of_image(built).read_text()
     old = built.archive.with_name("operator-old.tar.cdx.json")
@@ -121,7 +121,7 @@ def test_a_bill_is_the_same_for_the_same_image_and_goes_with_its_archive(image):
 
 
 def test_what_is_no_archive_is_refused_with_its_path(image):
-    """Another program may have written that file."""
+    """Another program may have written a file at this path."""
     built = image()
     built.archive.write_text("no archive")
 
@@ -130,7 +130,7 @@ def test_what_is_no_archive_is_refused_with_its_path(image):
 
 
 def test_a_bill_of_a_wheel_lists_what_it_was_tested_with(tmp_path):
-    """The bill has the hashes of the lock, so that a person can install the same packages."""
+    """The bill has the hashes of the lock file, so a person can install the tested packages."""
     sim, trainer, operator = bills.of_wheels(ROOT, tmp_path, "x86_64")
 
     assert f"pkg:pypi/palaestra-sim@{version('palaestra-sim')}" in listed(operator)

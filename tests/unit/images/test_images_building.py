@@ -1,4 +1,4 @@
-"""An image is built when its content is new, and only then."""
+"""An image is built only if its content is new."""
 
 import shutil
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ class Editor(BuildHookInterface):
 
 @dataclass
 class WritingEngine:
-    """An engine that builds nothing: its archive holds the arguments of the order."""
+    """An engine that builds no image: it writes the arguments of the order into the archive."""
 
     digest: str = "sha256:base"
     orders: list = field(default_factory=list)
@@ -39,7 +39,7 @@ class WritingEngine:
         return Base(name="debian", digest=self.digest)
 
     def build(self, order):
-        """Write the archive; check the build context, which exists only meanwhile."""
+        """Check the build context, which exists only during the build, and write the archive."""
         self.orders.append(order)
         assert (order.context / "requirements.txt").is_file()
         assert list((order.context / "packages").glob("palaestra-*.whl"))
@@ -48,7 +48,7 @@ class WritingEngine:
 
 @pytest.fixture
 def root(tmp_path):
-    """Return a copy of the sources of the operator's image, with a lock that names no package."""
+    """Return a copy of the sources of the operator's image, with a lock file without packages."""
     for package in OPERATOR.packages:
         copied = tmp_path / "checkout" / package
         shutil.copytree(ROOT / package, copied, ignore=shutil.ignore_patterns("__pycache__"))
@@ -58,18 +58,18 @@ def root(tmp_path):
 
 @pytest.fixture
 def engine():
-    """Return an engine."""
+    """Return an engine that only records its orders."""
     return WritingEngine()
 
 
 @pytest.fixture
 def workshop(root, engine, tmp_path):
-    """Return a workshop with an empty folder."""
+    """Return a workshop with an empty folder for archives."""
     return Workshop(root=root, engine=engine, folder=tmp_path / "images")
 
 
 def test_an_unchanged_image_is_not_built_again(workshop, engine):
-    """The tests of a cluster request the images each time."""
+    """Each run of the cluster tests requests the images."""
     first, second = workshop.build(OPERATOR), workshop.build(OPERATOR)
 
     assert len(engine.orders) == 1
@@ -77,7 +77,7 @@ def test_an_unchanged_image_is_not_built_again(workshop, engine):
 
 
 def test_an_archive_keeps_its_age_when_it_is_used(workshop):
-    """A cluster uses the age to find out whether it has loaded the archive."""
+    """A test cluster compares the modification time to find out whether it must load the archive."""
     before = workshop.build(OPERATOR).archive.stat().st_mtime_ns
 
     assert workshop.build(OPERATOR).archive.stat().st_mtime_ns == before
@@ -88,7 +88,7 @@ def test_an_archive_keeps_its_age_when_it_is_used(workshop):
     ["operator/Dockerfile", "operator/pyproject.toml", "sim_image/src/palaestra_sim/errors.py"],
 )
 def test_a_changed_file_makes_another_archive(workshop, root, engine, changed):
-    """No outdated image may be used."""
+    """After a change of the sources, no test may run an old image."""
     first = workshop.build(OPERATOR)
     file = root / changed
     file.write_text(f"{file.read_text()}\n# changed\n")
@@ -99,7 +99,7 @@ def test_a_changed_file_makes_another_archive(workshop, root, engine, changed):
 
 
 def test_a_changed_lock_of_its_own_makes_another_archive(workshop, root, engine):
-    """The same holds for the lock that all images share."""
+    """Besides the lock file of all images, an image may have a lock file of its own."""
     recipe = replace(OPERATOR, extra="extra.lock")
     (root / "extra.lock").write_text("# nothing is needed\n")
     without = workshop.build(OPERATOR)
@@ -110,7 +110,7 @@ def test_a_changed_lock_of_its_own_makes_another_archive(workshop, root, engine)
 
 
 def test_another_base_makes_another_archive(workshop, engine):
-    """A security update of Debian's image must reach this project's images."""
+    """A security update of Debian's image must cause a new build of this project's images."""
     first = workshop.build(OPERATOR)
     engine.digest = "sha256:newer"
 
@@ -118,7 +118,7 @@ def test_another_base_makes_another_archive(workshop, engine):
 
 
 def test_a_tag_is_part_of_the_content(workshop):
-    """An upgrade uses the same image under another name."""
+    """The tests of an upgrade use the same image under two tags."""
     built = workshop.build(OPERATOR, "0.0.0-next")
 
     assert built.reference == "docker.io/library/palaestra-operator:0.0.0-next"
@@ -126,14 +126,14 @@ def test_a_tag_is_part_of_the_content(workshop):
 
 
 def test_the_context_is_gone_after_the_build(workshop, engine):
-    """The context has gigabytes if PyTorch is among its wheels."""
+    """With PyTorch among its wheels, the build context has several gigabytes."""
     workshop.build(OPERATOR)
 
     assert not engine.orders[0].context.exists()
 
 
 def test_sources_that_change_while_they_are_read_are_refused(workshop, root):
-    """Otherwise the content of the archive would not match the digest in its name."""
+    """Without this error the archive's content would not match the digest in its name."""
     package = root / "operator"
     (package / "hatch_build.py").write_text(EDITS_WHILE_BUILDING)
     with (package / "pyproject.toml").open("a") as project:
@@ -144,7 +144,7 @@ def test_sources_that_change_while_they_are_read_are_refused(workshop, root):
 
 
 def test_archives_that_nobody_used_for_long_are_removed(tmp_path):
-    """Each archive has about a gigabyte."""
+    """An archive has about a gigabyte, so old archives would fill the disk."""
     for name in "abc":
         (tmp_path / name).touch()
     cache.use(tmp_path / "a")

@@ -1,4 +1,4 @@
-"""The rules for all Dockerfiles, and a check that hadolint finds nothing else in them."""
+"""The rules for all Dockerfiles, and a check that the linter hadolint finds no other mistake in them."""
 
 import json
 import re
@@ -20,18 +20,18 @@ EXCUSES = ROOT / ".hadolint.yaml"
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.name)
 def recipe(request):
-    """Return each image."""
+    """Return the recipe of each image."""
     return request.param
 
 
 @pytest.fixture
 def instructions(recipe):
-    """Return the image's Dockerfile."""
+    """Return the instructions of the image's Dockerfile."""
     return parsed(recipe)
 
 
 def parsed(recipe):
-    """Return a Dockerfile as pairs of an instruction and its argument, comments and line ends removed."""
+    """Return a Dockerfile as pairs of instruction and argument, without comments and line continuations."""
     text = re.sub(r"^\s*#.*\n", "", (ROOT / recipe.dockerfile).read_text(), flags=re.MULTILINE)
     lines = re.sub(r"\\\n\s*", "", text).splitlines()
     return [tuple(line.split(maxsplit=1)) for line in lines if line.strip()]
@@ -43,13 +43,13 @@ def values(instructions, wanted):
 
 
 def test_an_image_runs_as_a_user_without_rights(instructions):
-    """The user is a number: a cluster that refuses root cannot look up a name."""
+    """The user must be a number, because a cluster that refuses root cannot look up a name."""
     assert values(instructions, "USER") == ["65532:65532"]
     assert [each for each, _ in instructions].index("USER") > [each for each, _ in instructions].index("RUN")
 
 
 def test_an_image_runs_as_any_user_of_the_group_0(instructions):
-    """OpenShift gives each namespace its own user, which has no name and no home in the image."""
+    """OpenShift gives each namespace a user ID, which has no name and no home in the image."""
     folders = [
         words
         for run in values(instructions, "RUN")
@@ -61,7 +61,7 @@ def test_an_image_runs_as_any_user_of_the_group_0(instructions):
 
 
 def test_an_image_has_debian_trixie_as_its_base_unless_another_is_named(instructions):
-    """A base that is called `latest` may be another one tomorrow."""
+    """The tag `latest` may name another release of Debian tomorrow."""
     assert values(instructions, "FROM") == ["${BASE}"]
     assert "BASE=docker.io/library/debian:trixie-slim" in values(instructions, "ARG")
 
@@ -79,7 +79,7 @@ def test_every_use_of_apt_is_without_recommendations_and_cleans_up(instructions)
 
 
 def test_packages_are_installed_by_hash_from_the_context_alone(instructions):
-    """A build uses no package index, so none must be reachable, trusted or up to date."""
+    """A build uses no package index, so it works offline and cannot install a manipulated package."""
     *locked, ours = (run for run in values(instructions, "RUN") if "uv pip install" in run)
 
     assert all("--no-index" in run and "--no-cache" in run and "--no-deps" in run for run in (*locked, ours))
@@ -89,14 +89,14 @@ def test_packages_are_installed_by_hash_from_the_context_alone(instructions):
 
 
 def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
-    """The root file system is read-only in a pod."""
+    """In a pod the root file system is read-only, so Python cannot store bytecode there."""
     assert "PYTHONDONTWRITEBYTECODE=1" in values(instructions, "ENV")
     assert all("--compile-bytecode" in run for run in values(instructions, "RUN") if "uv pip" in run)
 
 
 @pytest.mark.parametrize("name", ["stub", "mujoco", "trainer", "notebook"])
 def test_an_image_with_ros_has_the_package_webots_ros(name):
-    """Users' programs import it there; Palaestra's own code uses the messages that it contains itself."""
+    """Users' programs import this package; Palaestra's own code has its own copy of the messages."""
     runs = values(parsed(recipes("debian")[name]), "RUN")
 
     distribution, *_ = [run for run in runs if "apt-get" in run]
@@ -108,7 +108,7 @@ def test_an_image_with_ros_has_the_package_webots_ros(name):
 
 @pytest.mark.parametrize("name", ["trainer", "notebook"])
 def test_an_image_has_a_folder_for_a_project_of_the_user_s_own(name):
-    """`palaestra-install` writes it in a build, as the user of the image, and Python looks there first."""
+    """In a user's build, `palaestra-install` writes a project into this folder. Python searches it first."""
     [made] = [run for run in values(parsed(recipes("debian")[name]), "RUN") if "useradd" in run]
 
     assert "install --directory --owner=palaestra --group=root --mode=775 /opt/packages" in made
@@ -116,14 +116,14 @@ def test_an_image_has_a_folder_for_a_project_of_the_user_s_own(name):
 
 
 def test_what_changes_most_comes_last(instructions):
-    """If a source changes, only the last layer is built again, without PyTorch."""
+    """After a change of the sources, only the last layer is built again, not PyTorch's layer."""
     order = [f"{instruction} {value}" for instruction, value in instructions]
 
     assert order.index("ARG REQUIREMENTS") < order.index("ARG PACKAGES") < order.index("ARG VERSION")
 
 
 def test_the_notebook_begins_with_the_layers_of_the_trainer():
-    """Debian's PyTorch and the trainer's libraries have 1.4 GB; equal layers are built and stored once."""
+    """PyTorch and the trainer's libraries have 1.4 GB; equal layers are built and stored once."""
     trainer, notebook = (parsed(recipes("debian")[name]) for name in ("trainer", "notebook"))
     shared = next(n for n, pair in enumerate(trainer) if "/context/requirements.txt" in pair[1]) + 1
 
@@ -131,7 +131,7 @@ def test_the_notebook_begins_with_the_layers_of_the_trainer():
 
 
 def test_mujoco_begins_with_the_layers_of_the_stub():
-    """A node that runs both pulls Python and the ROS messages once."""
+    """A node that runs both images pulls Python and the ROS messages once."""
     stub, mujoco = (parsed(recipes("debian")[name]) for name in ("stub", "mujoco"))
     shared = stub.index(("ENV", "PYTHONDONTWRITEBYTECODE=1")) + 1
 
@@ -139,9 +139,9 @@ def test_mujoco_begins_with_the_layers_of_the_stub():
 
 
 def test_mujoco_s_image_can_draw():
-    """The image has EGL, and with it Mesa's driver for the processor.
+    """The image needs EGL, with Mesa's software renderer.
 
-    PyOpenGL also loads libopengl.
+    PyOpenGL also needs libopengl.
     """
     install, *_ = [run for run in values(parsed(recipes("debian")["mujoco"]), "RUN") if "libegl1" in run]
 
@@ -149,7 +149,7 @@ def test_mujoco_s_image_can_draw():
 
 
 def test_the_labels_say_what_is_inside(instructions, recipe):
-    """`inspect` shows them without running anything."""
+    """`docker inspect` shows the labels without starting a container."""
     (labels,) = values(instructions, "LABEL")
     found = dict(re.findall(r'org\.opencontainers\.image\.(\w+)="([^"]*)"', labels))
 
@@ -160,19 +160,19 @@ def test_the_labels_say_what_is_inside(instructions, recipe):
 
 
 def test_no_dockerfile_copies_or_adds(instructions):
-    """A mounted file leaves no layer, but a copied file stays in one."""
+    """A mounted file is not part of a layer, but a copied file stays in the image."""
     assert not {"COPY", "ADD"} & {instruction for instruction, _ in instructions}
 
 
 def test_folders_with_the_version_of_python_are_those_of_the_lock():
-    """The Python version of the base image determines both."""
+    """The Python version of the base image must match these folders and the lock file."""
     for recipe in RECIPES:
         found = re.findall(r"/python(3\.\d+)/", (ROOT / recipe.dockerfile).read_text())
         assert set(found) <= {PYTHON}
 
 
 def linted(*options):
-    """Return the rules of hadolint that are broken, by Dockerfile."""
+    """Return the hadolint rules that each Dockerfile breaks."""
     files = [
         str(path.relative_to(ROOT))
         for folders in ("*", "images/*")
@@ -192,7 +192,7 @@ def linted(*options):
 
 
 def test_hadolint_finds_nothing_in_any_dockerfile():
-    """It also checks Dockerfiles that no recipe builds, and runs ShellCheck on the shell commands in them."""
+    """The linter also checks Dockerfiles without a recipe, and runs ShellCheck on their shell commands."""
     broken = linted()
 
     assert broken.keys() >= {recipe.dockerfile for recipe in RECIPES}

@@ -1,4 +1,4 @@
-"""Docker builds where it can; otherwise the reason not to use it is found before anything is built."""
+"""Docker builds the images if it can; if not, the reason is found before a build starts."""
 
 import os
 from pathlib import Path
@@ -55,14 +55,14 @@ def order(tmp_path):
 
 @pytest.mark.parametrize("lacking", ["version", "buildx-version"])
 def test_without_an_engine_or_buildx_there_is_no_docker(docker, lacking):
-    """Many machines have only the client, and an old engine has no mounts in a build."""
+    """Many machines have only Docker's client; an old engine cannot mount files during a build."""
     docker(" ".join(word for word in EVERYTHING.split() if word != lacking))
 
     assert Docker.here() is None
 
 
 def test_without_a_base_image_to_be_had_there_is_no_docker(docker):
-    """A registry may be unreachable; buildah makes its own base image."""
+    """If the registry is unreachable, buildah must build, because it creates its own base image."""
     calls = docker("version buildx-version")
 
     assert Docker.here() is None
@@ -80,7 +80,7 @@ def test_a_base_image_that_is_there_is_not_pulled(docker):
 
 
 def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
-    """The Dockerfile explains these arguments."""
+    """Comments in the Dockerfiles explain these build arguments."""
     calls = docker(EVERYTHING)
     Docker.here().build(order)
 
@@ -89,7 +89,7 @@ def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
 
 
 def test_docker_loads_what_another_image_is_built_from(docker, tmp_path):
-    """The name may belong to an older image, which another checkout has built."""
+    """In Docker, the name of the base may belong to an older image from another checkout."""
     calls = docker(f"{EVERYTHING} load")
     Docker.here().load(tmp_path / "trainer.tar", tmp_path / "load.log")
 
@@ -97,7 +97,7 @@ def test_docker_loads_what_another_image_is_built_from(docker, tmp_path):
 
 
 def test_a_failed_build_leaves_no_archive(docker, order):
-    """An existing archive is always complete."""
+    """An archive that exists must be complete, because it is never built again."""
     docker(EVERYTHING)
     engine = Docker.here()
     docker("save")
@@ -108,7 +108,7 @@ def test_a_failed_build_leaves_no_archive(docker, order):
 
 
 def test_a_failure_shows_the_last_lines(tmp_path):
-    """The user reads the cause where the command was typed."""
+    """The user reads the cause in the terminal and need not open the log."""
     with pytest.raises(ImagesError, match=r"(?s)sh: ended with 3; .*\nline 99$"):
         programs.run(
             ["sh", "-c", "for i in $(seq 99); do echo line $i; done; exit 3"],
@@ -118,6 +118,6 @@ def test_a_failure_shows_the_last_lines(tmp_path):
 
 
 def test_a_program_that_takes_too_long_is_ended(tmp_path):
-    """A build that hangs must fail."""
+    """A build that hangs must fail at its deadline."""
     with pytest.raises(ImagesError, match=r"sleep: was not done after 0 s"):
         programs.run(["sleep", "60"], log=tmp_path / "log", deadline_s=0.2)

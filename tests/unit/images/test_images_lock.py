@@ -1,4 +1,4 @@
-"""An image has the locked versions of the packages that its own need, and nothing else."""
+"""An image has the locked versions of the packages that it needs, and no other packages."""
 
 import re
 from pathlib import Path
@@ -38,22 +38,22 @@ stranger==4.0 \\
 
 
 def names(requirements):
-    """Return the names in a requirements file."""
+    """Return the package names in a requirements file."""
     return set(re.findall(r"^([a-z0-9-]+)==", requirements, re.MULTILINE))
 
 
 def test_a_share_holds_what_is_needed_also_by_way_of_others():
-    """Only `parent` requires `child`, and Palaestra requires `parent`."""
+    """Palaestra requires `parent`, and only `parent` requires `child`."""
     assert {"parent", "child"} <= names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
 
 def test_a_share_holds_nothing_that_only_others_need():
-    """Linters and test tools do not belong into an image."""
+    """Linters and test tools must not be in an image."""
     assert "stranger" not in names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
 
 def test_markers_are_decided_for_the_python_of_the_image():
-    """The Python of the machine that builds may be older."""
+    """The machine that builds the image may have another Python version."""
     chosen = names(share(parse(SMALL), ["palaestra"], "x86_64"))
 
     assert "new-python-only" in chosen
@@ -61,12 +61,12 @@ def test_markers_are_decided_for_the_python_of_the_image():
 
 
 def test_what_is_left_out_takes_along_what_only_it_needs():
-    """Debian's PyTorch replaces the locked one, and brings its own libraries."""
+    """Debian's PyTorch replaces the locked PyTorch, whose libraries are then not needed either."""
     assert names(share(parse(SMALL), ["palaestra"], "x86_64", without=["parent"])) == set()
 
 
 def test_what_a_package_does_not_want_stays_where_another_wants_it():
-    """Another package also requires `parent`."""
+    """Another package requires `parent` too, so `parent` stays in that package's share."""
     pins = unwanted(parse(SMALL), "palaestra", ["parent"])
 
     assert names(share(pins, ["palaestra"], "x86_64")) == set()
@@ -74,7 +74,7 @@ def test_what_a_package_does_not_want_stays_where_another_wants_it():
 
 
 def test_an_image_without_an_extra_has_nothing_that_only_the_extra_wants():
-    """Packages that are required without the extra stay."""
+    """Packages that are also required without the extra stay in the image."""
     package = {
         "dependencies": ["always>=1"],
         "optional-dependencies": {"camera": ["PyOpenGL>=3", "always"], "sound": ["horn"]},
@@ -85,21 +85,21 @@ def test_an_image_without_an_extra_has_nothing_that_only_the_extra_wants():
 
 
 def test_a_share_keeps_every_hash():
-    """The installer refuses a wheel that is not the locked one."""
+    """With the hashes, the installer refuses a wheel that differs from the locked one."""
     requirements = share(parse(SMALL), ["palaestra"], "x86_64")
 
     assert "child==1.0 \\\n    --hash=sha256:aa \\\n    --hash=sha256:bb\n" in requirements
 
 
 def test_a_lock_of_another_form_is_refused_with_the_line():
-    """If an unknown line were skipped, the image would lack its package."""
+    """If the parser skipped an unknown line, the image would lack the package of that line."""
     with pytest.raises(ValueError, match=r"'child @ file:///child' has no version with hashes"):
         parse("child @ file:///child\n    # via palaestra\n")
 
 
 @given(st.lists(st.sampled_from(["palaestra", "palaestra-sim", "palaestra-trainer"]), unique=True))
 def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages):
-    """The written text parses to the same pins: nothing is lost or added."""
+    """The written text parses to the same versions and hashes."""
     pins = {pin.name: pin for pin in LOCK if "python_full_version <" not in (pin.marker or "")}
     for pin in parse(share(LOCK, packages, "x86_64")):
         assert pin.hashes == pins[pin.name].hashes
@@ -128,7 +128,7 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
     ],
 )
 def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
-    """A sidecar stays small, and the trainer for the processor does not have 5 GB of CUDA."""
+    """The sidecar's image stays small, and the trainer's CPU image does not contain 5 GB of CUDA."""
     chosen = names(contents(ROOT, recipes("debian")[image], "x86_64").requirements.text)
 
     assert holds <= chosen
@@ -136,7 +136,7 @@ def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
 
 
 def test_what_the_notebook_has_besides_agrees_with_the_lock():
-    """The notebook's image adds to the trainer's libraries, which must stay as they are tested."""
+    """The notebook's image adds packages, but must keep the tested versions of the trainer's libraries."""
     here, besides = (
         {pin.name: pin.version for pin in parse(share(pins, [pin.name for pin in pins], "x86_64"))}
         for pins in (LOCK, parse((ROOT / recipes("debian")["notebook"].extra).read_text()))
@@ -148,7 +148,7 @@ def test_what_the_notebook_has_besides_agrees_with_the_lock():
 
 
 def test_what_an_image_has_besides_is_nothing_that_it_has_already():
-    """No package is downloaded twice, and no layer repeats a package of a lower one."""
+    """A package must be downloaded only once, and must be in only one layer."""
     inside = contents(ROOT, recipes("debian")["notebook"], "x86_64")
 
     assert names(inside.requirements.text)
@@ -157,7 +157,7 @@ def test_what_an_image_has_besides_is_nothing_that_it_has_already():
 
 
 def test_the_trainer_for_cuda_has_the_locked_torch_and_its_libraries():
-    """Debian's PyTorch is built only for the processor."""
+    """Debian's PyTorch has no CUDA, so this image needs the locked PyTorch."""
     recipe = recipes("cuda")["trainer"]
 
     assert {"torch", "triton", "nvidia-cudnn-cu12"} <= names(

@@ -1,4 +1,4 @@
-"""The digest in an archive's name covers everything that goes into the image."""
+"""The digest in an archive's name covers all content of the image."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ ROOT = Path(__file__).parents[3]
 
 @given(st.lists(st.binary(max_size=4)), st.lists(st.binary(max_size=4)))
 def test_different_parts_have_different_digests(one, other):
-    """The boundaries between parts count: (a, bc) differs from (ab, c)."""
+    """The boundaries between the parts count: (a, bc) and (ab, c) have different digests."""
     assert (digest(one) == digest(other)) == (one == other)
 
 
 def test_a_changed_file_changes_the_digest(tmp_path):
-    """No outdated image may be used."""
+    """After a change of the sources, no test may run an old image."""
     file = tmp_path / "module.py"
     file.write_text("1")
     before = digest_of_files(tmp_path, [file])
@@ -28,7 +28,7 @@ def test_a_changed_file_changes_the_digest(tmp_path):
 
 
 def test_a_renamed_file_changes_the_digest(tmp_path):
-    """The file name is the name of a module."""
+    """A renamed file is a Python module of another name."""
     one, other = tmp_path / "one.py", tmp_path / "other.py"
     one.write_text("1")
     before = digest_of_files(tmp_path, [one])
@@ -38,7 +38,7 @@ def test_a_renamed_file_changes_the_digest(tmp_path):
 
 
 def test_the_place_of_the_checkout_does_not_change_the_digest(tmp_path):
-    """Two checkouts share the images."""
+    """Two checkouts with the same content share one archive."""
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "module.py").write_text("1")
@@ -49,7 +49,7 @@ def test_the_place_of_the_checkout_does_not_change_the_digest(tmp_path):
 
 
 def test_what_python_leaves_behind_changes_nothing(tmp_path):
-    """A test run must not cause every image to be built again."""
+    """A test run writes bytecode, which must not cause a new build of every image."""
     source = tmp_path / "package" / "src" / "module.py"
     source.parent.mkdir(parents=True)
     source.write_text("1")
@@ -63,15 +63,15 @@ def test_what_python_leaves_behind_changes_nothing(tmp_path):
 
 @pytest.mark.parametrize("recipe", recipes("debian").values(), ids=lambda recipe: recipe.name)
 def test_a_recipe_names_what_is_there(recipe):
-    """A recipe is checked before anybody waits for a build."""
+    """This test finds a wrong path at once; a build would fail only after minutes."""
     assert (ROOT / recipe.dockerfile).is_file()
     assert all((ROOT / file).is_file() for file in recipe.files)
     assert all((ROOT / package / "pyproject.toml").is_file() for package in recipe.packages)
 
 
 def test_an_image_has_the_name_that_the_plan_asks_for():
-    """A cluster adds the registry to a name without a host."""
-    from palaestra.plan import Images  # noqa: PLC0415 - read here as what the name is compared with
+    """The plan's names have no registry; a container engine adds `docker.io/library` to them."""
+    from palaestra.plan import Images  # noqa: PLC0415 - only this test needs it
 
     images = Images.of_release("1.2.3")
 

@@ -1,4 +1,4 @@
-"""What a browser may do to the server of a live view: turn its camera, and use our own controls."""
+"""A browser may send two messages to a live view: the pose of its camera, and the use of our own controls."""
 
 import http.client
 from typing import get_type_hints
@@ -25,7 +25,7 @@ def sent(kind, **given):
 
 
 def camera():
-    """Return the message by which a browser reports its camera."""
+    """Return the message with which a browser reports its camera."""
     return sent(
         _messages.ViewerCameraMessage,
         wxyz=(1.0, 0.0, 0.0, 0.0),
@@ -36,14 +36,14 @@ def camera():
 
 
 def everything():
-    """Yield the name of each class of messages, with a message."""
+    """Yield the name of each message class, with a message of this class."""
     for name, kind in CLASSES.items():
         yield name, camera() if kind is _messages.ViewerCameraMessage else sent(kind)
 
 
 @pytest.fixture(scope="module")
 def view():
-    """Yield a running view with a foreign text field and an own button, and its gate."""
+    """Yield a running view and its gate; the view has a foreign text field and one of our buttons."""
     server, gate = guarded(0, "test")
     server.foreign = server.gui.add_text("path", "unchanged")
     server.own = server.gui.add_button("kill")
@@ -72,7 +72,7 @@ def browser(view):
 
 
 def test_no_message_but_two_reaches_a_handler(view):
-    """Viser of tomorrow may have further messages, so the gate knows what it accepts."""
+    """A later version of Viser may add messages, so the gate lists the messages that it accepts."""
     _, gate = view
 
     passed = {name for name, data in everything() if not isinstance(gate.deserialize(data), Dropped)}
@@ -83,12 +83,12 @@ def test_no_message_but_two_reaches_a_handler(view):
 
 @pytest.mark.parametrize("rubbish", [b"", b"\xc1", b"\x00", msgspec.msgpack.encode({"type": ["x"]})])
 def test_rubbish_is_dropped(view, rubbish):
-    """An error would end the connection with a traceback on the person's terminal."""
+    """An exception would end the connection and print a traceback on the user's terminal."""
     assert isinstance(view[1].deserialize(rubbish), Dropped)
 
 
 def test_every_message_of_viser_is_sent_and_has_no_effect(view, browser, monkeypatch):
-    """A page that could open a tunnel, upload a file or change a field would own the person's machine."""
+    """A foreign page that could open a tunnel or upload a file could control the user's machine."""
     server, _ = view
     shared = []
     monkeypatch.setattr(server, "request_share_url", lambda: shared.append(1))
@@ -116,7 +116,7 @@ def test_every_message_of_viser_is_sent_and_has_no_effect(view, browser, monkeyp
     "origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1", "http://localhost"]
 )
 def test_a_page_of_another_origin_cannot_connect(browser, origin):
-    """Any page in the person's browser can reach loopback."""
+    """Any web page in the user's browser can send requests to the loopback address."""
     with pytest.raises(InvalidStatus) as refused:
         browser(origin=origin)
 
@@ -124,7 +124,7 @@ def test_a_page_of_another_origin_cannot_connect(browser, origin):
 
 
 def test_a_foreign_name_for_this_address_gets_nothing(view):
-    """A site can bind its own name to 127.0.0.1, and then read the page as its own."""
+    """A web site can point its own host name to 127.0.0.1 and then read the page as its own."""
     connection = http.client.HTTPConnection("127.0.0.1", view[0].get_port(), timeout=10.0)
     connection.request("GET", "/", headers={"Host": "evil.example"})
     answer = connection.getresponse()
@@ -135,7 +135,7 @@ def test_a_foreign_name_for_this_address_gets_nothing(view):
 
 
 def test_the_own_page_is_served_and_only_on_loopback(view):
-    """Viser itself listens on all addresses."""
+    """By default, Viser listens on all addresses of the machine."""
     server, _ = view
     assert server.get_host() == "127.0.0.1"
     connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=10.0)

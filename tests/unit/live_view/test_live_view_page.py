@@ -1,4 +1,4 @@
-"""The page of a live view: what it draws of a scene, and what it asks a simulator for."""
+"""The page of a live view: what it draws of a scene, and which requests it sends to a simulator."""
 
 import signal
 import threading
@@ -42,7 +42,7 @@ THERE = (2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 class Simulator:
-    """A simulator with one robot of all shapes, and a mark that is sometimes elsewhere."""
+    """A fake simulator with a robot that has every shape, and a mark that the scene may move."""
 
     name = "collect-0"
 
@@ -56,11 +56,11 @@ class Simulator:
         self.shot = None
 
     def signal(self, number):
-        """Note a signal."""
+        """Record a signal."""
         self.signals.append(number)
 
     def scene(self):
-        """Return its scene."""
+        """Return the scene of this simulator."""
         nodes = (
             VisibleNode(name="mark", pose=AT, shapes=SHAPES[:1]),
             VisibleNode(name="robot", moves=True, robot=True, shapes=SHAPES),
@@ -68,31 +68,31 @@ class Simulator:
         return VisibleScene(world="w", revision=self.revision, nodes=nodes, meshes=(WEDGE,))
 
     def state(self):
-        """Return its newest state."""
+        """Return the current state of this simulator."""
         self.asked += 1
         if self.failing:
             raise NotNow("collect-0: the simulator does not run")
         return SceneState(time_s=1.5, revision=self.revision, poses=dict(self.poses), episode=7)
 
     def picture(self):
-        """Return the newest picture of its camera."""
+        """Return the current image of this simulator's camera."""
         self.asked += 1
         return self.shot
 
     def progress(self):
-        """Return the progress of its run."""
+        """Return the progress of the run."""
         return RUN
 
 
 @pytest.fixture
 def simulator():
-    """Return a simulator."""
+    """Return a fake simulator."""
     return Simulator()
 
 
 @pytest.fixture
 def page(simulator):
-    """Yield its page, which runs in a thread."""
+    """Yield the page of the simulator, which runs in a thread."""
     shown = ViewPage("test", lambda: (simulator,), 0)
     ended = threading.Event()
     thread = threading.Thread(target=shown.run, args=(ended.is_set,))
@@ -128,13 +128,13 @@ def browser(page):
 
 
 def place(page, name):
-    """Return the x of a node on the page; None before it is drawn."""
+    """Return the x coordinate of a node on the page; None until the node is drawn."""
     handle = page._stage._nodes.get(name)
     return None if handle is None else float(handle.position[0])
 
 
 def test_a_page_that_nobody_looks_at_asks_for_nothing(page, simulator):
-    """A person leaves the view open over night, and her training is as fast as without it."""
+    """A user may leave the view open over night, which must not slow down the training."""
     threading.Event().wait(0.5)
 
     assert page.address.startswith("http://127.0.0.1:")
@@ -143,7 +143,7 @@ def test_a_page_that_nobody_looks_at_asks_for_nothing(page, simulator):
 
 @pytest.mark.usefixtures("browser")
 def test_it_draws_every_shape_and_moves_what_moves(page, simulator):
-    """What a state does not name is where the scene has it."""
+    """If the state has no pose for a node, the page uses the pose of the scene."""
     eventually(lambda: place(page, "robot") == 2.0)
     assert place(page, "mark") == 1.0
 
@@ -155,7 +155,7 @@ def test_it_draws_every_shape_and_moves_what_moves(page, simulator):
 
 @pytest.mark.usefixtures("browser")
 def test_the_newest_picture_of_a_camera_is_shown_while_the_simulator_has_one(page, simulator):
-    """It shows what the policy sees; after a restart the camera may be off."""
+    """The page shows the image that the policy gets; after a restart the camera may be off."""
     for red in (1, 2):
         simulator.shot = CameraPicture(name="eye", width=2, height=1, pixels=bytes((red, 0, 0)) * 2)
         eventually(lambda red=red: page._picture is not None and page._picture.image[0, 0, 0] == red)
@@ -167,7 +167,7 @@ def test_the_newest_picture_of_a_camera_is_shown_while_the_simulator_has_one(pag
 
 @pytest.mark.usefixtures("browser")
 def test_another_revision_draws_the_scene_again(page, simulator):
-    """A supervisor has added a box, or the simulator has another world."""
+    """A supervisor may have added a box, or the simulator may have loaded another world."""
     eventually(lambda: place(page, "robot"))
     before = page._stage._nodes["robot"]
 
@@ -179,7 +179,7 @@ def test_another_revision_draws_the_scene_again(page, simulator):
 
 @pytest.mark.usefixtures("browser")
 def test_a_simulator_that_restarts_is_told_and_shown_again(page, simulator):
-    """The page is open when a fault comes: that is what the person wants to see."""
+    """A user opens the page to see how the run recovers from a fault."""
     eventually(lambda: place(page, "robot"))
     simulator.failing = True
     eventually(lambda: "does not run" in page._text.content)
@@ -190,12 +190,12 @@ def test_a_simulator_that_restarts_is_told_and_shown_again(page, simulator):
 
 
 def buttons(page):
-    """Return the identifiers of the buttons of a page by their labels."""
+    """Return the identifiers of a page's buttons, by label."""
     return {handle.label: identifier for identifier, handle in page._gate._controls.items()}
 
 
 def test_a_button_kills_the_simulator_of_a_run_of_this_machine(page, simulator, browser):
-    """That the training survives it is what the person came to see."""
+    """With the buttons a user can see that the training survives a fault."""
     for label in ("kill it", "hang it"):
         update = {"type": "GuiUpdateMessage", "uuid": buttons(page)[label], "updates": {"value": True}}
         browser.send(msgspec.msgpack.encode(update))
@@ -205,7 +205,7 @@ def test_a_button_kills_the_simulator_of_a_run_of_this_machine(page, simulator, 
 
 
 def test_a_simulator_of_a_cluster_has_no_such_button():
-    """Its processes are not this person's."""
+    """The simulator's process runs in a pod, to which this machine cannot send a signal."""
     shown = ViewPage("test", lambda: (Simulator(here=False),), 0)
     try:
         assert buttons(shown) == {}
@@ -214,7 +214,7 @@ def test_a_simulator_of_a_cluster_has_no_such_button():
 
 
 def test_names_of_a_pod_are_text_and_nothing_else():
-    """A reward term may have any name, and the panel is Markdown."""
+    """A reward term may have any name, and must not become a Markdown link or HTML on the page."""
     state = SceneState(time_s=0.0, rewards={"![x](http://evil)|<b>": 1.0}, joints={"hip": 0.5})
 
     text = described(state)
@@ -224,14 +224,14 @@ def test_names_of_a_pod_are_text_and_nothing_else():
 
 
 def test_the_success_rate_is_shown_with_its_interval_and_the_faults():
-    """One number without its interval says little, and a slow step is not a fault."""
+    """A rate means little without its interval; a slow step does not count as a fault."""
     text = "step 12,000 of 50,000 · 2 faults\n\n**success 85 %** (64 to 95 %, 20 episodes)"
 
     assert summarized(RUN) == text
 
 
 def test_a_run_without_an_evaluation_has_no_rate_and_one_between_two_attempts_nothing():
-    """The page shows what is known, and no zero in place of it."""
+    """The page leaves out unknown values and does not show a zero instead."""
     new = TrainerStatus(step=10, target=100, episodes=1, phase="collecting", faults={"hung": 1})
 
     assert summarized(new) == "step 10 of 100 · 1 fault"
@@ -239,7 +239,7 @@ def test_a_run_without_an_evaluation_has_no_rate_and_one_between_two_attempts_no
 
 
 def test_a_capsule_has_the_height_with_its_caps():
-    """Viser has no capsule, so it is a mesh."""
+    """Viser has no capsule shape, so the page draws a mesh."""
     points, faces = capsule(0.1, 0.6)
 
     assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((-0.3, 0.3))

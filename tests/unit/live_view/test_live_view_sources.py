@@ -1,4 +1,4 @@
-"""Where a view reads the simulators of a run: from sidecars of this machine, or through an API server."""
+"""A view reads the simulators of a run from sidecars on this machine, or through an API server."""
 
 import json
 from http import HTTPStatus
@@ -33,7 +33,7 @@ PLAYED = SceneState(time_s=0.0, episode=7, step=3, rewards={"progress": 0.5})
 
 @pytest.fixture
 def serve():
-    """Yield a function that serves routes on loopback and returns the address."""
+    """Yield a function that serves responses on the loopback address and returns the server's address."""
     servers = []
 
     def start(**routes):
@@ -66,12 +66,12 @@ def run(tmp_path):
 
 
 def answer(message):
-    """Return the response with a message."""
+    """Return an HTTP response with a message."""
     return json_response(HTTPStatus.OK, message.to_json())
 
 
 def test_a_run_of_this_machine_is_read_from_its_sidecars_and_its_trainer(serve, run):
-    """The trainer knows the episode, and the simulator where everything is."""
+    """The trainer reports the episode, and the sidecar reports the poses."""
     trainer = serve(watch=json_response(HTTPStatus.OK, {"collect-0": PLAYED.to_json()}), status=answer(RUN))
     folder = run(serve(scene=answer(ARENA), watch=answer(MOVED)), trainer)
 
@@ -85,7 +85,7 @@ def test_a_run_of_this_machine_is_read_from_its_sidecars_and_its_trainer(serve, 
 
 
 def test_a_trainer_between_two_attempts_hides_no_simulator(serve, run):
-    """Its poses are the point; the episode is not."""
+    """The view needs the poses, but can do without the episode."""
     (source,) = LocalRun(run(serve(watch=answer(MOVED)))).sources()
 
     assert source.state() == MOVED
@@ -106,7 +106,7 @@ PICTURE = CameraPicture(name="eye", width=1, height=1, pixels=b"rgb")
     ids=["one", "none", "nonsense", "older release"],
 )
 def test_a_picture_is_read_where_a_camera_has_sent_one(serve, run, served, picture):
-    """Most robots have no camera, and the rest of the page needs none."""
+    """Most robots have no camera, and the rest of the page works without images."""
     (source,) = LocalRun(run(serve(**served))).sources()
 
     assert source.picture() == picture
@@ -120,7 +120,7 @@ def test_a_picture_is_read_where_a_camera_has_sent_one(serve, run, served, pictu
     ],
 )
 def test_the_sentence_of_a_sidecar_is_passed_on(serve, run, status, error, fact):
-    """Only the sidecar knows why there is nothing to see."""
+    """Only the sidecar can report why it has no scene."""
     (source,) = LocalRun(
         run(serve(scene=error_response(status, "driver webots describes no world")))
     ).sources()
@@ -130,7 +130,7 @@ def test_the_sentence_of_a_sidecar_is_passed_on(serve, run, status, error, fact)
 
 
 def test_an_older_sidecar_and_a_dead_one_are_told_apart(serve, run):
-    """The first one will never answer, the other one may start again."""
+    """An older sidecar will never serve a scene; a dead one may be restarted."""
     (old,) = LocalRun(run(serve(state=answer(MOVED)))).sources()
     with pytest.raises(NotShown, match="is not one of /state"):
         old.scene()
@@ -141,7 +141,7 @@ def test_an_older_sidecar_and_a_dead_one_are_told_apart(serve, run):
 
 
 def test_nonsense_of_a_pod_is_refused(serve, run):
-    """A pod may send anything."""
+    """A program in a pod may send any response."""
     (source,) = LocalRun(run(serve(scene=answer(MOVED)))).sources()
 
     with pytest.raises(NotShown, match="answered /scene with world: is missing"):
@@ -149,7 +149,7 @@ def test_nonsense_of_a_pod_is_refused(serve, run):
 
 
 def test_a_folder_that_is_no_run_is_refused_with_the_one_to_give(run, tmp_path):
-    """The mistake is told before a page is opened."""
+    """The command reports the mistake before it opens a page."""
     with pytest.raises(NoRun, match="give runs/JOB/REPLICA"):
         LocalRun(tmp_path)
 
@@ -159,7 +159,7 @@ def test_a_folder_that_is_no_run_is_refused_with_the_one_to_give(run, tmp_path):
 
 
 def test_a_trainer_is_asked_a_few_times_a_second():
-    """Its thread is the one that learns."""
+    """The trainer's thread that responds also trains, so requests slow down the training."""
     now, asked = [0.0], []
 
     def fetch(path, _most):
@@ -174,7 +174,7 @@ def test_a_trainer_is_asked_a_few_times_a_second():
 
 
 def test_the_progress_of_a_run_is_asked_once_a_second():
-    """A page asks many times a second, but a person reads numbers more slowly."""
+    """The page draws many times a second, but a person reads numbers more slowly."""
     now, asked = [0.0], []
 
     def fetch(path, _most):
@@ -192,7 +192,7 @@ POD = {"name": "job-0-abc", "uid": "1", "created": "2026-01-01T00:00:00Z"}
 
 
 def test_a_standby_is_seen_after_it_has_taken_over():
-    """Only one of the two simulators of a sidecar works, and the trainer decides which."""
+    """Only one of a sidecar's two simulators is in use, and the trainer selects it."""
     running = {"standby/watch"}
     asked = []
 
@@ -211,7 +211,7 @@ def test_a_standby_is_seen_after_it_has_taken_over():
 
 
 class FakeClient:
-    """A client of a cluster with one job of two groups, whose pod answers through the API server."""
+    """A cluster's client with one job of two groups, whose pod responds through the API server."""
 
     namespace = "lab"
 
@@ -225,7 +225,7 @@ class FakeClient:
         return self._job
 
     def proxied(self, namespace, pod, port, path):
-        """Return what the pod serves, or raise what the API server makes of it."""
+        """Return the response of the pod, or raise the error of the API server."""
         found = self._answers[port, path]
         if isinstance(found, Exception):
             raise found
@@ -234,7 +234,7 @@ class FakeClient:
 
 
 def test_a_job_is_read_from_the_newest_pod_of_its_replica():
-    """Its simulators have the ports of health in the order of the groups."""
+    """The health ports of the simulators follow the order of the groups."""
     content = yaml.safe_load(EXAMPLE.read_bytes())
     content["metadata"]["uid"] = "7d3b8a54-0000-4000-8000-000000000000"
     content["status"] = {"replicas": [{"index": 0, "pod": POD}]}
@@ -257,7 +257,7 @@ def test_a_job_is_read_from_the_newest_pod_of_its_replica():
 
 
 def test_the_error_of_a_server_behind_the_api_server_keeps_its_sentence():
-    """The API server passes the body of a pod's response on, and our servers write `error`."""
+    """The API server passes on the body of a pod's response, in which our servers set `error`."""
     error = from_status(404, {"error": "driver webots describes no world"})
 
     assert (error.reason, error.message) == ("HTTP404", "driver webots describes no world")
@@ -273,7 +273,7 @@ def test_the_error_of_a_server_behind_the_api_server_keeps_its_sentence():
     ],
 )
 def test_a_pod_is_read_through_the_api_server(failure, error):
-    """No port is opened; a pod that is gone may be followed by another."""
+    """The view opens no port of the pod. If the pod is gone, another pod may follow."""
     job = ClusterJob(FakeClient(None, {(7200, "scene"): failure, (7200, "watch"): "{}"}), "job", 0)
     source = SidecarSource(
         name="collect-0", fetch=lambda path, most: job._fetch("job-0-abc", 7200, path, most)

@@ -1,4 +1,4 @@
-"""A program with endless output does not fill the disk, and both ends of its output are kept."""
+"""A log file has a size limit and keeps the beginning and the end of a program's output."""
 
 import os
 
@@ -11,13 +11,13 @@ FIRST, LAST = 1000, 500
 
 @pytest.fixture
 def log(tmp_path):
-    """A log file, open to read and to append."""
+    """Yield a log file that is open for reading and appending."""
     with (tmp_path / "x.log").open("a+b", buffering=0) as file:
         yield file
 
 
 def limited(file):
-    """Return the writing end of a log, with small parts."""
+    """Return the writer of a log with small limits."""
     return LimitedFile(file.fileno(), FIRST, LAST)
 
 
@@ -27,7 +27,7 @@ def content(file):
 
 
 def write_lines(file, numbers):
-    """Write a line of ten bytes for each number, and return the largest size that the file had."""
+    """Write a line of ten bytes for each number, and return the largest size that the file reached."""
     writer, most = limited(file), 0
     for number in numbers:
         writer.write(b"%09d\n" % number)
@@ -36,14 +36,14 @@ def write_lines(file, numbers):
 
 
 def test_a_short_log_has_every_line(log):
-    """Most logs are short."""
+    """A log below the limit must not lose a line."""
     write_lines(log, range(200))
 
     assert content(log) == [f"{number:09}" for number in range(200)]
 
 
 def test_a_long_log_keeps_its_two_ends_and_counts_what_was_left_out(log):
-    """The start of a log shows the program, and the end shows its error."""
+    """The beginning of a log identifies the program, and the end has its error."""
     most = write_lines(log, range(1000))
 
     lines = content(log)
@@ -67,7 +67,7 @@ def test_what_was_left_out_is_counted_over_all_writers(log):
 
 
 def test_a_log_of_one_endless_line_is_limited_too(log):
-    """A progress bar may never write the end of a line."""
+    """A progress bar may never write a newline."""
     writer = limited(log)
 
     for _ in range(100):
@@ -77,7 +77,7 @@ def test_a_log_of_one_endless_line_is_limited_too(log):
 
 
 def test_a_log_that_cannot_be_written_raises_nothing(tmp_path):
-    """The disk may be full or removed; the run continues all the same."""
+    """The disk may be full or removed, but the run must continue."""
     (tmp_path / "x.log").write_bytes(b"x" * 5000)
     with (tmp_path / "x.log").open("rb") as log:
         assert limited(log).write(b"lost\n") == 5

@@ -1,4 +1,4 @@
-"""The decision after the end of a pod, and the wait before the next; nothing is started."""
+"""The decision after the end of a pod and the wait before the next pod, without starting a process."""
 
 import pytest
 from hypothesis import given
@@ -28,17 +28,17 @@ PLANNED = plan(identified(validate({**JOB, "spec": {}}), "uid"), ClusterLayout(i
     ],
 )
 def test_the_planned_job_says_what_an_exit_code_means(code, meaning):
-    """The rules are those that Kubernetes reads, so there is only one table of exit codes."""
+    """`palaestra run` reads the same rules as Kubernetes, so the exit codes are defined once."""
     assert verdict(PLANNED.replicas[0].job, code) is meaning
 
 
 def test_without_a_policy_every_failure_is_counted():
-    """This is the default of Kubernetes."""
+    """Kubernetes also counts every failure by default."""
     assert verdict({"spec": {}}, 75) is RetryVerdict.COUNT
 
 
 def test_rules_are_read_in_order_and_the_first_match_decides():
-    """The API server documents this order."""
+    """Kubernetes documents this order for `podFailurePolicy`."""
     rules = [
         {"action": "Ignore", "onExitCodes": {"operator": "NotIn", "values": [7]}},
         {"action": "FailJob", "onExitCodes": {"operator": "In", "values": [7, 8]}},
@@ -51,7 +51,7 @@ def test_rules_are_read_in_order_and_the_first_match_decides():
 
 @given(st.integers(min_value=0, max_value=20))
 def test_a_limit_of_n_means_n_plus_one_pods(limit):
-    """The first pod is not a retry."""
+    """The limit counts retries, and the first pod is not a retry."""
     tries = Tries(limit=limit)
     pods = 1
     while tries.another(RetryVerdict.COUNT, step=0):
@@ -61,7 +61,7 @@ def test_a_limit_of_n_means_n_plus_one_pods(limit):
 
 
 def test_ignored_pods_that_get_no_further_are_bounded():
-    """Kubernetes has no limit for them, so a job whose master never starts would be retried for ever."""
+    """Kubernetes has no limit for ignored pods, so a job whose ROS master never starts would run for ever."""
     tries = Tries(limit=0)
     went_on = [tries.another(RetryVerdict.IGNORE, step=0) for _ in range(IDLE_PODS)]
 
@@ -69,14 +69,14 @@ def test_ignored_pods_that_get_no_further_are_bounded():
 
 
 def test_progress_makes_ignored_pods_unbounded():
-    """A run that is interrupted every hour but makes progress ends some day."""
+    """A run that is interrupted every hour, but makes progress, will end."""
     tries = Tries(limit=0)
 
     assert all(tries.another(RetryVerdict.IGNORE, step=step) for step in range(1, 50))
 
 
 def test_the_wait_before_the_next_pod_doubles_and_is_bounded():
-    """A pod that fails at once would otherwise be started hundreds of times a minute."""
+    """Without the wait, a pod that fails at once would be started hundreds of times a minute."""
     tries = Tries(limit=100)
     waits = []
     for _ in range(9):
@@ -88,7 +88,7 @@ def test_the_wait_before_the_next_pod_doubles_and_is_bounded():
 
 @given(st.integers(min_value=1, max_value=60))
 def test_a_sidecars_back_off_grows_up_to_its_bound(ends):
-    """A crash loop must not use the processor, and a single crash must not cost time."""
+    """A crash loop must not use the whole processor, but a single crash should cost little time."""
     backoff = BackOff(first_s=0.5, most_s=30.0)
 
     assert backoff.wait_s(1) == 0.5

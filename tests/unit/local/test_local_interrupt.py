@@ -1,4 +1,4 @@
-"""A run ends early through a person's signals or through its deadline."""
+"""A user's signals or the deadline end a run early."""
 
 import asyncio
 import os
@@ -12,7 +12,7 @@ PATIENCE_S = 20.0
 
 
 class Target:
-    """A target that can be stopped and killed, and queues the requests."""
+    """A target that puts each request to stop or kill it into a queue."""
 
     def __init__(self):
         self.told = asyncio.Queue()
@@ -31,7 +31,7 @@ class Target:
 
 
 def ended_by(signals, deadline_s=None):
-    """Return the requests to a target, and the interrupt, after a deadline and some signals."""
+    """Return the requests that a target gets after a deadline and some signals, and the interrupt."""
 
     async def play():
         interrupt, target, told = Interrupt(), Target(), []
@@ -48,7 +48,7 @@ def ended_by(signals, deadline_s=None):
 
 
 def test_a_deadline_stops_as_a_first_signal_does():
-    """The trainer saves a checkpoint, but the end is not a person's."""
+    """The trainer saves a checkpoint, but the run counts as expired, not as interrupted by a user."""
     told, interrupt = ended_by(0, deadline_s=0.01)
 
     assert told == ["stop"]
@@ -56,7 +56,7 @@ def test_a_deadline_stops_as_a_first_signal_does():
 
 
 def test_a_first_signal_after_the_deadline_does_not_kill():
-    """The person may not know that the run is already stopping."""
+    """The user may not have noticed that the run is already stopping."""
     told, interrupt = ended_by(2, deadline_s=0.01)
 
     assert told == ["stop", "stop", "kill"]
@@ -65,7 +65,7 @@ def test_a_first_signal_after_the_deadline_does_not_kill():
 
 @pytest.mark.parametrize("signals", [1, 2])
 def test_a_run_that_a_person_ends_has_not_expired(signals):
-    """This does not depend on how long the end takes."""
+    """The run counts as ended by the user, however long the trainer takes to stop."""
     told, interrupt = ended_by(signals)
 
     assert told == ["stop", "kill"][:signals]
@@ -74,14 +74,14 @@ def test_a_run_that_a_person_ends_has_not_expired(signals):
 
 @pytest.fixture(params=[signal.SIGINT, signal.SIGHUP], ids=lambda number: number.name)
 def ignored(request):
-    """A signal that is ignored, as this process would inherit it."""
+    """Ignore a signal, as a process does that inherits this setting from its parent."""
     before = signal.signal(request.param, signal.SIG_IGN)
     yield request.param
     signal.signal(request.param, before)
 
 
 def test_a_signal_that_was_ignored_at_the_start_stays_ignored(ignored):
-    """Scripts ignore SIGINT for background programs, nohup ignores SIGHUP; SIGTERM still ends the run."""
+    """Shells ignore SIGINT for background programs, and nohup ignores SIGHUP. SIGTERM still ends the run."""
 
     async def play():
         interrupt, target = Interrupt(), Target()

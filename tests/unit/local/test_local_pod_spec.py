@@ -1,4 +1,4 @@
-"""A planned pod is read for use on this machine."""
+"""`read_pod` reads a planned pod, so that `palaestra run` can start it on this machine."""
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,7 @@ def template(**spec):
 
 
 def test_every_planned_container_is_read_in_order():
-    """These are the containers that the kubelet of a cluster would start."""
+    """In a cluster the kubelet would start the same containers in the same order."""
     pod = read_pod(template(), "pod-1")
 
     assert [each.name for each in pod.containers] == [
@@ -36,7 +36,7 @@ def test_every_planned_container_is_read_in_order():
 
 
 def test_probes_are_those_of_the_plan():
-    """Master and trainer have a startup probe, sidecars and trainer a liveness probe, all on loopback."""
+    """The ROS master and the trainer have a startup probe; sidecars and the trainer have a liveness probe."""
     pod = read_pod(template(), "pod-1")
 
     assert pod.init[0].startup.command[0] == "bash"
@@ -46,12 +46,12 @@ def test_probes_are_those_of_the_plan():
 
 
 def test_the_uid_of_the_pod_is_filled_in_for_each_attempt():
-    """In a cluster the downward API fills it in; attempts.jsonl distinguishes pods by it."""
+    """In a cluster the downward API sets this variable. attempts.jsonl distinguishes pods by their uid."""
     assert read_pod(template(), "pod-7").main.env["PALAESTRA_POD_UID"] == "pod-7"
 
 
 def test_what_an_author_writes_reaches_the_program_as_it_stands():
-    """A kubelet replaces variables in such texts. The plan escapes them, and the escapes are removed here."""
+    """A kubelet expands `$(NAME)` in such texts, so the plan escapes it; `read_pod` removes the escapes."""
     texts = ("echo $$ $HOME", "$(ROS_HOME)", "$$(ROS_HOME)", "$")
     written = {"command": list(texts), "env": [{"name": "TEXT", "value": texts[1]}]}
 
@@ -62,7 +62,7 @@ def test_what_an_author_writes_reaches_the_program_as_it_stands():
 
 
 def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
-    """If the value were left out, the trainer would fail later."""
+    """This machine has no Secrets, so the trainer would later fail because of the missing variable."""
     secret = {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}}
 
     with pytest.raises(RunRefused, match=r"env TOKEN of container trainer: .* give it as `value`"):
@@ -70,7 +70,7 @@ def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
 
 
 def test_a_second_main_container_is_refused():
-    """The exit code of a pod is that of its only main container."""
+    """The exit code of a pod is that of its main container, so it can have only one main container."""
     two = {"spec": {"containers": [{"name": "a", "command": ["x"]}, {"name": "b", "command": ["y"]}]}}
 
     with pytest.raises(RunRefused, match="container b"):
@@ -88,11 +88,11 @@ def test_a_second_main_container_is_refused():
     ],
 )
 def test_a_log_has_what_was_seen_last(drawn, seen):
-    """A progress bar that is redrawn a thousand times must not become a thousand lines."""
+    """A progress bar that is redrawn a thousand times must be one line in the log."""
     assert as_seen(drawn) == seen
 
 
 @given(st.text(alphabet=st.characters(exclude_characters="\x1b\r\n")))
 def test_text_without_control_sequences_is_kept(line):
-    """No part of a traceback may be lost."""
+    """A log must not lose a part of a traceback."""
     assert as_seen(line) == line

@@ -10,7 +10,7 @@ from palaestra.local.ports import HeldPorts
 
 
 def test_ports_differ_from_one_another():
-    """If ports were chosen and released one by one, two could be equal."""
+    """If each port were released before the next is chosen, two ports could be equal."""
     with HeldPorts() as held:
         ports = [held.any() for _ in range(50)]
 
@@ -18,7 +18,10 @@ def test_ports_differ_from_one_another():
 
 
 def test_a_held_port_is_for_its_container_and_nobody_else():
-    """A server with SO_REUSEADDR can bind to the port, as Palaestra's do. A program without it cannot."""
+    """Palaestra's servers set SO_REUSEADDR and can bind the held port.
+
+    A program without this option cannot.
+    """
     with HeldPorts() as held:
         port = held.any()
 
@@ -30,7 +33,7 @@ def test_a_held_port_is_for_its_container_and_nobody_else():
 
 
 def test_a_held_port_can_be_listened_on_again_after_a_restart():
-    """A sidecar that crashed listens on the same port again."""
+    """A sidecar that restarts after a crash listens on the same port."""
     with HeldPorts() as held:
         port = held.any()
         for _ in range(3):
@@ -42,7 +45,7 @@ def test_a_held_port_can_be_listened_on_again_after_a_restart():
 
 
 def test_a_port_in_use_is_refused_with_a_remedy():
-    """The error comes before anything is started."""
+    """The error comes before the run starts a process."""
     with socket.create_server(("127.0.0.1", 0)) as server, HeldPorts() as held:
         port = server.getsockname()[1]
 

@@ -1,4 +1,4 @@
-"""Problems of a machine or a job are found before anything is started."""
+"""`preflight` finds problems of a machine or a job before a run starts a process."""
 
 import errno
 import os
@@ -18,7 +18,7 @@ JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata"
 
 @pytest.fixture
 def request_for(tmp_path):
-    """Return a function that makes requests to run a job with this spec."""
+    """Return a function that returns a request to run a job with the given spec."""
 
     def make(**spec):
         return PreflightRequest(job=validate({**JOB, "spec": spec}), runs=tmp_path / "runs")
@@ -27,7 +27,7 @@ def request_for(tmp_path):
 
 
 def collecting(**fields):
-    """Return groups of simulators, the first of them with these fields."""
+    """Return two groups of simulators; the first has the given fields."""
     first = {"name": "collect", "role": "Collect", **fields}
     return {"simulators": [first, {"name": "evaluate", "role": "Evaluate"}]}
 
@@ -42,7 +42,7 @@ def test_this_machine_can_run_the_minimal_job(request_for):
 
 
 def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch, tmp_path):
-    """Without /proc, the processes that a container leaves behind could not be found and ended."""
+    """Without /proc the run could not find and end the processes that a container leaves."""
     monkeypatch.setattr(preflight, "ENVIRONMENT", tmp_path / "environ")
 
     [problem] = preflight.processes_can_be_found(request_for())
@@ -51,7 +51,7 @@ def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch,
 
 
 def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_path):
-    """The PYTHONPATH of the machine and that of the job both reach a process of the pod."""
+    """A process of the pod gets the PYTHONPATH of the machine and that of the job."""
     for folder in ("machine", "job"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "queue.py").touch()
@@ -67,7 +67,7 @@ def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_pa
 
 
 def test_a_suspended_job_is_refused(request_for):
-    """Nothing here would ever resume it, and a suspended training must not begin."""
+    """No program on this machine would ever resume the job."""
     [problem] = preflight.nothing_is_put_off(request_for(suspend=True))
 
     assert problem.startswith("spec.suspend: is true")
@@ -85,21 +85,21 @@ def test_a_suspended_job_is_refused(request_for):
     ],
 )
 def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec, problem, monkeypatch):
-    """The author of the job can fix it."""
+    """The message names the field, so the author of the job can correct it."""
     monkeypatch.setenv("PATH", "")
 
     assert any(each.startswith(problem) for each in preflight.programs_exist(request_for(**spec)))
 
 
 def test_a_job_with_mujoco_runs_where_it_is_installed(request_for):
-    """`make setup` installs MuJoCo."""
+    """The development setup installs MuJoCo, so the check must find no problem."""
     assert not list(preflight.programs_exist(request_for(**collecting(driver="mujoco"))))
 
 
 def test_the_error_for_a_missing_mujoco_names_the_package_and_the_extra(request_for, monkeypatch):
-    """The program is always installed, but its library is an extra.
+    """The program is always installed, but its library is an optional extra.
 
-    Nobody reads a simulator's log at once.
+    Without this check the error would appear only in a simulator's log.
     """
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
 
@@ -112,7 +112,7 @@ def test_the_error_for_a_missing_mujoco_names_the_package_and_the_extra(request_
 
 
 def test_the_error_for_a_missing_program_of_mujoco_names_the_package(request_for, monkeypatch, tmp_path):
-    """An installation without simulators lacks the program."""
+    """An installation without the simulators' package lacks this program."""
     monkeypatch.setattr("palaestra.local.simulators.program_path", lambda: str(tmp_path))
 
     assert (
@@ -122,7 +122,7 @@ def test_the_error_for_a_missing_program_of_mujoco_names_the_package(request_for
 
 
 def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_path):
-    """Its sidecar would find the mistake too, but report it only in a log."""
+    """The sidecar would find the mistake too, but would report it only in a log."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nWorldInfo {\n  basicTimeStep [\n}\n")
 
@@ -133,7 +133,7 @@ def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_
 
 
 def test_a_world_file_that_is_right_passes(request_for, tmp_path):
-    """It may refer to files in its folder."""
+    """A correct world file must not be refused because of the files to which it refers."""
     world = tmp_path / "arena.wbt"
     world.write_bytes(builtin("arena"))
 
@@ -141,14 +141,14 @@ def test_a_world_file_that_is_right_passes(request_for, tmp_path):
 
 
 def test_the_error_for_a_missing_world_file_has_its_path(request_for):
-    """The message also has the system's own words."""
+    """The message also quotes the error of the operating system."""
     [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": "/no/such.wbt"})))
 
     assert "/no/such.wbt: No such file or directory" in problem
 
 
 def test_a_world_without_an_end_is_refused(request_for, tmp_path):
-    """A device without an end fills the memory, and the opening of a pipe blocks the check."""
+    """A device without an end would fill the memory, and a pipe would block the check when it is opened."""
     device, pipe = tmp_path / "device.wbt", tmp_path / "pipe.wbt"
     device.symlink_to("/dev/zero")
     os.mkfifo(pipe)
@@ -159,7 +159,7 @@ def test_a_world_without_an_end_is_refused(request_for, tmp_path):
 
 
 def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, tmp_path):
-    """The sidecar refuses it too, but only after the start, and is then restarted for a minute."""
+    """The sidecar would refuse the world only after the start, and would be restarted for a minute."""
     world = tmp_path / "lab" / "worlds" / "arm.xml"
     world.parent.mkdir(parents=True)
     (tmp_path / "arm.xml").write_text("<mujocoinclude/>")
@@ -174,7 +174,7 @@ def test_a_root_that_does_not_hold_what_the_world_names_is_refused(request_for, 
 
 
 def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
-    """The disk would be full in the middle of a checkpoint."""
+    """The run would fail later, while it writes a checkpoint."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
     with pytest.raises(RunRefused, match=r"MiB are free and a run takes .*--dir"):
@@ -182,7 +182,7 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
 
 
 def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_path):
-    """The check comes before the run directory is created, and leaves nothing behind."""
+    """The check comes before the run directory is created, and leaves no file."""
     monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
 
     [problem] = preflight.locks_work(request_for())
@@ -193,7 +193,7 @@ def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_pa
 
 
 def test_all_problems_are_reported_at_once(request_for, monkeypatch):
-    """An author can fix all problems of a job at once."""
+    """The author of a job can then correct all problems in one edit."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
     with pytest.raises(RunRefused) as refused:
@@ -203,7 +203,7 @@ def test_all_problems_are_reported_at_once(request_for, monkeypatch):
 
 
 def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path):
-    """The check comes before a simulator starts, as that of a world does."""
+    """Like a wrong world, a wrong file is reported before a simulator starts."""
 
     def problems(path):
         return list(preflight.initial_policy_is_there(request_for(trainer={"initialPolicy": {"path": path}})))
@@ -223,7 +223,7 @@ def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path
 
 
 def test_an_initial_policy_may_be_gone_once_the_run_has_a_checkpoint(request_for):
-    """A prolonged run resumes from its checkpoint, and the run of the initial policy may be deleted."""
+    """The run resumes from its checkpoint and no longer needs the initial policy, which may be deleted."""
     request = request_for(trainer={"initialPolicy": {"path": "/deleted/model.zip"}})
     before = list(preflight.initial_policy_is_there(request))
 

@@ -1,4 +1,4 @@
-"""The lines that `palaestra run` prints while a policy trains."""
+"""The progress lines that `palaestra run` prints during the training."""
 
 import asyncio
 
@@ -24,7 +24,7 @@ def progress(**values):
 
 
 def test_a_line_says_how_far_how_good_how_fast_and_how_long():
-    """A person needs no key to read it."""
+    """A person can read the line without documentation."""
     line = progress_line(progress())
 
     assert line == (
@@ -46,12 +46,12 @@ def test_a_line_says_how_far_how_good_how_fast_and_how_long():
     ],
 )
 def test_unknown_values_are_left_out_and_times_are_rounded(values, text):
-    """A zero in place of an unknown value would be a wrong number."""
+    """A zero instead of an unknown value would mislead the reader."""
     assert text in progress_line(progress(**values))
 
 
 def test_lines_are_shown_from_the_first_response_of_the_trainer():
-    """A run that starts has no target yet, and a line without one would mislead."""
+    """During its start a run has no target yet, and a line without a target would mislead."""
 
     class Reader:
         def __init__(self):

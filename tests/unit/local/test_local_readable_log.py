@@ -1,4 +1,4 @@
-"""The lines of the trainer's log that a person sees."""
+"""The lines of the trainer's log that `palaestra run` prints for a person."""
 
 import pytest
 import structlog
@@ -23,18 +23,18 @@ HEAD = "2026-11-27T17:23:06.142184Z "
     ],
 )
 def test_values_are_progress_and_warnings_are_sentences(line, text):
-    """A person reads sentences; the file has the fields."""
+    """The terminal shows sentences; the log file has all fields."""
     assert readable(HEAD + line) == text
 
 
 @pytest.mark.parametrize("line", ["hello", "", "Traceback (most recent call last):", "[info     ] mine x=1"])
 def test_output_of_the_users_code_stays_as_it_is(line):
-    """A print in an environment is how its author looks into it."""
+    """Authors of environments use `print` to debug them."""
     assert readable(line) == line
 
 
 def test_the_trainers_own_format_is_understood(capsys):
-    """The log's format is the trainer's; here it is written by the trainer's own code."""
+    """The trainer's own code writes these lines, so a change of its format makes the test fail."""
     configure_logs()
     log = structlog.get_logger("test")
     log.info("progress", step=1)

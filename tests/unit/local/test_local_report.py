@@ -1,4 +1,4 @@
-"""The runner makes the report that a killed trainer could not make."""
+"""`palaestra run` writes the report of a run if the trainer was killed before it could write one."""
 
 import pytest
 
@@ -8,14 +8,14 @@ from palaestra.local.report import complete_report
 
 @pytest.fixture
 def run_directory(tmp_path):
-    """Return the directory of a run that has begun."""
+    """Return the directory of a run that has started."""
     (tmp_path / "attempts.jsonl").write_text('{"reason": "new run"}\n')
     (tmp_path / "training.yaml").write_text("job: killed\nreplica: 0\n")
     return tmp_path
 
 
 def test_a_killed_run_has_a_report(run_directory):
-    """The killed trainer wrote no record of its end."""
+    """A killed trainer cannot write a record of its end."""
     complete_report(run_directory)
 
     assert "its trainer was killed" in (run_directory / "report.html").read_text()
@@ -23,7 +23,7 @@ def test_a_killed_run_has_a_report(run_directory):
 
 
 def test_a_report_that_the_trainer_made_is_kept(run_directory):
-    """The trainer knows more than its files."""
+    """The trainer's own report may have details that are not in the files."""
     (run_directory / "end.json").write_text("{}")
 
     complete_report(run_directory)
@@ -32,14 +32,14 @@ def test_a_report_that_the_trainer_made_is_kept(run_directory):
 
 
 def test_a_program_of_the_users_own_has_no_report(tmp_path):
-    """Such a program need not write the files that a report needs."""
+    """Such a program may not write the files that the report needs."""
     complete_report(tmp_path)
 
     assert not (tmp_path / "report.html").exists()
 
 
 def test_without_the_trainers_package_there_is_no_report(run_directory, monkeypatch):
-    """A run has ended whether or not a report can be made."""
+    """The end of a run must not depend on whether a report can be written."""
     monkeypatch.setattr("palaestra.local.report.PROGRAM", "palaestra-none")
 
     complete_report(run_directory)

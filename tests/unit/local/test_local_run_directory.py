@@ -1,4 +1,4 @@
-"""The run directory: its lock, the job that it belongs to, and the files that are kept."""
+"""The run directory: its lock, the job to which it belongs, and its files."""
 
 import errno
 import json
@@ -29,14 +29,14 @@ def record(**changes):
 
 @pytest.fixture
 def directory(tmp_path):
-    """A run directory in which a job was started."""
+    """Return a run directory in which a job was started."""
     path = tmp_path / "job" / "0"
     run_directory.prepare(path, record())
     return path
 
 
 def test_the_uid_of_a_job_follows_from_its_place(tmp_path):
-    """The same command resumes the same run; two directories belong to two jobs."""
+    """The same command must resume the same run; jobs in two directories must have different uids."""
     here, there = tmp_path / "a", tmp_path / "b"
 
     assert run_directory.uid_of(here) == run_directory.uid_of(here)
@@ -45,12 +45,12 @@ def test_the_uid_of_a_job_follows_from_its_place(tmp_path):
 
 
 def test_a_run_goes_on_with_the_job_that_it_was_started_with(directory):
-    """The same file is read again."""
+    """To resume a run, a user runs the command with the same file."""
     run_directory.refuse_another_job(directory, record())
 
 
 def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
-    """The training up to the last checkpoint was that of the same job, so the result stays explained."""
+    """Up to the last checkpoint, a longer training is the same, so one spec still explains the result."""
     run_directory.prepare(tmp_path, record(trainer={"steps": 100}))
     longer = record(trainer={"steps": 150})
 
@@ -70,7 +70,7 @@ def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
     ids=["fewer steps", "another seed"],
 )
 def test_what_a_prolonged_run_cannot_change_is_refused(tmp_path, changes, line):
-    """This holds also together with more steps."""
+    """A higher step count does not make another change acceptable."""
     run_directory.prepare(tmp_path, record(trainer={"steps": 100}))
     steps = 150 if changes else 50
 
@@ -83,12 +83,12 @@ def test_what_a_prolonged_run_cannot_change_is_refused(tmp_path, changes, line):
 
 
 def test_a_new_directory_takes_any_job(tmp_path):
-    """There is no earlier job that could differ."""
+    """A new directory has no earlier job from which the new one could differ."""
     run_directory.refuse_another_job(tmp_path / "new", record())
 
 
 def test_a_changed_job_is_refused_with_every_changed_field(directory):
-    """A run with parts of two jobs would be a run of neither."""
+    """A run that was trained under two specs could be explained by neither."""
     changed = record(seed=2, simulators=[{"name": "b", "startDeadlineSeconds": 60}])
 
     with pytest.raises(RunRefused) as refused:
@@ -103,7 +103,7 @@ WRONG = RunOutcome(exit_code=2, reason="ConfigurationWrong: gama: is not known",
 
 
 def test_a_job_that_was_wrong_before_its_first_step_may_be_corrected(directory):
-    """Nothing was trained yet that another job could spoil."""
+    """The run has not trained a step, so the correction mixes no results."""
     WRONG.keep(directory)
 
     run_directory.refuse_another_job(directory, record(seed=2))
@@ -112,7 +112,7 @@ def test_a_job_that_was_wrong_before_its_first_step_may_be_corrected(directory):
 
 
 def test_a_wrong_job_that_runs_again_unchanged_is_no_correction(directory):
-    """The mistake may have been corrected in a file of the user's own; the run directory stays in place."""
+    """The user may have corrected her own code instead of the job; the run directory then stays."""
     WRONG.keep(directory)
 
     assert not run_directory.is_correction(directory, record())
@@ -130,7 +130,7 @@ def test_a_wrong_job_that_runs_again_unchanged_is_no_correction(directory):
     ids=["killed", "steps", "a program of one's own", "failed", "interrupted"],
 )
 def test_a_run_that_may_have_trained_is_never_corrected(directory, outcome):
-    """The trained steps belong to the job as it was."""
+    """The trained steps belong to the spec before the change."""
     if outcome is not None:
         outcome.keep(directory)
 
@@ -140,7 +140,7 @@ def test_a_run_that_may_have_trained_is_never_corrected(directory, outcome):
 
 
 def test_a_run_with_a_checkpoint_is_never_corrected(directory):
-    """Only the newest attempt was refused; earlier ones have trained."""
+    """Only the last attempt was refused; an earlier attempt has trained."""
     WRONG.keep(directory)
     (directory / "checkpoints" / "5000").mkdir(parents=True)
 
@@ -149,7 +149,7 @@ def test_a_run_with_a_checkpoint_is_never_corrected(directory):
 
 
 def test_a_run_that_begins_has_no_outcome_of_the_one_before(directory):
-    """If the run is killed, an old outcome would report that it ended at step 0."""
+    """If the new run is killed, the old outcome would report an end at step 0."""
     WRONG.keep(directory)
 
     run_directory.prepare(directory, record())
@@ -173,7 +173,7 @@ def test_what_does_not_change_what_is_learned_may_change(directory, change):
 
 
 def test_a_default_that_is_new_since_a_run_began_makes_it_no_other_job(tmp_path):
-    """Between the attempts was an upgrade; a new field with its default changes nothing."""
+    """An upgrade between two attempts may add a field, whose default must not count as a change."""
     job = validate({**JOB, "spec": {"trainer": {"algorithm": {"name": "PPO", "normalize": {}}}}})
     old = run_directory.record_of(job)
     del old["spec"]["backoffLimit"], old["spec"]["network"], old["spec"]["simulators"][1]["standby"]
@@ -184,7 +184,7 @@ def test_a_default_that_is_new_since_a_run_began_makes_it_no_other_job(tmp_path)
 
 
 def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_path):
-    """The job now requests something else than before."""
+    """A new field with another value than its default changes the training."""
     old = run_directory.record_of(validate({**JOB, "spec": {}}))
     del old["spec"]["seed"]
     run_directory.prepare(tmp_path, old)
@@ -196,7 +196,7 @@ def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_pa
 
 
 def test_the_record_of_a_newer_release_is_compared_as_it_stands(tmp_path):
-    """A field that this release does not know is named, not ignored."""
+    """If this release does not know a field of the record, the error must name the field."""
     now = run_directory.record_of(validate({**JOB, "spec": {}}))
     run_directory.prepare(tmp_path, {**now, "spec": {**now["spec"], "ofTomorrow": 3}})
 
@@ -205,13 +205,13 @@ def test_the_record_of_a_newer_release_is_compared_as_it_stands(tmp_path):
 
 
 def test_all_that_may_change_in_a_cluster_may_change_here():
-    """The same marks in the models apply in both cases, so the two cannot differ."""
+    """The models mark the fields that may change, for clusters and for this command."""
     assert {"spec.activeDeadlineSeconds", "spec.simulators.startDeadlineSeconds"} < run_directory.MUTABLE
     assert "spec.seed" not in run_directory.MUTABLE
 
 
 def test_a_field_that_is_new_or_gone_is_a_change():
-    """An absent field counts as a value."""
+    """A missing field differs from every value."""
     assert list(run_directory.changed_fields({"a": {"b": 1}}, {"a": {"c": [1]}})) == [
         "a.b: was 1, is absent",
         "a.c[0]: was absent, is 1",
@@ -232,7 +232,7 @@ def test_only_one_runner_at_a_time_has_a_directory(tmp_path):
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
 def test_a_file_system_without_locks_is_refused(tmp_path, monkeypatch, number):
-    """Without such locks, two runs could not be kept apart.
+    """Without locks, two runs could write to one directory.
 
     Examples are NFS without its lock service and Lustre without `flock`.
     """
@@ -249,7 +249,7 @@ def test_a_file_system_without_locks_is_refused(tmp_path, monkeypatch, number):
 
 
 def test_a_lock_is_free_again_afterwards(tmp_path):
-    """It is free also after an error; when the process is gone, the kernel releases it."""
+    """The lock is also released after an error, and by the kernel when the process ends."""
     path = tmp_path / "job" / "0"
     with pytest.raises(ZeroDivisionError), run_directory.locked(path):
         raise ZeroDivisionError
@@ -259,13 +259,13 @@ def test_a_lock_is_free_again_afterwards(tmp_path):
 
 
 def test_replicas_are_locked_apart(tmp_path):
-    """Two terminals may run one replica each."""
+    """A user may run two replicas of a job in two terminals."""
     with run_directory.locked(tmp_path / "0"), run_directory.locked(tmp_path / "1"):
         assert (tmp_path / "1.lock").exists()
 
 
 def test_what_was_there_is_set_aside_not_deleted(directory):
-    """A typing error must not delete a trained policy."""
+    """A typing error with `--fresh` must not delete a trained policy."""
     first = run_directory.set_aside(directory)
     run_directory.prepare(directory, record(seed=2))
     second = run_directory.set_aside(directory)
@@ -276,7 +276,7 @@ def test_what_was_there_is_set_aside_not_deleted(directory):
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
-    """A full disk shows only while the file is written."""
+    """A full disk causes an error only during the write."""
     path = tmp_path / "file"
     write(path, b"old")
     monkeypatch.setattr(os, "fsync", _full)
@@ -293,7 +293,7 @@ def _full(_descriptor):
 
 
 def test_an_outcome_is_kept_in_the_directory(directory):
-    """A finished run is reported from it without starting anything."""
+    """The command can report a finished run without starting a process."""
     outcome = RunOutcome(exit_code=0, steps=50, success_rate=0.95, faults=1)
 
     outcome.keep(directory)
@@ -304,7 +304,7 @@ def test_an_outcome_is_kept_in_the_directory(directory):
 
 @pytest.mark.parametrize("content", [None, "", "{", "[]", '{"exit_code": 0, "other": 1}'])
 def test_a_directory_without_a_readable_outcome_is_not_finished(directory, content):
-    """Such a run was interrupted, so it resumes."""
+    """Such a run was interrupted, so the same command resumes it."""
     if content is not None:
         (directory / "outcome.json").write_text(content)
 
@@ -312,7 +312,7 @@ def test_a_directory_without_a_readable_outcome_is_not_finished(directory, conte
 
 
 def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
-    """Values that were not measured are left out."""
+    """The summary leaves out values that were not measured."""
     for name in ("model.zip", "attempts.jsonl"):
         (directory / name).touch()
     (directory / "tensorboard").mkdir()
@@ -339,7 +339,7 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
 
 
 def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
-    """People copy them, also from folders whose names have spaces."""
+    """Users copy these commands, also if the name of the folder has spaces."""
     directory = tmp_path / "Ada's runs" / "$HOME `x`" / "0"
     (directory / "tensorboard").mkdir(parents=True)
     for name in ("model.zip", "attempts.jsonl"):
@@ -356,7 +356,7 @@ def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
 
 
 def test_the_summary_has_the_interval_of_the_success_rate(directory):
-    """The trainer writes it into summary.json."""
+    """The trainer writes this interval into summary.json."""
     interval = {"low": 0.8882, "high": 0.9785, "episodes": 100}
     (directory / "summary.json").write_text(json.dumps({"success_interval": interval}))
 
@@ -367,14 +367,14 @@ def test_the_summary_has_the_interval_of_the_success_rate(directory):
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"success_interval": null}', '{"success_interval": 3}'])
 def test_a_summary_without_an_interval_shows_the_rate_alone(directory, content):
-    """A program of one's own may write any file of that name."""
+    """A user's own program may write any content into a file of this name."""
     (directory / "summary.json").write_text(content)
 
     assert summary(RunOutcome(exit_code=0, success_rate=0.951), directory)[0].split()[-1] == "95%"
 
 
 def test_the_summary_of_a_program_of_one_s_own_promises_nothing_that_it_did_not_write(directory):
-    """palaestra-eval reads only models of the built-in loop, and TensorBoard only existing curves."""
+    """`palaestra-eval` reads only models of the built-in loop, and TensorBoard needs existing curves."""
     (directory / "model.zip").touch()
 
     lines = summary(RunOutcome(exit_code=0), directory)

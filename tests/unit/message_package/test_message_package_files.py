@@ -1,4 +1,4 @@
-"""The content of the package webots_ros: its md5 sums and its Python modules."""
+"""The content of the ROS package webots_ros: the md5 sums of its types, and its Python modules."""
 
 import ast
 from pathlib import Path
@@ -14,13 +14,13 @@ from tests.tables import for_each
 
 FILES = dict(package_files())
 MESSAGES, SERVICES = ([name for name in names if name.startswith("webots_ros/")] for names in type_names())
-# The messages of Debian's ros-sensor-msgs and of its dependencies.
+# The messages of Debian's package ros-sensor-msgs and of its dependencies.
 INSTALLED = {name: [f"/usr/share/{name}/msg"] for name in ("std_msgs", "geometry_msgs", "sensor_msgs")}
 
 
 @pytest.fixture
 def definitions(tmp_path):
-    """Return the folders in which genmsg looks for messages: this project's and the installed ones."""
+    """Return the folders in which genmsg searches for messages: this project's and the installed ones."""
     for name, text in FILES.items():
         if name.endswith(".msg"):
             (tmp_path / Path(name).name).write_text(text)
@@ -28,14 +28,14 @@ def definitions(tmp_path):
 
 
 def md5_of(spec, context, definitions):
-    """Return the md5 sum that ROS's tools compute from the files."""
+    """Return the md5 sum that ROS's tools compute from the definition files."""
     genmsg.msg_loader.load_depends(context, spec, definitions)
     return genmsg.gentools.compute_md5(context, spec)
 
 
 @for_each("name", MESSAGES)
 def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
-    """Otherwise the simulator would refuse a tool that reads the file."""
+    """With another md5 sum, a simulator would refuse the connection of a tool that reads the file."""
     context = genmsg.MsgContext.create_default()
     text = FILES[f"msg/{name.removeprefix('webots_ros/')}.msg"]
 
@@ -46,7 +46,7 @@ def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
 
 @for_each("name", SERVICES)
 def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
-    """The md5 sum of a service covers request and response together."""
+    """The md5 sum of a service covers its request and its response."""
     context = genmsg.MsgContext.create_default()
     text = FILES[f"srv/{name.removeprefix('webots_ros/')}.srv"]
 
@@ -56,7 +56,7 @@ def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
 
 
 def test_the_modules_of_a_kind_are_the_types_of_that_kind():
-    """If `webots_ros.srv` lacked a service, the user's program would fail, not this one."""
+    """If `webots_ros.srv` lacked a service, the import would fail only in a user's program."""
     for kind, names in (("msg", MESSAGES), ("srv", SERVICES)):
         imports = ast.parse(FILES[f"src/webots_ros/{kind}/__init__.py"]).body
 

@@ -1,4 +1,4 @@
-"""`palaestra-webots-ros` writes into a new folder, one with another package, and one on a full disk."""
+"""`palaestra-webots-ros` writes a ROS package into a new folder, over another package, and on a full disk."""
 
 import os
 import resource
@@ -18,12 +18,12 @@ SYSTEM_PYTHON = "/usr/bin/python3"  # has genpy and Debian's messages, but no pa
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
-    """Return a package that the tests only read."""
+    """Return the folder of a written package, which the tests only read."""
     return write(tmp_path_factory.mktemp("share"))
 
 
 def contents(folder):
-    """Return the text of every file, without Python's bytecode."""
+    """Return the text of every file by its path, without Python's bytecode."""
     return {
         str(path.relative_to(folder)): path.read_text()
         for path in folder.rglob("*")
@@ -44,13 +44,13 @@ def python(code, *arguments):
 
 
 def test_the_folder_holds_every_file_of_the_package_and_nothing_besides(package):
-    """ROS's tools search every folder on ROS_PACKAGE_PATH."""
+    """ROS's tools search every folder on ROS_PACKAGE_PATH, so an extra file could be taken for a package."""
     assert contents(package) == dict(package_files())
     assert [path.name for path in package.parent.iterdir()] == ["webots_ros"]
 
 
 def test_the_bytecode_names_the_files_where_they_are(package):
-    """In a container it cannot be compiled again, and a traceback shows lines of these files."""
+    """In a read-only container Python cannot compile the files again, and tracebacks need their paths."""
     code = "import sys; sys.path.append(sys.argv[1]); import webots_ros.srv._set_int as module\n"
     code += "print(module.__cached__, module.set_intRequest.serialize.__code__.co_filename)"
 
@@ -61,7 +61,7 @@ def test_the_bytecode_names_the_files_where_they_are(package):
 
 
 def test_a_package_of_an_earlier_release_is_replaced_as_a_whole(tmp_path):
-    """Otherwise a removed type could still be imported."""
+    """If old files stayed, programs could still import a removed type."""
     (write(tmp_path) / "srv/gone.srv").write_text("---\n")
 
     package = write(tmp_path)
@@ -77,7 +77,7 @@ def test_a_failed_write_leaves_the_earlier_package_as_it_was(tmp_path):
 
     done = subprocess.run(
         [COMMAND, tmp_path],
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # Python would keep half of its bytecode
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # Python would leave incomplete bytecode files
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)),
         capture_output=True,
         text=True,
@@ -92,7 +92,7 @@ def test_a_failed_write_leaves_the_earlier_package_as_it_was(tmp_path):
 
 
 def test_a_package_of_another_origin_is_left_alone(tmp_path, capsys):
-    """It may be Webots' own, built from its sources."""
+    """The package may be the one of Webots, built from its sources."""
     other = tmp_path / "webots_ros/package.xml"
     other.parent.mkdir()
     other.write_text("<package><name>webots_ros</name></package>")
@@ -105,7 +105,7 @@ def test_a_package_of_another_origin_is_left_alone(tmp_path, capsys):
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path, capsys):
-    """The remedy is another folder, or another user."""
+    """The user must choose another folder or run the command as another user."""
     (tmp_path / "share").write_text("")
 
     code = main([str(tmp_path / "share")])
@@ -119,14 +119,14 @@ IMPORTED += "import webots_ros.srv; print(webots_ros.srv.set_int)"
 
 
 def test_a_python_whose_packages_name_it_imports_it(package, tmp_path):
-    """It works without PYTHONPATH, which a notebook or a program in a pod does not have."""
+    """A notebook or a program in a pod does not set PYTHONPATH, and must still find the package."""
     make_importable(package, tmp_path)
 
     assert python(IMPORTED, tmp_path, tmp_path / "nothing") == "<class 'webots_ros.srv._set_int.set_int'>"
 
 
 def test_an_installed_webots_ros_is_imported_even_if_it_comes_last(package, tmp_path):
-    """In the virtual environment Palaestra's packages come before those of the distribution."""
+    """Palaestra's virtual environment is searched before the distribution's packages."""
     make_importable(package, tmp_path)
     installed = tmp_path / "dist-packages/webots_ros"
     (installed / "srv").mkdir(parents=True)

@@ -1,8 +1,6 @@
-"""The programs' metrics: names by Prometheus' conventions, and the page that is generated from them.
+"""The programs' metrics have names by Prometheus' conventions, and a page is generated from them.
 
-Source of the rules: https:
-
-prometheus.io/docs/practices/naming/ and the checks of `promtool check metrics`.
+Source of the rules: https://prometheus.io/docs/practices/naming/ and the checks of `promtool check metrics`.
 """
 
 import re
@@ -57,7 +55,7 @@ each_family = for_each("family", FAMILIES)
 
 
 def test_a_name_is_declared_once():
-    """Otherwise the meaning of a name would depend on the scraped program."""
+    """A name with two declarations would mean something else in each program."""
     names = [family.name for family in FAMILIES]
 
     assert sorted(names) == sorted(set(names))
@@ -65,20 +63,20 @@ def test_a_name_is_declared_once():
 
 @pytest.mark.parametrize("program", page.PROGRAMS, ids=lambda program: program.name)
 def test_a_name_tells_its_home(program):
-    """Each name also begins with the project's prefix."""
+    """The prefix shows which program exports a metric, and that it belongs to this project."""
     assert all(family.name.startswith(PREFIX) for family in program.families)
     assert [it.name for it in program.families if not it.name.startswith(HOMES[program.name])] == []
 
 
 @each_family
 def test_a_counter_and_nothing_else_ends_in_total(family):
-    """The name shows whether a query needs a rate."""
+    """The author of a query sees from the name whether the metric needs `rate`."""
     assert family.name.endswith("_total") is (family.kind is MetricType.COUNTER)
 
 
 @each_family
 def test_a_name_has_a_base_unit_or_none(family):
-    """With seconds, bytes and ratios no query has to convert anything."""
+    """If all metrics use seconds, bytes and ratios, no query has to convert a unit."""
     assert re.fullmatch(r"[a-z][a-z0-9_]*[a-z0-9]", family.name)
     assert not OTHER_UNITS.search(family.name)
     assert family.name.endswith(ENDS) is not (family.name in UNITLESS)
@@ -86,19 +84,22 @@ def test_a_name_has_a_base_unit_or_none(family):
 
 @each_family
 def test_a_name_ends_in_nothing_that_prometheus_adds(family):
-    """`_sum`, `_count` and `_bucket` belong to a histogram, and a type is not a part of a name."""
+    """Prometheus adds `_sum`, `_count` and `_bucket` to a histogram.
+
+    The type of a metric is not part of its name.
+    """
     assert not re.search(r"_(sum|count|bucket|created|counter|gauge|histogram)(_|$)", family.name)
 
 
 @each_family
 def test_a_help_text_is_a_line_that_tells_something(family):
-    """Grafana's explorer shows it next to the metric."""
+    """Grafana's explorer shows this text next to the metric."""
     assert re.fullmatch(r"[A-Z1].{14,118}\.", family.meaning)
 
 
 @each_family
 def test_labels_are_bounded_and_not_those_of_a_target(family):
-    """Each label has a list of values, or names objects of which there are few."""
+    """A label has a fixed list of values, or names objects whose number is small."""
     for label in family.labels:
         assert re.fullmatch(r"[a-z][a-z_]*", label.name)
         assert label.name not in OF_TARGETS | {"le", "quantile"}  # le and quantile are Prometheus' own
@@ -107,7 +108,7 @@ def test_labels_are_bounded_and_not_those_of_a_target(family):
 
 @each_family
 def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
-    """There are few enough buckets for thousands of trainers."""
+    """Each bucket is a series of each trainer, so their number is limited."""
     buckets = family.buckets
 
     assert bool(buckets) is (family.kind is MetricType.HISTOGRAM)
@@ -116,14 +117,14 @@ def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
 
 
 def test_the_page_has_every_family_and_no_other():
-    """The page is generated from the same tables; this test reads it as a person does."""
+    """The page is generated from the same tables; the test reads the page as a person reads it."""
     named = re.findall(r"^\| `(palaestra_\w+)` \|", PAGE.read_text(), re.MULTILINE)
 
     assert named == [family.name for family in FAMILIES]
 
 
 def test_the_queries_of_the_page_name_metrics_that_there_are():
-    """The test finds a renamed metric."""
+    """If a metric is renamed, the test finds its old name on the page."""
     text = PAGE.read_text()
     known = {family.name for family in FAMILIES}
 
@@ -132,5 +133,5 @@ def test_the_queries_of_the_page_name_metrics_that_there_are():
 
 
 def test_the_series_of_a_large_cluster_are_few_enough_for_one_prometheus():
-    """With a thousand jobs at once they must stay below the millions of series that a server handles."""
+    """A Prometheus server handles a few million series, also with a thousand jobs at once."""
     assert sum(program.series * program.count for program in page.PROGRAMS) < 600_000

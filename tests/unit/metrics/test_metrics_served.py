@@ -1,9 +1,7 @@
-"""The histograms of operator and trainer keep the rules of Prometheus' text format and OpenMetrics.
+"""The histograms of operator and trainer follow the rules of Prometheus' text format and of OpenMetrics.
 
-Sources: https:
-
-prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some readers are
-stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
+Sources: https://prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some
+readers are stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
 """
 
 from collections import defaultdict
@@ -39,9 +37,9 @@ def trainer():
 
 
 def series(text):
-    """Return the samples of each histogram's series by family and labels.
+    """Return the samples of each histogram series, by family and labels.
 
-    A series maps suffix or bound to value.
+    The samples of a series are a dict from the suffix or the bucket's bound to the value.
     """
     found = defaultdict(dict)
     for family in text_string_to_metric_families(text):
@@ -54,7 +52,10 @@ def series(text):
 
 @pytest.mark.parametrize(("served", "declared"), [(operator, of_operator), (trainer, of_trainer)])
 def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, declared):
-    """These are ascending buckets up to infinity, an equal count, and a sum unless it may decrease."""
+    """A strict reader needs ascending buckets up to infinity and an equal count.
+
+    It also needs a sum, except for a histogram whose sum may decrease.
+    """
     text = served()
     found = series(text)
 
@@ -72,7 +73,7 @@ def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, decla
 
 
 def test_an_episode_of_each_return_is_in_the_count():
-    """A return below the lowest bound is counted, too."""
+    """A return below the lowest bound counts too."""
     samples = series(trainer())["palaestra_trainer_episode_return",]
 
     assert samples["palaestra_trainer_episode_return_count"] == 4

@@ -1,4 +1,4 @@
-"""A cart with a pole in MJCF, its devices, and MuJoCo's own simulation of the cart."""
+"""An MJCF model of a cart with a pole and some devices, and MuJoCo's own simulation of the cart."""
 
 import pytest
 
@@ -55,7 +55,7 @@ POSITION = '<position name="push" joint="slider" kp="500" dampratio="1" ctrlrang
 
 @pytest.fixture
 def cartpole(tmp_path):
-    """`cartpole(actuator, sensor, *changes)` returns the path of the world, with texts replaced."""
+    """`cartpole(actuator, sensor, *changes)` writes the world with texts replaced, and returns its path."""
 
     def write(actuator=FORCE, sensor="", *changes):
         text = CARTPOLE.format(actuator=actuator, sensor=sensor)
@@ -71,7 +71,7 @@ def cartpole(tmp_path):
 
 @pytest.fixture
 def load(cartpole):
-    """`load(...)` returns the simulation of such a world, with `leave_out` as its types."""
+    """`load(...)` returns the simulation of such a world, which leaves out the types in `leave_out`."""
 
     def load(*texts, leave_out=()):
         return load_mjcf(cartpole(*texts), Mode.FAST, LeaveOut(types=frozenset(leave_out)))

@@ -1,4 +1,4 @@
-"""What a viewer gets of a model of MuJoCo: bodies, geoms, and the poses after a step."""
+"""A viewer gets the bodies and geoms of a MuJoCo model, and the poses after each step."""
 
 import json
 
@@ -26,7 +26,7 @@ def state_of(simulation):
 
 
 def test_each_body_is_a_node(simulation):
-    """The tree is that of the model."""
+    """The viewer's tree of nodes is the model's tree of bodies."""
     nodes = {node.name: node for node in scene_of(simulation).nodes}
 
     assert nodes.keys() == {WORLD, "cart", "pole", "ball", "target"}
@@ -35,7 +35,7 @@ def test_each_body_is_a_node(simulation):
 
 
 def test_geoms_have_whole_sizes(simulation):
-    """MuJoCo's own sizes are halves, and its height of a capsule does not include the caps."""
+    """MuJoCo's sizes are half sizes, and its height of a capsule does not include the caps."""
     nodes = {node.name: node for node in scene_of(simulation).nodes}
     (floor,), (pole,), (ball,) = (nodes[name].shapes for name in (WORLD, "pole", "ball"))
 
@@ -46,7 +46,7 @@ def test_geoms_have_whole_sizes(simulation):
 
 
 def test_a_state_has_the_bodies_that_joints_move_and_their_positions(simulation):
-    """The ball falls, and the target stays."""
+    """The state has a pose for the falling ball, but not for the fixed target."""
     before = scene_of(simulation)
     for _ in range(10):
         simulation.step(10)
@@ -60,7 +60,7 @@ def test_a_state_has_the_bodies_that_joints_move_and_their_positions(simulation)
 
 
 def test_looking_changes_nothing_on_which_the_next_step_depends(load):
-    """A run that was watched is the run that was not, bit for bit."""
+    """A run with a viewer and the same run without it have equal results, bit for bit."""
     watched, alone = load(), load()
     for _ in range(20):
         watched.appearance.state(watched.time_ms)
@@ -71,7 +71,7 @@ def test_looking_changes_nothing_on_which_the_next_step_depends(load):
 
 
 def test_a_mesh_and_a_height_field_are_triangles(load):
-    """Robots of MuJoCo consist of meshes."""
+    """Most robot models for MuJoCo consist of meshes."""
     assets = """<asset><mesh name="wedge" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
       <hfield name="hill" nrow="2" ncol="3" size="2 1 0.5 0.1" elevation="0 1 0 0 0 1"/></asset><worldbody>
       <geom type="mesh" mesh="wedge" rgba="1 0 0 1"/><geom type="hfield" hfield="hill"/>"""

@@ -1,4 +1,4 @@
-"""Actuators, sensors and cameras of a model become devices of Webots."""
+"""Actuators, sensors and cameras of a MuJoCo model become devices of Webots."""
 
 import math
 
@@ -12,7 +12,7 @@ from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 
 def kinds(simulation):
-    """Return the node types of all devices by name."""
+    """Return the node type of each device by the device's name."""
     return {name: kind.node for name, (kind, _) in simulation.robots[0].parts.devices.rows.items()}
 
 
@@ -22,7 +22,7 @@ def value(simulation, name):
 
 
 def test_every_actuator_sensor_and_camera_is_a_device(load):
-    """A model needs no mapping; a sensor without a name gets that of its joint and its type."""
+    """A model needs no list of devices; a sensor without a name is named after its joint and its type."""
     assert kinds(load()) == {
         "push": "LinearMotor",
         "cart position": "PositionSensor",
@@ -39,14 +39,14 @@ def test_every_actuator_sensor_and_camera_is_a_device(load):
 
 
 def test_a_name_that_ros_refuses_gets_underscores(load):
-    """MuJoCo allows any character, and a user may be unable to change the names of a model."""
+    """MuJoCo allows any character in a name, and a user may be unable to rename elements of a model."""
     found = kinds(load(FORCE.replace('"push"', '"/cart::pushé"')))
 
     assert found["cart__push_"] == "LinearMotor"
 
 
 def test_names_of_one_topic_are_refused_with_the_text_that_renames_one(load):
-    """A client could reach only one of the two."""
+    """Both devices would have the same ROS topic, so a client could reach only one of them."""
     with pytest.raises(WorldError, match="devices 'cart position' and 'cart-position'") as refused:
         load(FORCE.replace('"push"', '"cart position"'), '<jointpos name="cart-position" joint="hinge"/>')
 
@@ -54,7 +54,7 @@ def test_names_of_one_topic_are_refused_with_the_text_that_renames_one(load):
 
 
 def test_a_text_renames_a_device_or_leaves_it_out(load):
-    """Users' programs expect names of their own."""
+    """A user's program may expect other device names than those of the model."""
     texts = '<text name="device:actuator/push" data="motor"/><text name="device:camera/eye" data="-"/>'
 
     found = kinds(load(FORCE, "", ("<custom>", f"<custom>{texts}")))
@@ -64,7 +64,10 @@ def test_a_text_renames_a_device_or_leaves_it_out(load):
 
 
 def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
-    """The color order begins with blue; the camera looks down on a red plate and moves with its body."""
+    """The plate below the camera is red, and blue is the first color of a pixel.
+
+    The camera moves with its body.
+    """
     plate = '<geom type="box" pos="0 0 0.1" size="0.5 0.5 0.01" rgba="1 0 0 1" contype="0" conaffinity="0"/>'
     simulation = load(FORCE, "", ('<geom name="floor"', f'{plate}<geom name="floor"'))
     _, camera = simulation.robots[0].parts.devices.rows["eye"]
@@ -82,7 +85,7 @@ def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
 
 
 def test_a_force_accelerates_its_joint(load):
-    """The gear counts: 1.1 N accelerate 1.1 kg to 1 m/s2, for half a second."""
+    """The device accounts for the gear: 1.1 N accelerate 1.1 kg at 1 m/s2, for half a second."""
     simulation = load(FORCE, "", ('damping="0.01"', 'damping="1000"'))
     simulation.robots[0].motors["push"].set_effort(1.1)
 
@@ -93,7 +96,7 @@ def test_a_force_accelerates_its_joint(load):
 
 
 def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
-    """A motor of Webots does the same; its target of infinity means a velocity."""
+    """A motor of Webots does the same. With an infinite target position the motor turns at its velocity."""
     simulation = load(VELOCITY)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(math.inf)
@@ -108,7 +111,7 @@ def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
 
 
 def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
-    """Without a commanded velocity it moves as fast as its force allows."""
+    """Without a commanded velocity the servo moves as fast as its force allows."""
     simulation = load(POSITION)
     motor = simulation.robots[0].motors["push"]
     motor.set_position(1.0)
@@ -137,7 +140,7 @@ def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
     ],
 )
 def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command, message):
-    """If the command succeeded without an effect, a policy would learn from a robot that stands still."""
+    """If such a command succeeded without effect, a policy would learn with a robot that does not move."""
     motor = load(actuator).robots[0].motors["push"]
 
     with pytest.raises(UnsimulatedError, match=message):
@@ -145,7 +148,7 @@ def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command
 
 
 def test_sensors_have_the_values_of_the_moment(load):
-    """MuJoCo computes sensor values when a step begins; devices must have those at its end."""
+    """MuJoCo computes sensor values at the beginning of a step. A device must have the values at its end."""
     simulation = load()
     simulation.robots[0].motors["push"].set_effort(5.0)
 
@@ -157,7 +160,7 @@ def test_sensors_have_the_values_of_the_moment(load):
 
 
 def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(load):
-    """MuJoCo's value of -1 would be nearer than any object."""
+    """MuJoCo returns -1 if the ray hits no object, which a policy would take for a very near object."""
     simulation = load(FORCE, '<rangefinder name="up" site="skin" cutoff="7"/>')
 
     simulation.step(10)
@@ -167,7 +170,7 @@ def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(l
 
 
 def test_the_other_sensors_have_the_units_of_webots(load):
-    """Gravity points up in an accelerometer, and a quaternion ends with w."""
+    """An accelerometer at rest measures gravity upward, and a quaternion ends with w."""
     simulation = load()
 
     simulation.step(10)
@@ -195,13 +198,13 @@ def test_the_other_sensors_have_the_units_of_webots(load):
     ],
 )
 def test_what_cannot_be_a_device_is_refused_before_anything_starts(load, texts, message):
-    """The message for each such element has the fact and the remedy."""
+    """The message names the element of the model, the fact and the remedy."""
     with pytest.raises(WorldError, match=message):
         load(*texts)
 
 
 def test_devices_of_one_name_are_told_apart(load):
-    """A name is unique only in a section of a model; the velocity term of a servo has no name of its own."""
+    """In MJCF a name is unique only within its section, and the velocity term of a servo may lack a name."""
     servo = '<position joint="slider" kp="20"/><velocity joint="slider" kv="1"/>'
 
     found = kinds(load(servo + FORCE, '<jointpos name="push" joint="hinge"/>'))
@@ -210,7 +213,7 @@ def test_devices_of_one_name_are_told_apart(load):
 
 
 def test_sensors_without_names_on_one_joint_have_their_numbers(load):
-    """MuJoCo loads them, and a text in <custom> could not name one of them."""
+    """MuJoCo loads such sensors. A text in <custom> cannot rename them, because they have no names."""
     twice = '<jointvel joint="hinge"/><jointvel joint="hinge"/>'
 
     found = kinds(load(FORCE, twice))
@@ -221,7 +224,7 @@ def test_sensors_without_names_on_one_joint_have_their_numbers(load):
 
 
 def test_refused_sensors_do_not_search_the_file_once_each(load, monkeypatch):
-    """60,000 sensors of one name took more than a minute until the refusal."""
+    """With 60,000 sensors of one name, the refusal took more than a minute."""
     searched = []
     walk = Element.walk
     monkeypatch.setattr(Element, "walk", lambda element: searched.append(element) or walk(element))
@@ -236,7 +239,7 @@ def test_refused_sensors_do_not_search_the_file_once_each(load, monkeypatch):
 
 
 def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
-    """An included file may name further files."""
+    """An included file may refer to files outside of the folder of the model."""
     (tmp_path / "part.xml").write_text('<mujoco><asset><mesh file="/etc/x.obj"/></asset></mujoco>')
 
     with pytest.raises(WorldError, match=r"part\.xml:1:16: '/etc/x.obj' does not count from the folder"):
@@ -244,7 +247,7 @@ def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
 
 
 def test_a_part_of_the_model_that_is_missing_is_refused(load):
-    """MuJoCo's error does not show where it looked."""
+    """MuJoCo's own error does not show in which folder it searched."""
     with pytest.raises(
         WorldError, match=r"the file 'part\.xml', of which the model consists too, is missing"
     ):

@@ -1,4 +1,4 @@
-"""Models of several files: where MuJoCo finds them, and their content."""
+"""Models that consist of several files: the folders in which MuJoCo searches, and the files' content."""
 
 import mujoco
 import pytest
@@ -20,7 +20,7 @@ ARGUMENTS = '<custom><text name="controllerArgs" data="--name=cell --synchronize
 
 @pytest.fixture
 def world(tmp_path):
-    """`world(head, body, **files)` returns the path of a world in a project with these files."""
+    """`world(head, body, files)` writes a project with these files, and returns the path of its world."""
 
     def write(head="", body="", files=()):
         folder = tmp_path / "project" / "worlds"
@@ -33,9 +33,9 @@ def world(tmp_path):
 
 
 def test_files_are_found_where_mujoco_finds_them(world):
-    """The world's folder comes first, then that of the including file.
+    """MuJoCo searches the folder of the world first, then that of the including file.
 
-    A path with `..` may lead back into the project.
+    A path with `..` may leave a folder and lead back into the project.
     """
     path = world(
         ARGUMENTS.format(""),
@@ -54,7 +54,7 @@ def test_files_are_found_where_mujoco_finds_them(world):
 
 
 def test_what_an_included_file_holds_counts(world):
-    """Only the main file was read for the timestep, the basic step and the names of devices."""
+    """The timestep, the basic step and the device names were once read only from the main file."""
     custom = '<numeric name="basicTimeStep" data="6"/><text name="device:actuator/push" data="arm"/>'
     inner = f"<mujocoinclude><option timestep='0.003'/>{ARGUMENTS.format(custom)}</mujocoinclude>"
     path = world('<include file="defaults.xml"/>', files={"defaults.xml": inner})
@@ -66,7 +66,7 @@ def test_what_an_included_file_holds_counts(world):
 
 
 def test_a_basic_step_that_the_whole_model_does_not_fit_is_refused(world):
-    """The last option in the model wins, in whichever file it is."""
+    """The last `option` element of the whole model applies, in whichever file it is."""
     head = ARGUMENTS.format('<numeric name="basicTimeStep" data="4"/>') + '<include file="defaults.xml"/>'
     inner = '<mujocoinclude><option timestep="0.003"/></mujocoinclude>'
 
@@ -78,7 +78,7 @@ OUTSIDE = '<mujocoinclude><body name="outside"/></mujocoinclude>'
 
 
 def test_the_project_is_the_nearest_folder_that_holds_all_files(world, tmp_path):
-    """Models of dm_control and gymnasium-robotics name files up to four folders above their own."""
+    """Models of dm_control and gymnasium-robotics refer to files up to four folders above their own."""
     (tmp_path / "shared.xml").write_text(OUTSIDE)
     inner = '<mujocoinclude><include file="../../shared.xml"/></mujocoinclude>'
     path = world(ARGUMENTS.format(""), '<include file="inner.xml"/>', {"inner.xml": inner})
@@ -87,7 +87,7 @@ def test_the_project_is_the_nearest_folder_that_holds_all_files(world, tmp_path)
 
 
 def test_a_file_outside_of_the_root_that_the_user_names_is_refused(world, tmp_path):
-    """The message has the file that names it, and the remedy."""
+    """The message names the file that refers to the outside, and the remedy."""
     (tmp_path / "shared.xml").write_text(OUTSIDE)
     inner = '<mujocoinclude><include file="../../shared.xml"/></mujocoinclude>'
     path = world("", '<include file="inner.xml"/>', {"inner.xml": inner})
@@ -101,7 +101,7 @@ def test_a_file_outside_of_the_root_that_the_user_names_is_refused(world, tmp_pa
 
 
 def test_the_whole_file_system_is_no_project(world):
-    """A model from somebody else must not read files of the pod."""
+    """A model from an unknown author must not read arbitrary files of the pod."""
     path = world("", f'<include file="{"../" * 20}etc/passwd"/>')
 
     with pytest.raises(WorldError, match="etc/passwd' leads to the root of the file system; copy it"):
@@ -110,9 +110,9 @@ def test_the_whole_file_system_is_no_project(world):
 
 @pytest.mark.parametrize("element", ['<include file="inner.xml"/>', '<geom type="mesh" mesh="inner"/>'])
 def test_a_link_out_of_the_project_is_refused(world, tmp_path, element):
-    """It is treated like a name that leads out.
+    """A symbolic link out of the project is treated like a path that leads out.
 
-    Links inside are allowed, such as those of a mounted ConfigMap.
+    Links within the project are allowed, because a mounted ConfigMap consists of links.
     """
     (tmp_path / "shared.xml").write_text(OUTSIDE)
     path = world(f'<asset><mesh name="inner" file="inner.xml"/></asset>{ARGUMENTS.format("")}', element)
@@ -129,7 +129,10 @@ def test_a_link_out_of_the_project_is_refused(world, tmp_path, element):
 
 
 def test_a_rounded_timestep_is_made_exact(world):
-    """A joint at 1 rad/s must turn by 1 rad in 1 s; otherwise the clock and the physics drift apart."""
+    """A joint at 1 rad/s must turn by 1 rad in 1 s.
+
+    With a rounded timestep, clock and physics would drift apart.
+    """
     turning = """<option timestep="0.0041667" gravity="0 0 0"/>
         <keyframe><key name="home" qvel="1"/></keyframe>
         <sensor><jointpos joint="hinge"/></sensor>"""
@@ -144,7 +147,7 @@ def test_a_rounded_timestep_is_made_exact(world):
 
 
 def test_a_model_that_attaches_itself_is_refused(world):
-    """MuJoCo attached it until the process crashed."""
+    """MuJoCo attached such a model again and again until the process crashed."""
     path = world('<asset><model name="m" file="other.xml"/></asset>')
     for name, other in (("other.xml", "third.xml"), ("third.xml", "other.xml")):
         text = f'<mujoco><asset><model name="m" file="{other}"/></asset></mujoco>'
@@ -155,7 +158,7 @@ def test_a_model_that_attaches_itself_is_refused(world):
 
 
 def test_models_that_attach_each_other_twice_are_counted_before_they_are_made(world):
-    """Twenty files of one line each make a million copies of the last."""
+    """Twenty files with one line each can expand to a million copies of the last file."""
     path = world('<asset><model name="m" file="f0.xml"/></asset>')
     for level in range(20):
         twice = "".join(f'<attach model="m" body="b" prefix="{it}"/>' for it in "xy")

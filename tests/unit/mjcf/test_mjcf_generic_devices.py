@@ -1,4 +1,4 @@
-"""Sensors and actuators of a model for which Webots has no device."""
+"""MuJoCo's sensors and actuators for which Webots has no device type."""
 
 import logging
 import math
@@ -28,19 +28,19 @@ GENERAL = '<general name="any" joint="hinge" dyntype="integrator"/>'
 
 
 def device(simulation, name):
-    """Return a device of the robot."""
+    """Return a device of the robot by its name."""
     return simulation.robots[0].parts.devices.rows[name][1]
 
 
 @pytest.fixture
 def ros():
-    """Return a ROS without nodes."""
+    """Return a fake ROS without nodes."""
     return FakeRos()
 
 
 @pytest.fixture
 def robot(ros, cartpole):
-    """`robot(actuator, sensor)` returns the robot's node of a running world."""
+    """`robot(actuator, sensor)` starts a world and returns the node of its robot."""
 
     def start(*texts):
         RunningSimulator(cartpole(*texts), load_mjcf, ros.make_node, mode=Mode.FAST, clock=ros.clock).start()
@@ -50,7 +50,7 @@ def robot(ros, cartpole):
 
 
 def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
-    """In three poses the values are those that MuJoCo itself computes for the same state."""
+    """In three poses, MuJoCo itself computes the same values for the same state."""
     simulation = load(FORCE, SENSORS)
     model = mujoco.MjModel.from_xml_path(str(cartpole(FORCE, SENSORS)))
     data = mujoco.MjData(model)
@@ -73,14 +73,14 @@ def test_a_sensor_of_several_numbers_has_those_of_mujoco(load, cartpole):
 
 
 def test_a_sensor_of_one_number_stays_a_position_sensor(load):
-    """One number fits the message of that device."""
+    """The message of a Webots position sensor has space for one number."""
     simulation = load(FORCE, '<user name="one" dim="1"/>')
 
     assert "one" in simulation.robots[0].sensors
 
 
 def test_its_messages_have_the_numbers_once_it_is_enabled(robot):
-    """The trainer's facade reads the messages of the simulator."""
+    """The trainer's sensor class reads these messages."""
     node = robot(FORCE, VELOCITY)
     messages = node.inbox("mujoco/cart_velocity/value")
     node.call("robot/time_step", value=10)
@@ -99,7 +99,7 @@ def test_its_messages_have_the_numbers_once_it_is_enabled(robot):
 
 
 def test_services_name_it_below_mujoco(robot):
-    """The list of devices has the name that is in the paths of its services."""
+    """A client builds the paths of a device's services from the name in the list of devices."""
     node = robot(FORCE, VELOCITY)
 
     assert "mujoco/cart velocity" in node.get("robot/get_device_list")
@@ -108,7 +108,7 @@ def test_services_name_it_below_mujoco(robot):
 
 
 def test_a_reset_returns_its_numbers_and_the_control(load):
-    """As at the start, an actuator has no command then."""
+    """After a reset an actuator has no command, as at the start."""
     simulation = load(FORCE + GRIP, VELOCITY)
     simulation.robots[0].motors["push"].set_effort(5.0)
     simulation.step(10)
@@ -128,7 +128,7 @@ def test_a_reset_returns_its_numbers_and_the_control(load):
     ("actuator", "name"), [(GRIP, "grip"), (MUSCLE, "arm"), (GENERAL, "any")], ids=["grip", "arm", "any"]
 )
 def test_an_actuator_without_a_motor_takes_mujocos_control(robot, actuator, name):
-    """The examples are a muscle, an adhesion, and an actuator that integrates its control."""
+    """Such actuators are a muscle, an adhesion, and an actuator that integrates its control."""
     node = robot(FORCE + actuator)
     path = f"mujoco/{name}"
     assert node.get(f"{path}/get_control") == 0.0
@@ -140,7 +140,7 @@ def test_an_actuator_without_a_motor_takes_mujocos_control(robot, actuator, name
 
 
 def test_an_adhesion_keeps_its_control_within_its_range(load):
-    """MuJoCo does the same. NaN is refused, because a client must not cause a fault of the simulator."""
+    """MuJoCo limits the control too. NaN is refused, because a client must not make the simulation fail."""
     simulation = load(FORCE + GRIP)
     grip = device(simulation, "mujoco/grip")
 
@@ -153,7 +153,7 @@ def test_an_adhesion_keeps_its_control_within_its_range(load):
 
 
 def test_an_adhesion_pulls(load):
-    """The ball sticks to the floor, so its touch sensor measures more than its weight."""
+    """The ball is pulled to the floor, so its touch sensor measures more than its weight."""
     pull = '<adhesion name="pull" body="ball" ctrlrange="0 1" gain="100"/>'
     simulation = load(FORCE + pull)
     simulation.step(2000)
@@ -176,7 +176,7 @@ def test_an_adhesion_pulls(load):
     ids=["sensor", "adhesion", "muscle", "general"],
 )
 def test_leave_out_leaves_out_a_type(load, texts, type_name, name):
-    """The trainer logs the left-out devices, and the job's status shows them."""
+    """The trainer logs the devices that are left out, and the job's status lists them."""
     simulation = load(*texts, leave_out=[type_name])
 
     assert name not in simulation.robots[0].parts.devices.rows
@@ -185,7 +185,7 @@ def test_leave_out_leaves_out_a_type(load, texts, type_name, name):
 
 
 def test_a_text_renames_it_or_leaves_it_out(load):
-    """The new name begins with `mujoco/` too."""
+    """The new name of a renamed device also begins with `mujoco/`."""
     texts = '<text name="device:sensor/cart velocity" data="v"/><text name="device:actuator/grip" data="-"/>'
 
     rows = load(FORCE + GRIP, VELOCITY, ("<custom>", f"<custom>{texts}")).robots[0].parts.devices.rows
@@ -195,14 +195,14 @@ def test_a_text_renames_it_or_leaves_it_out(load):
 
 
 def test_a_sensor_and_an_actuator_of_one_name_are_told_apart(load):
-    """A name in a model is unique only in its section."""
+    """In MJCF a name is unique only within its section."""
     rows = load(FORCE + GRIP, VELOCITY.replace("cart velocity", "grip")).robots[0].parts.devices.rows
 
     assert {"mujoco/grip", "mujoco/grip_framelinvel"} <= set(rows)
 
 
 def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
-    """The remedy has the name that the model uses."""
+    """The remedy uses the sensor's name in the model, so that the user can find the sensor there."""
     texts = '<text name="device:sensor/cart velocity" data="grip"/>'
 
     with pytest.raises(WorldError, match="a second device 'mujoco/grip'"):
@@ -210,7 +210,7 @@ def test_two_of_one_name_are_refused_with_the_text_that_renames_one(load):
 
 
 def test_the_check_counts_and_names_them(cartpole, capsys, caplog):
-    """A program for Webots would expect other devices."""
+    """A program that was written for Webots does not know these devices."""
     caplog.set_level(logging.WARNING)
 
     assert main([str(cartpole(FORCE + GRIP, SENSORS)), "--check"]) == 0
@@ -222,7 +222,7 @@ def test_the_check_counts_and_names_them(cartpole, capsys, caplog):
 
 
 def test_a_number_that_is_not_finite_reaches_the_sensor(load):
-    """A trainer treats it as a fault of the simulator."""
+    """The trainer must see the NaN, which it treats as a fault of the simulator."""
     simulation = load(FORCE, VELOCITY)
     simulation._model.data.qvel[0] = math.nan
     simulation._model.changed()

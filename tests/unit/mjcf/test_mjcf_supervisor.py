@@ -1,4 +1,4 @@
-"""Bodies and joints of a model become nodes; resets, and the changes that a supervisor may make."""
+"""Bodies and joints of a MuJoCo model as nodes, resets, and the changes that a supervisor may make."""
 
 import math
 
@@ -10,12 +10,12 @@ from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
 
 
 def positions(simulation):
-    """Return the positions of cart and ball."""
+    """Return the positions of the cart, the ball and the pole."""
     return [simulation.tree.of_def(name).place.world_position for name in ("cart", "ball", "pole")]
 
 
 def play(simulation, steps=20):
-    """Push the cart back and forth, and return every value on the way."""
+    """Push the cart back and forth, and return all sensor values and positions."""
     seen = []
     robot = simulation.robots[0]
     for step in range(steps):
@@ -27,7 +27,7 @@ def play(simulation, steps=20):
 
 
 def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_the_robot(load):
-    """A supervisor finds all bodies; joints have their names too."""
+    """A supervisor can find each body and each joint by its name in the model."""
     simulation = load()
     of_def = simulation.tree.of_def
 
@@ -40,7 +40,7 @@ def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_t
 
 
 def test_a_reset_returns_to_the_start_bit_for_bit(load):
-    """The state does not depend on the past, nor on readings between steps."""
+    """The state after a reset depends neither on the past nor on values that were read between steps."""
     simulation = load()
     first = play(simulation)
     simulation.reset()
@@ -52,7 +52,7 @@ def test_a_reset_returns_to_the_start_bit_for_bit(load):
 
 
 def test_looking_changes_nothing(load):
-    """Poses are computed on request, and the next step starts from the same values."""
+    """Poses are computed when a client requests them, which must not change the next step."""
     watched, other = load(), load()
     for simulation in (watched, other):
         simulation.robots[0].motors["push"].set_effort(3.0)
@@ -65,7 +65,7 @@ def test_looking_changes_nothing(load):
 
 
 def test_a_world_begins_at_its_keyframe(load):
-    """Legged robots stand at it; at the default positions of their model they would fall."""
+    """In the default pose of their model, most legged robots would fall."""
     changes = (
         ("<custom>", '<custom><text name="keyframe" data="tilted"/>'),
         ("<sensor>", '<keyframe><key name="tilted" qpos="0.5 0.3 1 1 0.5 1 0 0 0"/></keyframe><sensor>'),
@@ -81,7 +81,7 @@ def test_a_world_begins_at_its_keyframe(load):
 
 
 def home(control):
-    """Return the changes that start the world with the cart at 1 m and with that control."""
+    """Return changes after which the world starts with the cart at 1 m and with the given control."""
     keyframe = f'<keyframe><key name="home" qpos="1 0 1 1 0.5 1 0 0 0" ctrl="{control}"/></keyframe>'
     named = '<custom><text name="keyframe" data="home"/>'
     return ("<custom>", named), ("<sensor>", f"{keyframe}<sensor>")
@@ -90,7 +90,10 @@ def home(control):
 @pytest.mark.parametrize("velocity", [None, 5.0])
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, velocity, reset):
-    """A velocity alone is not a target: a standing robot would move its legs to position 0."""
+    """A velocity is not a target position.
+
+    Without this rule a standing robot would move its legs to position 0.
+    """
     simulation = load(POSITION, "", *home(control=1))
     motor = simulation.robots[0].motors["push"]
     if reset:
@@ -108,7 +111,7 @@ def test_a_servo_holds_the_position_of_the_keyframe_until_it_gets_another(load, 
 
 
 def test_a_servo_for_a_velocity_holds_where_the_world_begins(load):
-    """A motor of Webots turns to the position in the world file until it gets a target."""
+    """Until it gets a target, a motor of Webots stays at the position in the world file."""
     simulation = load(VELOCITY, "", *home(control=0))
     simulation.robots[0].motors["push"].set_velocity(5.0)
 
@@ -119,7 +122,7 @@ def test_a_servo_for_a_velocity_holds_where_the_world_begins(load):
 
 @pytest.mark.parametrize("name", ["ball", "target"])
 def test_a_field_moves_what_is_free_or_stands(load, name):
-    """Tasks move their targets at each reset, and a reset of the world moves them back."""
+    """A task moves its target at each reset, and a reset of the world moves it back."""
     simulation = load()
     node = simulation.tree.of_def(name)
     start = node.place.world_position
@@ -134,7 +137,7 @@ def test_a_field_moves_what_is_free_or_stands(load, name):
 
 
 def test_a_field_does_not_move_what_joints_move(load):
-    """The physics would overwrite the write at once."""
+    """The physics would overwrite the position in the next step."""
     simulation = load()
     field = simulation.tree.field_of(simulation.tree.of_def("cart"), "translation", simulation)
 
@@ -143,7 +146,7 @@ def test_a_field_does_not_move_what_joints_move(load):
 
 
 def test_a_joint_is_put_within_its_range(load):
-    """A cart-pole begins at random positions."""
+    """The task of a cart-pole starts each episode at a random position."""
     simulation = load()
 
     simulation.set_joint_position(simulation.tree.of_def("slider"), 9.0, 1)
@@ -155,7 +158,7 @@ def test_a_joint_is_put_within_its_range(load):
 
 
 def test_velocities_and_forces_of_free_bodies(load):
-    """The force accelerates a ball of 4.19 kg by 3 m/s2, for a tenth of a second."""
+    """The force accelerates a ball of 4.19 kg at 3 m/s2, for a tenth of a second."""
     simulation = load(FORCE, "", ("<option", '<option gravity="0 0 0"'))
     ball = simulation.tree.of_def("ball")
     simulation.motion.set_velocity(ball, (1.0, 0.0, 0.0), (0.0, 0.0, 2.0))
@@ -172,7 +175,7 @@ def test_velocities_and_forces_of_free_bodies(load):
 
 
 def test_a_body_on_joints_takes_no_velocity(load):
-    """Its joints have their own speeds, and a client's velocity would contradict them."""
+    """The velocity of such a body follows from the speeds of its joints."""
     simulation = load()
 
     with pytest.raises(UnsimulatedError, match="'pole' is on joints or fixed, so its velocity cannot be set"):
@@ -193,7 +196,7 @@ def test_contact_points_are_where_a_body_touches(load):
 
 
 def test_a_state_of_a_node_is_saved_and_loaded(load):
-    """Only the joints inside the node return to their saved state."""
+    """Only the joints below this node return to the saved state."""
     simulation = load()
     cart = simulation.tree.of_def("cart")
     simulation.set_joint_position(simulation.tree.of_def("slider"), 0.5, 1)
@@ -212,9 +215,9 @@ def test_a_state_of_a_node_is_saved_and_loaded(load):
 
 
 def test_the_same_follows_from_a_loaded_state_each_time(load):
-    """The results are equal to the last bit, because the solver keeps nothing from before."""
+    """The results are bitwise equal, because the solver keeps no value from the time before."""
     simulation = load()
-    simulation.step(2000)  # the ball then lies on the floor, so the solver starts with contacts
+    simulation.step(2000)  # the ball then lies on the floor, so that the solver must handle contacts
     simulation.save_state(simulation.tree.root, "lying")
     played = []
     for _ in range(2):
@@ -225,7 +228,7 @@ def test_the_same_follows_from_a_loaded_state_each_time(load):
 
 
 def test_nothing_is_added_to_or_removed_from_a_model(load):
-    """MuJoCo compiles a model once."""
+    """MuJoCo compiles a model once, at the start."""
     simulation = load()
     root = simulation.tree.field_of(simulation.tree.root, "children", simulation)
 
@@ -236,7 +239,7 @@ def test_nothing_is_added_to_or_removed_from_a_model(load):
 
 
 def test_a_model_that_explodes_has_values_that_are_no_numbers(load):
-    """MuJoCo would silently restart the simulation; a client treats NaN as a fault."""
+    """MuJoCo would silently reset the simulation. A client must see NaN, which it treats as a fault."""
     simulation = load(VELOCITY)
     simulation._model.data.qvel[0] = math.nan
 
@@ -246,7 +249,7 @@ def test_a_model_that_explodes_has_values_that_are_no_numbers(load):
 
 
 def test_the_basic_step_is_the_shortest_that_fits_the_timestep(load):
-    """The controller counts whole milliseconds."""
+    """The basic step is a whole number of milliseconds, because a controller counts in milliseconds."""
     without = ('<numeric name="basicTimeStep" data="10"/>', "")
 
     assert load(FORCE, "", without).basic_step_ms == 2

@@ -1,4 +1,4 @@
-"""`palaestra-mujoco` before its simulation."""
+"""`palaestra-mujoco`, as far as it runs before the simulation starts."""
 
 import sys
 
@@ -6,7 +6,7 @@ from palaestra_sim.mujoco.cli import main
 
 
 def test_without_its_library_it_names_what_to_install(tmp_path, monkeypatch, capsys):
-    """The stub's image has no MuJoCo, and a traceback would not explain that."""
+    """The stub's image has no MuJoCo, and a traceback would not explain the remedy."""
     world = tmp_path / "empty.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nWorldInfo { }\n")
     for name in [name for name in sys.modules if name.startswith("palaestra_sim.mujoco.")]:
@@ -19,7 +19,7 @@ def test_without_its_library_it_names_what_to_install(tmp_path, monkeypatch, cap
 
 
 def test_it_reports_what_it_makes_of_a_world(tmp_path, capsys):
-    """A world with dynamic solids needs no report."""
+    """MuJoCo simulates dynamic solids, so `--check` reports no difference for this world."""
     world = tmp_path / "crate.wbt"
     world.write_text(
         "#VRML_SIM R2023b utf8\nWorldInfo { }\nSolid { boundingObject Box { } physics Physics { } }\n"

@@ -1,4 +1,4 @@
-"""Displays over the pictures of cameras."""
+"""Displays that show the image of a camera behind their own drawings."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,10 @@ def devices():
 
 
 def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
-    """The display's black pixels become transparent when the camera is attached; drawings stay on top."""
+    """When a camera is attached, black pixels of the display become transparent.
+
+    Later drawings stay on top.
+    """
     camera, display = devices()
     display.picture.draw([(3, 2)], WHITE)
 
@@ -47,7 +50,7 @@ def test_a_display_shows_the_picture_of_a_camera_behind_what_is_drawn(devices):
 
 
 def test_a_display_without_its_camera_is_transparent_where_nothing_was_drawn(devices):
-    """Webots does the same."""
+    """Without the camera, Webots also shows only the drawings."""
     _, display = devices()
     display.attach("eye")
     display.picture.draw([(3, 2)], WHITE)
@@ -59,7 +62,7 @@ def test_a_display_without_its_camera_is_transparent_where_nothing_was_drawn(dev
 
 
 def test_a_camera_of_another_size_is_not_attached(devices):
-    """Webots would read pixels that do not belong to the camera."""
+    """Webots would read memory outside of the camera's image."""
     _, display = devices("width 8 height 8")
 
     with pytest.raises(UnsimulatedError, match="give both one size"):

@@ -1,4 +1,4 @@
-"""Movies of a supervisor are read back with the library that wrote them."""
+"""The tests read a supervisor's movies with the library that also writes them."""
 
 import errno
 import math
@@ -26,7 +26,7 @@ WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor
   device RotationalMotor { name "%s" maxVelocity 50 }
   endPoint Solid { translation 0 %s 0.05 rotation 1 0 0 1.5707963
     boundingObject Cylinder { radius 0.05 height 0.01 } } }"""
-# A red robot drives to the right; the picture is from above.
+# A red robot drives to the right; the viewpoint looks down on it.
 WORLD = f"""#VRML_SIM R2023b utf8
 WorldInfo {{ basicTimeStep 20 }}
 Viewpoint {{ position 0 0 3 orientation -0.577 0.577 0.577 2.0944 }}
@@ -46,25 +46,25 @@ def simulation():
 
 
 def movie(path, **changes):
-    """A movie of the best quality."""
+    """Return a movie of the best quality."""
     return Movie(**{"path": str(path), "size": SIZE, "quality": 100, "acceleration": 1, **changes})
 
 
 def frames(path):
-    """Return the pictures of a file, each (height, width, 3), and its frames per second."""
+    """Return the frames of a movie file, each (height, width, 3), and its frame rate."""
     with av.open(str(path)) as file:
         rate = file.streams.video[0].average_rate
         return [frame.to_ndarray(format="bgr24") for frame in file.decode(video=0)], rate
 
 
 def place(picture):
-    """Return the mean row and the mean column of the red pixels."""
+    """Return the mean row and the mean column of the red pixels of a frame."""
     red, others = picture[:, :, RED].astype(int), picture[:, :, [BLUE, GREEN]].max(axis=2)
     return np.argwhere(red > 60 + others).mean(axis=0)
 
 
 def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation, tmp_path):
-    """It has 25 frames a second, and gets its name only when it is complete."""
+    """The movie has 25 frames a second; its file gets its name only when the movie is complete."""
     path = tmp_path / "drive.mp4"
     assert simulation.movies.ready
     assert simulation.movies.start(movie(path))
@@ -82,7 +82,7 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
 
 
 def test_a_movie_follows_the_viewpoint(tmp_path):
-    """A client that moves the viewpoint makes a panorama; the robot stands still."""
+    """The robot stands still, and a client moves the viewpoint."""
     simulation = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
     viewpoint = next(node for node in simulation.tree.root.nodes() if node.type_name == "Viewpoint")
     path = tmp_path / "panorama.mp4"
@@ -99,7 +99,7 @@ def test_a_movie_follows_the_viewpoint(tmp_path):
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """Hidden files of other movies stay, and so do those that another simulator is still writing."""
+    """The hidden files of other movies stay, and so do files that another simulator is writing."""
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal
@@ -126,7 +126,7 @@ def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path
 
 
 def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_path, monkeypatch):
-    """Without locks, the hidden file of a killed simulator looks like one that is being written."""
+    """Without locks, the file of a killed simulator looks like one that is being written."""
     unfinished = tmp_path / ".drive.mp4-x.unfinished"
     unfinished.touch()
     monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
@@ -140,7 +140,7 @@ def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
-    """Four seconds of the simulation become one second of the movie."""
+    """Four seconds of simulated time are one second of the movie."""
     simulation.movies.start(movie(tmp_path / "fast.mp4", acceleration=4))
     simulation.step(1600)
     simulation.movies.stop()
@@ -154,12 +154,12 @@ def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):
     [(1, 20, 40), (1, 32, 32), (1, 64, 64), (1, 16, 32), (1, 15, 45), (4, 32, 160)],
 )
 def test_a_frame_comes_after_whole_steps(acceleration, basic_step_ms, expected_ms):
-    """The interval is as near to 40 ms of the movie as whole steps allow, and sets the frame rate."""
+    """The interval between frames is the multiple of the basic step that is nearest to 40 ms of the movie."""
     assert frame_step_ms(acceleration, basic_step_ms) == expected_ms
 
 
 def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
-    """The movie must be neither too fast nor too slow."""
+    """With another frame rate the movie would be too fast or too slow."""
     source = WORLD.replace("basicTimeStep 20", "basicTimeStep 32").encode()
     simulation = Simulation.load(source, MujocoPhysics(), "world", Mode.FAST)
     simulation.movies.start(movie(tmp_path / "it.mp4"))
@@ -170,7 +170,7 @@ def test_the_frames_in_a_second_follow_from_the_steps(simulation, tmp_path):
 
 
 def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path, caplog):
-    """The log has one line about it."""
+    """The log has one line with the path and the error."""
     assert not simulation.movies.start(movie(tmp_path / "none" / "it.mp4"))
 
     assert simulation.movies.failed
@@ -178,7 +178,7 @@ def test_a_movie_that_cannot_be_written_fails_at_the_start(simulation, tmp_path,
 
 
 def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
-    """No file is left."""
+    """A failed movie leaves no file."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
     simulation.movies.stop()
 
@@ -189,7 +189,7 @@ def test_a_movie_without_a_step_fails(simulation, tmp_path, caplog):
 
 
 def test_a_movie_whose_folder_is_gone_fails_at_its_end(simulation, tmp_path, caplog):
-    """The simulation continues."""
+    """The error of the movie must not end the simulation."""
     folder = tmp_path / "films"
     folder.mkdir()
     simulation.movies.start(movie(folder / "it.mp4"))
@@ -212,14 +212,14 @@ def test_a_movie_whose_folder_is_gone_fails_at_its_end(simulation, tmp_path, cap
     ],
 )
 def test_what_cannot_be_recorded_is_refused(simulation, changes, fact):
-    """The message has the supported values."""
+    """The message names the supported values."""
     with pytest.raises(UnsimulatedError, match=fact):
         simulation.movies.start(movie(**{"path": "it.mp4", **changes}))
     assert simulation.movies.failed
 
 
 def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
-    """The first movie continues."""
+    """The second request fails, and the first movie continues."""
     simulation.movies.start(movie(tmp_path / "it.mp4"))
 
     with pytest.raises(UnsimulatedError, match="stop it first"):
@@ -227,7 +227,7 @@ def test_one_movie_is_recorded_at_a_time(simulation, tmp_path):
 
 
 def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_path, monkeypatch):
-    """The library is loaded for the first movie."""
+    """The library is loaded only for the first movie, so the simulator starts without it."""
     monkeypatch.setitem(sys.modules, "av", None)
 
     with pytest.raises(UnsimulatedError, match=r"install palaestra-sim\[mujoco\]"):
@@ -235,7 +235,7 @@ def test_without_the_library_the_refusal_names_what_to_install(simulation, tmp_p
 
 
 def test_a_simulator_without_pictures_records_none(tmp_path):
-    """Webots does the same with --no-rendering; a request to stop is not an error."""
+    """Webots with `--no-rendering` does the same; a request to stop is not an error."""
     simulation = Simulation.load(WORLD.encode(), StubPhysics(), "world", Mode.FAST)
 
     assert not simulation.movies.start(movie(tmp_path / "it.mp4"))

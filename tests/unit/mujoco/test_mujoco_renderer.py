@@ -1,4 +1,4 @@
-"""Pictures of MuJoCo, pixel by pixel: position, color and distance of objects."""
+"""The position, the color and the distance of objects in MuJoCo's images, pixel by pixel."""
 
 import math
 import subprocess
@@ -31,7 +31,7 @@ WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor
 
 
 class Request(NamedTuple):
-    """A request of `save_image`."""
+    """A request to the service `save_image`."""
 
     filename: str
     quality: int = 90
@@ -39,7 +39,7 @@ class Request(NamedTuple):
 
 @pytest.fixture
 def load():
-    """`load(nodes, device)` returns a simulation with a robot at the origin that has that device."""
+    """`load(nodes, device)` returns a simulation with a robot at the origin that has this device."""
 
     def load(nodes, device=CAMERA, parts=""):
         world = f"""#VRML_SIM R2023b utf8
@@ -54,19 +54,19 @@ DEF ROBOT Robot {{ name "robot" children [ {device} {parts} ] }}
 
 
 def look(simulation, name="eye"):
-    """Return the picture of a camera, (height, width, 4)."""
+    """Return the image of a camera, (height, width, 4)."""
     device = simulation.robots[0].parts.devices.rows[name][1]
     return np.frombuffer(device.value, np.uint8).reshape(HEIGHT, WIDTH, 4)
 
 
 def depths(simulation):
-    """Return the distances of the range finder, (height, width)."""
+    """Return the distances that the range finder measures, (height, width)."""
     device = simulation.robots[0].parts.devices.rows["depth"][1]
     return np.frombuffer(device.value, np.float32).reshape(HEIGHT, WIDTH)
 
 
 def reds(picture):
-    """Return the mask of the red pixels of a picture, (height, width) of bool."""
+    """Return the mask of the red pixels of an image, (height, width) of bool."""
     red, others = picture[:, :, RED].astype(int), picture[:, :, [BLUE, GREEN]].astype(int)
     return red > 60 + others.max(axis=2)
 
@@ -77,7 +77,7 @@ def middle(mask):
 
 
 def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
-    """Its front is 1.5 m away and 1 m wide, and a pixel covers 1 / 58.6 rad there."""
+    """The front of the box is 1.5 m away and 1 m wide, and a pixel covers 1 / 58.6 rad."""
     picture = look(load(BOX))
 
     across = WIDTH / 2.0 / math.tan(0.5) / 1.5
@@ -87,7 +87,7 @@ def test_a_red_box_ahead_is_in_the_middle_before_the_sky(load):
 
 
 def test_a_color_is_blue_green_red_alpha(load):
-    """This is the order of Webots; alpha is at its maximum everywhere."""
+    """Webots has this order of colors; alpha is 255 in every pixel."""
     picture = look(load(BOX))
     blue, green, red, _ = picture[HEIGHT // 2, WIDTH // 2]
 
@@ -97,7 +97,7 @@ def test_a_color_is_blue_green_red_alpha(load):
 
 
 def test_left_is_left_and_up_is_up(load):
-    """Y points to the left of a camera that looks along x."""
+    """For a camera that looks along x, the y axis points to the left."""
     left = look(load(BOX.replace("2 0 0.5", "2 0.8 1.3")))
     rows, columns = np.nonzero(reds(left))
 
@@ -106,7 +106,7 @@ def test_left_is_left_and_up_is_up(load):
 
 
 def test_a_wall_is_as_far_away_as_it_stands_to_the_millimeter(load):
-    """This holds for every pixel, because distances are measured along the axis of the lens."""
+    """Each pixel has the same distance, because distances are measured along the optical axis."""
     seen = depths(load(WALL, FINDER))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.0), abs=0.001)
@@ -114,21 +114,21 @@ def test_a_wall_is_as_far_away_as_it_stands_to_the_millimeter(load):
 
 @pytest.mark.parametrize("away_m", [0.45, 5.2])
 def test_a_distance_outside_of_the_range_is_infinite(load, away_m):
-    """It is nearer than `minRange` or beyond `maxRange`."""
+    """The wall is nearer than `minRange` or beyond `maxRange`."""
     seen = depths(load(WALL.replace("2.05", str(away_m + 0.05)), FINDER))
 
     assert np.isinf(seen).all()
 
 
 def test_distances_have_the_resolution_of_the_finder(load):
-    """They are multiples of the resolution."""
+    """A measured distance is a multiple of the field `resolution`."""
     seen = depths(load(WALL, FINDER.replace("minRange", "resolution 0.3 minRange")))
 
     assert seen == pytest.approx(np.full((HEIGHT, WIDTH), 2.1), abs=1e-6)
 
 
 def test_a_thing_that_a_supervisor_moves_moves_in_the_picture(load):
-    """It moves from the next step on, even if it has no boundingObject; a reset moves it back."""
+    """The box has no boundingObject, and still moves in the next image. A reset moves it back."""
     simulation = load(BOX)
     before = middle(reds(look(simulation)))
 
@@ -142,7 +142,7 @@ def test_a_thing_that_a_supervisor_moves_moves_in_the_picture(load):
 
 
 def test_a_color_that_a_supervisor_writes_is_seen(load):
-    """Training with random colors depends on it."""
+    """Domain randomization changes the colors of objects during a training."""
     simulation = load(BOX)
 
     assert reds(look(simulation)).any()
@@ -152,7 +152,7 @@ def test_a_color_that_a_supervisor_writes_is_seen(load):
 
 
 def test_a_thing_that_a_supervisor_removes_is_gone(load):
-    """It disappears from the next picture on."""
+    """The next image must not show the removed object."""
     simulation = load(BOX)
 
     assert reds(look(simulation)).any()
@@ -162,7 +162,7 @@ def test_a_thing_that_a_supervisor_removes_is_gone(load):
 
 
 def test_a_camera_turns_with_its_robot(load):
-    """For a robot that turns to the left, objects move to the right."""
+    """If the robot turns to the left, objects move to the right in the image."""
     simulation = load(BOX, parts=WHEEL % ("0.1", "left", "0.1") + WHEEL % ("-0.1", "right", "-0.1"))
     before = middle(reds(look(simulation)))
     motors = simulation.robots[0].motors
@@ -178,7 +178,7 @@ def test_a_camera_turns_with_its_robot(load):
 
 
 def test_a_shape_on_a_joint_moves_with_its_motor(load):
-    """A camera must see the arm of a robot."""
+    """A camera that looks at a robot's arm must show the arm's motion."""
     arm = """SliderJoint { jointParameters JointParameters { axis 0 1 0 }
       device LinearMotor { name "arm" maxVelocity 10 }
       endPoint Solid { translation 2 0 0.5 children [ Shape {
@@ -204,7 +204,7 @@ def test_a_shape_on_a_joint_moves_with_its_motor(load):
     ],
 )
 def test_every_geometry_is_drawn_where_it_is(load, geometry):
-    """Each is in the middle, like the box of the other tests; MuJoCo centers meshes, and this is undone."""
+    """MuJoCo moves the origin of a mesh to its center; the renderer must undo this."""
     picture = look(load(BOX.replace("Box { size 1 1 1 }", geometry)))
     rows, columns = np.nonzero(reds(picture))
 
@@ -214,7 +214,7 @@ def test_every_geometry_is_drawn_where_it_is(load, geometry):
 
 
 def test_a_spherical_camera_sees_nothing(load):
-    """Its picture would not be flat; `enable` fails, as in a simulator that cannot draw."""
+    """The renderer makes only flat images, so `enable` fails, as in a simulator without a renderer."""
     simulation = load(BOX, CAMERA.replace("fieldOfView", "spherical TRUE fieldOfView"))
     kind, camera = simulation.robots[0].parts.devices.rows["eye"]
 
@@ -232,7 +232,7 @@ def recognized(simulation):
 
 
 def test_a_solid_with_recognition_colors_is_recognized(load):
-    """The message has its position, its size in the picture and its colors."""
+    """The message has the object's position, its size in the image and its colors."""
     (found,) = recognized(load(OBJECT, RECOGNITION))
 
     assert found["position"] == pytest.approx((2.0, 0.0, 0.0))
@@ -244,7 +244,7 @@ def test_a_solid_with_recognition_colors_is_recognized(load):
 
 
 def test_what_is_behind_a_wall_is_not_recognized(load):
-    """The same holds for an object without colors or out of range."""
+    """Objects without colors, out of range or above `maxObjects` are not recognized either."""
     wall = WALL.replace("2.05", "1")
     near = RECOGNITION.replace("segmentation TRUE", "maxRange 1")
     none = RECOGNITION.replace("segmentation TRUE", "maxObjects 0")
@@ -256,7 +256,7 @@ def test_what_is_behind_a_wall_is_not_recognized(load):
 
 
 def test_the_image_of_segments_has_plain_colors(load):
-    """It has the first recognition color of each object, and black."""
+    """An object has its first recognition color, and the rest of the image is black."""
     simulation = load(OBJECT, RECOGNITION)
     recognition = simulation.robots[0].parts.devices.rows["eye"][1].recognition
     picture = np.frombuffer(recognition.picture, np.uint8).reshape(HEIGHT, WIDTH, 4)
@@ -266,7 +266,7 @@ def test_the_image_of_segments_has_plain_colors(load):
 
 
 def test_the_view_of_the_world_is_saved_as_a_file(load, tmp_path):
-    """The picture is from the Viewpoint, independent of the robots."""
+    """The Viewpoint of the world determines the image, not a robot's camera."""
     simulation = load(f"Viewpoint {{ position 0 0 0.5 }} {BOX}")
 
     assert simulation.export_image(str(tmp_path / "world.png"), 100)
@@ -274,7 +274,7 @@ def test_the_view_of_the_world_is_saved_as_a_file(load, tmp_path):
 
 
 def test_a_camera_and_a_range_finder_save_what_they_see(load, tmp_path):
-    """A range finder saves shades of gray."""
+    """A range finder saves its distances as shades of gray."""
     simulation = load(WALL, CAMERA + FINDER)
 
     for name in ("eye", "depth"):
@@ -301,7 +301,10 @@ print(hashlib.sha256(eye.colors()).hexdigest(), hashlib.sha256(eye.depths(0.0, 0
 
 
 def test_two_processes_draw_the_same_bytes():
-    """This holds on one machine; another version of Mesa or a graphics card may round differently."""
+    """The images are equal on one machine.
+
+    Another version of Mesa or a graphics card may round differently.
+    """
     found = {
         subprocess.run([sys.executable, "-c", HASH], capture_output=True, check=True).stdout for _ in "ab"
     }
@@ -332,7 +335,7 @@ except SimError as error:
     ],
 )
 def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
-    """OpenGL is loaded with the first camera, and the error names the missing package."""
+    """OpenGL is loaded only for the first camera; the error then names the missing packages."""
     done = subprocess.run(
         [sys.executable, "-c", BLIND % environment], capture_output=True, text=True, check=True
     )
@@ -341,7 +344,7 @@ def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
 
 
 def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
-    """The warning at the start lists only devices for which a client would wait in vain."""
+    """The warning at the start lists only devices that will never send a value to a waiting client."""
     simulation = load(
         "",
         f"{CAMERA} {FINDER}",
@@ -352,7 +355,7 @@ def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
 
 
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):
-    """The physics moves it, not a client."""
+    """Here the physics moves the object, not a client."""
     simulation = load(
         BOX.replace("children [", "physics Physics { } boundingObject Box { size 1 1 1 } children [").replace(
             "2 0 0.5", "3 0 1.5"
@@ -374,7 +377,7 @@ Robot { name "robot" children [ %s ] }
 
 
 def test_a_camera_of_an_old_file_looks_along_minus_z_with_y_up():
-    """Worlds from before R2022a have those axes."""
+    """World files from before Webots R2022a use these axes."""
     leave_out = LeaveOut(types=frozenset(("WorldInfo",)))
     camera = CAMERA.replace("0 0 0.5", "0 0.5 0")
     world = parse((OLD % camera).encode(), "world")
@@ -386,7 +389,7 @@ def test_a_camera_of_an_old_file_looks_along_minus_z_with_y_up():
 
 
 def _with(simulation, name, **fields):
-    """Return a node with other numbers in some fields."""
+    """Return a node after some of its fields got other numbers."""
     node = simulation.tree.of_def(name)
     for field, numbers in fields.items():
         node.fields[field].items[:] = list(numbers)

@@ -1,4 +1,4 @@
-"""A job and the raw objects of its one replica, as an API server stores them."""
+"""A job and the raw objects of its only replica, as an API server stores them."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -20,13 +20,13 @@ def _valid_job(**spec: Any) -> TrainingJob:
 
 @pytest.fixture
 def valid_job() -> Callable[..., TrainingJob]:
-    """Return a builder: keywords are fields of the spec, in camelCase."""
+    """Return a function that builds a job; its keywords are fields of the spec, in camelCase."""
     return _valid_job
 
 
 @pytest.fixture
 def raw_job() -> dict[str, Any]:
-    """Return the batch/v1 Job of the replica."""
+    """Return the Kubernetes Job (batch/v1) of the replica."""
     planned = plan(_valid_job(), ClusterLayout(images=Images.of_release("1")))
     job = deepcopy(dict(planned.replicas[0].job))
     job["metadata"]["uid"] = "job-uid"
@@ -35,7 +35,7 @@ def raw_job() -> dict[str, Any]:
 
 @pytest.fixture
 def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
-    """Return a pod of the replica that has not started."""
+    """Return a pod of the replica that has not started yet."""
     template = deepcopy(raw_job["spec"]["template"])
     named: dict[str, Any] = {"name": "job-0-x", "uid": "pod-1", "creationTimestamp": "2026-01-31T12:00:00Z"}
     named["ownerReferences"] = [{"kind": "Job", "uid": raw_job["metadata"]["uid"]}]
@@ -44,5 +44,8 @@ def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def look(raw_job: dict[str, Any]) -> Callable[..., Observed]:
-    """`look(pods=[...])` returns the observation of the job; its Job exists unless `jobs` replaces it."""
+    """`look(pods=[...])` returns the observation of the job.
+
+    Its Kubernetes Job exists unless `jobs` replaces it.
+    """
     return lambda **objects: observe(_valid_job(), Objects(**({"jobs": [raw_job]} | objects)))

@@ -1,4 +1,4 @@
-"""A cached TrainingJob is small whatever its spec, and is never mistaken for the whole job."""
+"""A cached TrainingJob is small whatever its spec, and the operator never takes it for the whole job."""
 
 import json
 
@@ -34,7 +34,7 @@ def raw_job(metadata=None, **spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
-    """Refused jobs are cached like all others; a few of 1.4 MB each ended the operator for everybody."""
+    """The cache also holds refused jobs; a few jobs of 1.4 MB each once ended the operator for all users."""
     kept = trimmed(raw_job(**spec))
 
     assert len(json.dumps(kept)) < MOST_CHARACTERS
@@ -43,7 +43,7 @@ def test_a_cached_job_is_small_whatever_its_author_wrote(spec):
 
 @pytest.mark.parametrize("spec", LARGE.values(), ids=LARGE)
 def test_what_decides_is_kept_of_every_job(spec):
-    """Each reconcile reads counts, deadlines and suspension; only the plan needs the rest of the spec."""
+    """Each reconcile reads counts, deadlines and `suspend`; only the plan needs the rest of the spec."""
     job = validate({**trimmed(raw_job(**spec)), "status": {}})
 
     assert (job.spec.replicas, job.spec.suspend, job.spec.ttl_seconds_after_finished) == (3, True, 9)
@@ -54,7 +54,7 @@ def test_what_decides_is_kept_of_every_job(spec):
 
 
 def test_labels_do_not_make_a_cached_job_large():
-    """The definition does not limit their size."""
+    """The CustomResourceDefinition cannot limit the size of the labels."""
     kept = trimmed(raw_job({"labels": {f"label-{number}": "x" * 63 for number in range(4000)}}))
 
     assert len(json.dumps(kept)) < MOST_CHARACTERS
@@ -62,7 +62,7 @@ def test_labels_do_not_make_a_cached_job_large():
 
 
 def test_a_digest_stands_for_each_world():
-    """Together with the length it shows in a dump whether two worlds are equal."""
+    """In a memory dump, digest and length show whether two worlds are equal."""
     kept = trimmed(raw_job(**LARGE["worlds"]))
     text = kept["spec"]["simulators"][0]["world"]["inline"]
 
@@ -72,7 +72,7 @@ def test_a_digest_stands_for_each_world():
 
 
 def test_a_usual_job_is_kept_whole():
-    """The plan of a usual job needs no request."""
+    """The operator can plan a usual job from its cache, without a request."""
     whole = raw_job(simulators=[COLLECT, EVALUATE], trainer={"steps": 5})
 
     assert trimmed(whole) == whole
@@ -81,5 +81,5 @@ def test_a_usual_job_is_kept_whole():
 
 @pytest.mark.parametrize("mark", ["texts", "fields", "nonsense"])
 def test_only_the_cache_says_that_a_copy_lacks_something(mark):
-    """Otherwise an annotation of the author could make the operator read the job again for ever."""
+    """If an author could set this annotation, the operator would read the job again for ever."""
     assert lacking(trimmed(raw_job({"annotations": {"palaestra.dev/lacks": mark}}))) is None

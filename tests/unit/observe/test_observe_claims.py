@@ -1,4 +1,4 @@
-"""Unused claims are found, so that they can be deleted with their TrainingJob."""
+"""The operator finds unused claims, which it deletes together with their TrainingJob."""
 
 import pytest
 
@@ -16,7 +16,7 @@ PENDING = {
 
 @pytest.mark.parametrize("kept", [dict, trimmed])
 def test_a_claim_that_was_never_bound_is_unused(kept):
-    """A cached copy has the fields that show it."""
+    """The cached copy of a claim keeps the fields that show whether the claim was bound."""
     assert is_unused(kept(PENDING))
 
 
@@ -35,5 +35,5 @@ def test_a_claim_that_was_never_bound_is_unused(kept):
     ],
 )
 def test_every_other_claim_may_hold_a_run(change):
-    """If it is not certain, the claim stays."""
+    """In doubt the operator keeps a claim, because a deleted run is lost."""
     assert not is_unused(trimmed(PENDING | change))

@@ -1,4 +1,4 @@
-"""The reason of a wait is read from a Workload, as Kueue 0.19 writes it."""
+"""The operator reads the reason of a wait from a Workload, in the format of Kueue 0.19."""
 
 import pytest
 
@@ -29,12 +29,12 @@ def workload(*conditions, created="2026-01-31T12:00:00Z", active=True, checks=()
 
 
 def test_what_a_job_waits_for_is_in_the_words_of_the_quota():
-    """An author may be able to read TrainingJobs, but not Workloads."""
+    """The author of a job may be able to read TrainingJobs, but not Workloads."""
     assert why_not_admitted([workload(condition("QuotaReserved", "False", SHORT))]) == SHORT
 
 
 def test_long_words_are_bounded_and_on_one_line():
-    """Kueue allows 32,768 characters; a status has a bound."""
+    """Kueue allows 32,768 characters in a message, but a status must stay small."""
     words = why_not_admitted([workload(condition("QuotaReserved", "False", "a\nb " * 9000))])
 
     assert len(words) == MOST_TEXT
@@ -42,12 +42,12 @@ def test_long_words_are_bounded_and_on_one_line():
 
 
 def test_the_message_for_a_job_without_a_workload_names_what_to_check():
-    """Kueue writes nothing about a Job that it does not manage."""
+    """Kueue creates no Workload for a Job that it does not manage."""
     assert why_not_admitted([]) == NO_WORKLOAD
 
 
 def test_a_workload_that_somebody_deactivated_is_named_with_the_remedy():
-    """Its condition may still have an old message."""
+    """The condition of such a Workload may still have an old message, which would mislead the user."""
     stopped = workload(condition("QuotaReserved", "False", SHORT), active=False)
 
     assert why_not_admitted([stopped]) == (
@@ -56,7 +56,7 @@ def test_a_workload_that_somebody_deactivated_is_named_with_the_remedy():
 
 
 def test_checks_that_have_not_passed_are_named():
-    """The quota is reserved, but an admission check of another controller may still refuse the job."""
+    """The quota is reserved, but the admission check of another controller may still refuse the job."""
     checks = [
         {"name": "budget", "state": "Ready", "message": "paid"},
         {"name": "machines", "state": "Pending", "message": "2 nodes are on order"},
@@ -79,12 +79,12 @@ def test_checks_that_have_not_passed_are_named():
     ids=["new", "admitted", "text", "list", "number"],
 )
 def test_nothing_is_said_of_a_workload_that_gives_no_reason(found):
-    """Kueue has not written it yet, or its content cannot be read."""
+    """Kueue has not written a reason yet, or another program has written unreadable content."""
     assert why_not_admitted([found]) == ""
 
 
 def test_of_several_workloads_the_newest_counts():
-    """Kueue replaces the Workload of a Job that was changed."""
+    """When a Job changes, Kueue replaces its Workload."""
     old = workload(condition("QuotaReserved", "False", "old"))
     new = workload(condition("QuotaReserved", "False", "new"), created="2026-01-31T12:00:01Z")
 

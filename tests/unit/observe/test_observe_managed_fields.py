@@ -1,4 +1,4 @@
-"""The writer of a field, read from managedFields that may hold anything."""
+"""The operator reads the last writer of a field from managedFields, whose content it does not trust."""
 
 import pytest
 
@@ -6,19 +6,19 @@ from palaestra.observe.jobs import suspends
 
 
 def entry(manager, field="f:suspend", time="2026-01-31T12:00:00Z"):
-    """Return the fields that one field manager has written."""
+    """Return an entry of managedFields with the field that a manager has written."""
     return {"manager": manager, "operation": "Update", "time": time, "fieldsV1": {"f:spec": {field: {}}}}
 
 
 def test_the_manager_of_the_field_is_found():
-    """The other managers of the Job own other fields."""
+    """The other managers of the Job have written other fields."""
     fields = [entry("palaestra", "f:backoffLimit"), entry("kueue"), entry("kubectl-edit", "f:parallelism")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
 
 
 def test_of_several_managers_it_is_the_last():
-    """Two managers that apply the same value share a field."""
+    """Two managers that apply the same value share the ownership of a field."""
     fields = [entry("kueue", time="2026-01-31T12:00:01Z"), entry("palaestra")]
 
     assert suspends({"metadata": {"managedFields": fields}}) == "kueue"
@@ -30,5 +30,5 @@ def test_of_several_managers_it_is_the_last():
     ids=["absent", "no list", "no entries", "no fields"],
 )
 def test_what_does_not_tell_is_nobody(fields):
-    """The cluster may store any content there."""
+    """Any content may be stored in managedFields, and the operator must not fail."""
     assert suspends({"metadata": {"managedFields": fields}}) == ""

@@ -1,4 +1,4 @@
-"""A pod is read with its containers in order and its messages shortened; no value in it is trusted."""
+"""A pod is read with its containers in order and with shortened messages; its content is not trusted."""
 
 import pytest
 
@@ -12,12 +12,12 @@ def state(name, **status):
 
 
 def pod(look, raw):
-    """Return the observed pod."""
+    """Return the observation of a raw pod."""
     return look(pods=[raw]).replicas[0].pod
 
 
 def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
-    """The kind of each container comes from the pod's spec, its state from the status."""
+    """The pod's spec gives the kind of each container, and the status gives its state."""
     seen = pod(look, raw_pod)
 
     assert [(each.name, each.kind) for each in seen.containers] == [
@@ -29,7 +29,7 @@ def test_containers_come_in_the_order_in_which_they_start(look, raw_pod):
 
 
 def test_a_sidecar_without_its_restart_policy_is_a_plain_init_container(look, raw_pod):
-    """A program between the operator and the kubelet has dropped the field."""
+    """A webhook may have dropped the restart policy."""
     del raw_pod["spec"]["initContainers"][0]["restartPolicy"]
 
     assert pod(look, raw_pod).containers[0].kind is ContainerKind.INIT
@@ -37,14 +37,14 @@ def test_a_sidecar_without_its_restart_policy_is_a_plain_init_container(look, ra
 
 @pytest.mark.parametrize("created", ["noon", "9999-12-31T23:59:59-23:59", None, 3])
 def test_a_pod_without_a_readable_time_is_the_oldest(look, raw_pod, created):
-    """The pod still exists."""
+    """Such a pod still exists, so the operator must not ignore it."""
     raw_pod["metadata"]["creationTimestamp"] = created
 
     assert pod(look, raw_pod).created.year == 1970
 
 
 def test_a_container_that_runs_again_still_tells_how_it_ended_before(look, raw_pod):
-    """So a crash loop is visible also while the container runs."""
+    """The last end shows a crash loop even while the container runs."""
     running = {"running": {"startedAt": "2026-01-31T12:00:05Z"}}
     ended = {"terminated": {"exitCode": 137, "reason": "OOMKilled"}}
     raw_pod["status"]["initContainerStatuses"] = [
@@ -58,7 +58,7 @@ def test_a_container_that_runs_again_still_tells_how_it_ended_before(look, raw_p
 
 
 def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
-    """Messages of other programs are shown on terminals, and in a status of limited size."""
+    """Such messages are printed on terminals and stored in a status of limited size."""
     waiting = {"waiting": {"reason": "ErrImagePull", "message": "a\n\x1b[31mred" + "x" * 5000}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=waiting)]
 
@@ -85,14 +85,14 @@ def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
     ],
 )
 def test_conditions_say_why(look, raw_pod, condition, field, value):
-    """The scheduler, the component that removed the pod and the kubelet each set a condition."""
+    """The scheduler, the kubelet and the program that removes a pod each set a condition."""
     raw_pod["status"]["conditions"] = [condition]
 
     assert getattr(pod(look, raw_pod), field) == value
 
 
 def test_the_last_word_is_of_our_protocol(look, raw_pod):
-    """The termination message is JSON, and strictly parsed."""
+    """The trainer's termination message is JSON of a fixed format."""
     word = Termination(step=7, reason="Completed", success_rate=0.5, attempt=2, restarts=1)
     ended = {"terminated": {"exitCode": 0, "message": word.to_message()}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
@@ -104,7 +104,7 @@ def test_the_last_word_is_of_our_protocol(look, raw_pod):
     "message", ["Traceback: it", "{}", '{"step": -1, "reason": ""}', "[" * 5000, None, 3, ""]
 )
 def test_anything_else_is_no_last_word(look, raw_pod, message):
-    """A termination message may also be the end of a log, or any text of the program's author."""
+    """A termination message may also be the end of a log, or any text of a user's program."""
     ended = {"terminated": {"exitCode": 1, "message": message}}
     raw_pod["status"]["containerStatuses"] = [state("trainer", state=ended)]
 
@@ -112,7 +112,7 @@ def test_anything_else_is_no_last_word(look, raw_pod, message):
 
 
 def test_a_termination_message_is_cut_where_kubernetes_cuts_it(look, raw_pod):
-    """A cache must not grow with the output of a pod."""
+    """The cache must not grow with the output of a pod."""
     raw_pod["status"]["containerStatuses"] = [
         state("trainer", state={"terminated": {"exitCode": 1, "message": "x" * 100_000}})
     ]
@@ -121,7 +121,7 @@ def test_a_termination_message_is_cut_where_kubernetes_cuts_it(look, raw_pod):
 
 
 def test_the_memory_limit_is_that_of_the_pods_spec(look, raw_pod):
-    """The message about a container that was killed for its memory names this limit."""
+    """The message about a memory kill names the limit of the container."""
     limits = {each.name: each.memory_limit for each in pod(look, raw_pod).containers}
     raw_pod["spec"]["containers"][0]["resources"] = {"limits": "garbage"}
 

@@ -1,4 +1,4 @@
-"""The objects that a job refers to, each with its fields."""
+"""The objects to which a job refers, each with the field of the reference."""
 
 from palaestra.observe import ReferenceKind, references
 
@@ -6,12 +6,12 @@ SECRET = {"env": [{"name": "A", "secretKeyRef": {"name": "keys", "key": "a"}}]}
 
 
 def test_a_job_of_defaults_refers_to_nothing(valid_job):
-    """Its worlds are in the images, and its claims are created."""
+    """The bundled worlds are in the images, and the operator creates the claims."""
     assert references(valid_job()) == ()
 
 
 def test_worlds_secrets_and_claims_are_named_with_their_fields(valid_job):
-    """To fix a missing object, the author must know the field that refers to it."""
+    """If an object is missing, the author must know which field refers to it."""
     job = valid_job(
         simulators=[
             {"name": "a", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "a.wbt"}}},
@@ -31,7 +31,7 @@ def test_worlds_secrets_and_claims_are_named_with_their_fields(valid_job):
 
 
 def test_an_object_that_is_named_twice_is_looked_up_once(valid_job):
-    """Thirty variables from one Secret are one request."""
+    """Thirty variables from one Secret must cause only one request."""
     env = [{"name": name, "secretKeyRef": {"name": "keys", "key": name}} for name in "ABC"]
 
     assert len(references(valid_job(trainer={"env": env}))) == 1

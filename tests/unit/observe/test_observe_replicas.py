@@ -1,4 +1,4 @@
-"""The objects that belong to a replica, as opposed to those that only have its name."""
+"""The objects that belong to a replica, and objects of others with the same name."""
 
 from copy import deepcopy
 from datetime import UTC, datetime
@@ -13,7 +13,7 @@ NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 
 
 def test_every_replica_of_the_spec_is_there(valid_job):
-    """A replica without any object is included."""
+    """A replica without objects must also be observed, so that the operator creates them."""
     seen = observe(valid_job(replicas=3), Objects())
 
     assert [each.index for each in seen.replicas] == [0, 1, 2]
@@ -21,7 +21,7 @@ def test_every_replica_of_the_spec_is_there(valid_job):
 
 
 def test_a_job_is_ours_by_the_uid_of_its_owner(look, raw_job):
-    """Names are reused, but uids are not."""
+    """Another object may get an old name again, but never an old uid."""
     other = deepcopy(raw_job)
     other["metadata"]["ownerReferences"][0]["uid"] = "another"
 
@@ -32,7 +32,7 @@ def test_a_job_is_ours_by_the_uid_of_its_owner(look, raw_job):
 
 
 def test_pods_of_a_job_of_the_same_name_are_not_ours(look, raw_pod):
-    """The earlier TrainingJob had the same name, and its pods may still be ending."""
+    """An earlier TrainingJob had the same name, and its pods may still terminate."""
     raw_pod["metadata"]["labels"]["palaestra.dev/job-uid"] = "another"
 
     assert look(pods=[raw_pod]).replicas[0].pod is None
@@ -50,7 +50,7 @@ def test_the_newest_pod_is_the_last(look, raw_pod):
 
 
 def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
-    """Only one pod runs at a time, so the other one had ended before this one was created."""
+    """A Job runs one pod at a time, so the ended pod is the older one."""
     ended = deepcopy(raw_pod)
     ended["metadata"] |= {"name": "zzz", "uid": "pod-2"}
     ended["status"] = {"phase": "Failed"}
@@ -59,7 +59,7 @@ def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
 
 
 def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
-    """The status of a pod that has ended is ignored, because its last word has more."""
+    """For a pod that has ended, the termination message is newer than the polled status."""
     answer = Polled(status=TrainerStatus(step=1, target=2, episodes=0, phase="training"), at_s=5.0)
     other = look(pods=[raw_pod], polled={"another": answer}).replicas[0]
     alive = look(pods=[raw_pod], polled={"pod-1": answer}).replicas[0]
@@ -81,21 +81,21 @@ def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     ],
 )
 def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
-    """The early conditions are enough, because the last pod may never end on a lost node."""
+    """The conditions before the last pod's end are enough, because on a lost node the pod never ends."""
     raw_job["status"] = {"conditions": conditions}
 
     assert look(jobs=[raw_job]).replicas[0].job.end is end
 
 
 def test_failures_that_are_about_to_be_booked_count(look, raw_job):
-    """The Job controller counts them in two steps."""
+    """The Job controller first lists an ended pod as uncounted, and then raises its count."""
     raw_job["status"] = {"failed": 2, "uncountedTerminatedPods": {"failed": ["uid-3"]}}
 
     assert look(jobs=[raw_job]).replicas[0].job.failures == 3
 
 
 def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
-    """The event must have the uid of this Job, because an earlier Job may have had the same name."""
+    """An earlier Job may have had the same name, so only the uid in the event decides."""
 
     def event(words, second, uid="job-uid"):
         return {
@@ -111,7 +111,7 @@ def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
 
 
 def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
-    """The newer events API writes series."""
+    """In the newer events API, a repeated event is one object with a series."""
     event = {
         "reason": "FailedCreate",
         "message": "quota",
@@ -134,9 +134,9 @@ def test_what_is_there_is_known_by_kind_and_name(valid_job):
 
 
 def test_a_config_map_or_policy_of_somebody_else_is_not_there(valid_job):
-    """The operator's label alone does not make it the operator's.
+    """Any user can set the operator's label, so only the owner reference counts.
 
-    A claim has no owner, because it outlives its job.
+    A claim has no owner, because it must outlive its job.
     """
     named = {"metadata": {"name": "x"}}
 
@@ -146,14 +146,14 @@ def test_a_config_map_or_policy_of_somebody_else_is_not_there(valid_job):
 
 
 def test_of_other_kinds_only_who_wrote_them_is_forgotten():
-    """An object of an unlisted kind, such as an Event, loses only `managedFields`."""
+    """From an object of an unlisted kind, such as an Event, only `managedFields` is removed."""
     event = {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x", "managedFields": [1]}}
 
     assert trimmed(event) == {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x"}}
 
 
 def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
-    """Trimming removes only unread fields, which are most of the object."""
+    """The cache drops only fields that the operator never reads, which are most of an object."""
     raw_job |= {"status": {"failed": 1}}
     raw_job["metadata"] |= {
         "annotations": {
@@ -181,7 +181,7 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
 
 
 def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
-    """A user who may create pods can give them the operator's labels."""
+    """Any user who may create pods can give them the operator's labels."""
     raw_pod["metadata"]["ownerReferences"] = [{"kind": "Job", "name": "job-0", "uid": "another"}]
 
     replica = look(pods=[raw_pod]).replicas[0]
@@ -190,7 +190,7 @@ def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
 
 
 def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(valid_job, raw_pod):
-    """A user deleted the Job, but its pod still saves a checkpoint."""
+    """A user deleted the Job, but its pod is still saving a checkpoint."""
     named = {"name": "job-0-x", "uid": "pod-1", "created": NOW}
     job = valid_job()
     status = job.status.model_copy(
@@ -203,7 +203,7 @@ def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(v
 
 
 def test_what_was_refused_is_of_the_replica_or_of_all(valid_job):
-    """The message is that of the API server, on one line."""
+    """The status quotes the message of the API server on one line."""
     seen = observe(valid_job(replicas=2), Objects(denied={1: "over\nquota"}))
     of_all = observe(valid_job(replicas=2), Objects(denied={None: "no policy"}))
 
@@ -212,7 +212,7 @@ def test_what_was_refused_is_of_the_replica_or_of_all(valid_job):
 
 
 def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, raw_pod):
-    """The last event about volumes counts, while the pod waits for them."""
+    """While a pod waits for its volumes, the last event about volumes has the cause."""
 
     def event(reason, words, second, uid="pod-1"):
         return {
@@ -236,7 +236,7 @@ def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, ra
 
 
 def test_the_event_about_the_probe_is_read_and_not_one_about_another_container():
-    """After the trainer the kubelet ends the other containers, and emits events about that too."""
+    """After the trainer the kubelet also ends the other containers, and emits events about them."""
     probe = {"reason": "Killing", "message": "Container trainer failed startup probe, will be restarted"}
     other = {"reason": "Killing", "message": "Stopping container sim-collect-0"}
     events = [

@@ -1,4 +1,4 @@
-"""Knowledge that no watch delivers is kept in a bounded cache, by TrainingJob."""
+"""A bounded cache holds the facts about TrainingJobs that no watch delivers, by TrainingJob."""
 
 import pytest
 
@@ -25,14 +25,14 @@ TRAINING_JOB = make_job(
 
 @pytest.fixture
 def full():
-    """Return a cache that another TrainingJob has filled."""
+    """Return a cache that another TrainingJob has filled up."""
     memory = BoundedCache()
     memory.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED), "words"))
     return memory
 
 
 def test_what_a_look_leaves_takes_the_place_of_what_was_known():
-    """Keys that the last reconcile did not return are dropped, so nobody has to remove them."""
+    """A reconcile replaces the facts of its job, so outdated facts need no cleanup."""
     memory = BoundedCache()
     memory.keep(KEY, UID, {"a": 1, "b": 2})
 
@@ -42,7 +42,7 @@ def test_what_a_look_leaves_takes_the_place_of_what_was_known():
 
 
 def test_nothing_is_known_of_a_job_that_was_made_again():
-    """The new job has the same name but another uid."""
+    """The new job has the name of the old one but another uid, so the old facts do not apply."""
     memory = BoundedCache()
     memory.keep(KEY, UID, {"a": 1})
 
@@ -51,7 +51,7 @@ def test_nothing_is_known_of_a_job_that_was_made_again():
 
 
 def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
-    """If the oldest were dropped, nothing would be remembered of 5,000 jobs that are reconciled in turn."""
+    """If new facts displaced old ones, with 5,000 jobs in turn each fact would be gone before its use."""
     assert full.keep(KEY, UID, {"a": 1}) == {}
 
     assert full.known(KEY, UID) == {}
@@ -59,7 +59,7 @@ def test_a_full_memory_takes_nothing_new_and_keeps_what_it_has(full):
 
 
 def test_what_is_known_keeps_its_place_when_a_job_brings_more_than_there_is_room_for(full):
-    """A known response must not be dropped for a new key that happens to come first."""
+    """A new fact that comes first in the dict must not displace a known fact."""
     full.keep(OTHER, UID, dict.fromkeys(range(REMEMBERED - 1), "words"))
 
     kept = full.keep(OTHER, UID, {"new": "a", "newer": "b", **dict.fromkeys(range(REMEMBERED - 1), "words")})
@@ -68,7 +68,7 @@ def test_what_is_known_keeps_its_place_when_a_job_brings_more_than_there_is_room
 
 
 def test_what_is_forgotten_makes_room(full):
-    """A deleted TrainingJob leaves nothing behind."""
+    """The facts of a deleted TrainingJob must not use space in the cache."""
     full.forget(OTHER)
 
     assert full.keep(KEY, UID, {"a": 1}) == {"a": 1}
@@ -76,18 +76,18 @@ def test_what_is_forgotten_makes_room(full):
 
 
 class Cluster:
-    """An API server and the caches: somebody else has resumed its one Job, which lacks a pod."""
+    """An API server and the caches with one Job, which another program has resumed and which lacks a pod."""
 
     def __init__(self):
         self.asked = 0
 
     def get(self, *_):
-        """Return the Job with the managers of its fields."""
+        """Return the Job with its managedFields."""
         self.asked += 1
         return self.children(None, KEY)[0]
 
     def children(self, resource, _):
-        """Return the Job, the only object."""
+        """Return the Job, or an empty list for another kind."""
         if resource is not None and resource.kind != "Job":
             return []
         metadata = {
@@ -98,7 +98,7 @@ class Cluster:
 
 
 def test_nothing_stays_of_a_job_that_is_gone():
-    """Everything about it is dropped with it, so the memory holds no more than the cluster."""
+    """The operator drops all facts of a deleted job, so its memory does not grow with deleted jobs."""
     cluster, strangers, denials = Cluster(), ForeignJobs(Cluster()), RejectedCreations()
     checking = WorldChecker(dict, print)
     looking = JobObserver(cluster, cluster, strangers, denials, dict, checking)

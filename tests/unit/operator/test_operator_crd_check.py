@@ -1,4 +1,4 @@
-"""A status is written only with the conditions that the definition in the cluster accepts."""
+"""The operator writes only those conditions that the CustomResourceDefinition in the cluster accepts."""
 
 import pytest
 
@@ -11,9 +11,9 @@ NOW = [*BEFORE, "Reconciling", "Stalled"]
 
 
 class Server:
-    """An API server that publishes a definition with these types of conditions.
+    """An API server whose definition accepts these types of conditions.
 
-    With None, it does not respond.
+    With None, the server does not respond.
     """
 
     def __init__(self, types):
@@ -24,7 +24,7 @@ class Server:
         return self
 
     def schema(self, *_):
-        """Return the definition."""
+        """Return the schema of the definition."""
         if self.types is None:
             raise ApiError(0, "", "no answer")
         served = schema()
@@ -35,13 +35,13 @@ class Server:
 
 @pytest.fixture
 def looks():
-    """Return a list with one item for each time that all jobs were queued again."""
+    """Return a list that gets an item each time all jobs are queued again."""
     return []
 
 
 @pytest.fixture
 def definition(looks):
-    """`definition(types)` returns a check that has compared the definition once, and its server."""
+    """`definition(types)` returns a check that has read the definition once, and its server."""
 
     def make(types):
         server = Server(types)
@@ -58,7 +58,7 @@ def status(*types):
 
 
 def test_a_definition_of_this_release_takes_every_condition(definition, looks):
-    """Every job is also queued, because its status may lack a condition."""
+    """The check also queues every job, because an older status may lack a condition."""
     made, _ = definition(NOW)
 
     assert made.accepted({}, status("Running", "Stalled")) == status("Running", "Stalled")
@@ -66,7 +66,7 @@ def test_a_definition_of_this_release_takes_every_condition(definition, looks):
 
 
 def test_an_older_definition_gets_no_condition_that_it_would_refuse(definition, looks):
-    """An API server would refuse the whole status for it, and no job would be accepted any more."""
+    """The API server would refuse the whole status, and the operator could accept no job any more."""
     made, server = definition(BEFORE)
 
     assert made.accepted(status("Stalled"), status("Running", "Stalled")) == status("Running")
@@ -80,9 +80,9 @@ def test_an_older_definition_gets_no_condition_that_it_would_refuse(definition, 
 
 
 def test_a_status_keeps_its_conditions_while_the_definition_cannot_be_read(definition):
-    """Otherwise an operator would remove them from every job and restore them later.
+    """Without this rule the operator would remove the conditions from every job and add them again later.
 
-    This occurred when the API server was busy while the operator started.
+    This happened when the API server was busy during the operator's start.
     """
     made, _ = definition(None)
 

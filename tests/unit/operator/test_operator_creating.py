@@ -1,4 +1,4 @@
-"""The creation of an object whose name is already used."""
+"""The operator tries to create an object whose name is already in use."""
 
 import pytest
 
@@ -21,13 +21,13 @@ WANTED = {
 
 
 def a_job(*owners):
-    """Return the Job of a replica, with the uids of its owners."""
+    """Return the Job of a replica whose owners have these uids."""
     metadata = {"name": "job-0", "namespace": "robots", "ownerReferences": [{"uid": uid} for uid in owners]}
     return {"apiVersion": "batch/v1", "kind": "Job", "metadata": metadata}
 
 
 class Server:
-    """An API server that already has an object of that name."""
+    """An API server that already has an object of this name."""
 
     pods = ()
 
@@ -62,7 +62,7 @@ class Server:
     ids=["ours, of a moment ago", "other content", "of somebody else", "not immutable"],
 )
 def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(change, wrong):
-    """Otherwise pods would train with whatever it contains, now or later."""
+    """Pods must not train with the content of a foreign ConfigMap, or of one that somebody can change."""
     api, denials = Server({**WANTED, **change}), RejectedCreations()
     acting = Executor(api, FencedClient(api, lambda: True), None, denials)
 
@@ -78,7 +78,7 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
     ids=["ours, which the cache has not heard of", "of an earlier job", "of nobody", "gone by now"],
 )
 def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there, made):
-    """Otherwise an event would report its creation; the next reconcile finds out the owner."""
+    """An event must not report the creation of a foreign Job; the next reconcile reads its owner."""
     api = Server(there)
     acting = Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations())
 
@@ -88,7 +88,7 @@ def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there,
 
 
 def a_pod(uid="old", claim="shared", phase="Running"):
-    """Return a pod of replica 0 of the TrainingJob with a uid."""
+    """Return a pod of replica 0 of the TrainingJob with this uid."""
     labels = {"palaestra.dev/job": "job", "palaestra.dev/job-uid": uid, "palaestra.dev/replica": "0"}
     volumes = [{"name": "run", "persistentVolumeClaim": {"claimName": claim}}]
     metadata = {"name": "job-0-x", "labels": labels}
@@ -106,7 +106,7 @@ def a_pod(uid="old", claim="shared", phase="Running"):
     ids=["an earlier one's, on a claim of both", "an earlier one's", "its own", "one that has ended"],
 )
 def test_a_job_is_not_created_beside_a_pod_that_may_write_to_its_volume(pod, waits):
-    """The last check before a creation reads the cluster, because a cache may be late."""
+    """The cache may be outdated, so the operator reads the pods from the API server before the creation."""
     job = a_job("ours")
     job["metadata"]["labels"] = a_pod(uid="new")["metadata"]["labels"]
     job["spec"] = {"template": {"spec": a_pod()["spec"]}}

@@ -1,4 +1,4 @@
-"""The comparison of definitions only informs people and must not end the operator."""
+"""The check of the CustomResourceDefinition only informs people and must not end the operator."""
 
 import threading
 
@@ -22,7 +22,7 @@ class Server:
 
 
 def test_a_document_that_nobody_foresaw_does_not_end_the_operator(monkeypatch):
-    """A thread that fails ends the whole operator, and would do so again after every start."""
+    """An exception in a thread ends the whole operator, and would end it again after each restart."""
     broken = []
     monkeypatch.setattr(threading, "excepthook", broken.append)
     server, stopping = Server(), threading.Event()

@@ -1,4 +1,4 @@
-"""The permission to write, and the merge patch of a status with its effects."""
+"""The client that writes only while the operator leads, and the merge patch of a status."""
 
 import pytest
 from hypothesis import given
@@ -15,7 +15,7 @@ OBJECTS = st.recursive(
 
 
 def merged(target, patch):
-    """Return the result of a merge patch as an API server computes it (RFC 7386)."""
+    """Return the result of a merge patch, computed as in an API server (RFC 7386)."""
     if not isinstance(patch, dict):
         return patch
     result = dict(target) if isinstance(target, dict) else {}
@@ -29,18 +29,18 @@ def merged(target, patch):
 
 @given(OBJECTS, OBJECTS)
 def test_a_patch_makes_the_old_status_into_the_new(old, new):
-    """This includes removed fields: a merge patch that leaves a field out would keep it for ever."""
+    """A merge patch keeps the fields that it does not contain, so it must set removed fields to null."""
     assert merged(old, difference(old, new)) == new
 
 
 @given(OBJECTS)
 def test_a_status_that_did_not_change_needs_no_patch(status):
-    """An empty patch causes no write."""
+    """With an empty patch the operator sends no request."""
     assert difference(status, status) == {}
 
 
 def test_a_job_without_a_status_gets_all_of_it():
-    """The API server has no status before the first write."""
+    """Before the first write the API server has no status."""
     assert difference(None, {"phase": "Pending"}) == {"phase": "Pending"}
 
 
@@ -55,13 +55,13 @@ class Server:
 
 
 def delete(writer):
-    """Write through the fenced client."""
+    """Delete an object with the fenced client."""
     writer.delete(None, "robots", "job", uid="u", version="1")
 
 
 @pytest.mark.parametrize("later", [None, 2], ids=["lost", "lost and regained"])
 def test_what_was_decided_in_one_tenure_is_not_written_in_another(later):
-    """Another operator may have led in between and acted otherwise."""
+    """Another operator may have led in the meantime and decided otherwise."""
     api, terms = Server(), [1]
     writer = FencedClient(api, lambda: terms[-1])
     writer.begin()
@@ -75,7 +75,7 @@ def test_what_was_decided_in_one_tenure_is_not_written_in_another(later):
 
 
 def test_a_look_that_begins_after_the_lease_was_regained_may_write():
-    """By then the operator has read the changes of the other operator."""
+    """A reconcile that starts after that time has read the changes of the other operator."""
     api, terms = Server(), [1]
     writer = FencedClient(api, lambda: terms[-1])
     writer.begin()

@@ -1,4 +1,4 @@
-"""The operator's own port, which kubelets and Prometheus read."""
+"""The HTTP port of the operator, which kubelets and Prometheus read."""
 
 import socket
 import urllib.error
@@ -19,19 +19,19 @@ PHASES = [("robots", "Running"), ("robots", "Running"), ("home", "Failed")]
 
 @pytest.fixture
 def told():
-    """The current problems; empty if everything is fine."""
+    """Return the list of current problems, which is empty if the operator is healthy."""
     return []
 
 
 @pytest.fixture
 def ask(told):
-    """A function that returns status and text of a path."""
+    """Yield a function that returns the HTTP status and the text at a path."""
     metrics = Metrics()
     metrics.request("list", "pods", 200, 0.01)
     metrics.watch(
         depth=lambda: 3, leads=lambda: True, phases=lambda: PHASES, waits=list, outdated=lambda: False
     )
-    trouble = lambda: told[0] if told else None  # noqa: E731 - both questions get the same answer
+    trouble = lambda: told[0] if told else None  # noqa: E731 - both probes get the same response
     server = serving(Address("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
 
     def get(path):
@@ -48,7 +48,7 @@ def ask(told):
 
 @pytest.mark.parametrize("path", ["/healthz", "/readyz"])
 def test_a_probe_fails_with_the_reason(path, ask, told):
-    """`kubectl describe pod` shows what is wrong."""
+    """`kubectl describe pod` shows the reason to an administrator."""
     assert ask(path) == (200, "ok\n")
 
     told.append("not read yet: pods")
@@ -57,7 +57,7 @@ def test_a_probe_fails_with_the_reason(path, ask, told):
 
 
 def test_nothing_else_is_served(ask):
-    """The port serves no index, no file and no profile."""
+    """The port must not serve an index, a file or a profile."""
     assert ask("/../etc/passwd")[0] == 404
 
 
@@ -74,14 +74,14 @@ def test_nothing_else_is_served(ask):
     ],
 )
 def test_what_the_operator_counts(line, ask):
-    """Labels are bounded: no job's name is among them."""
+    """The labels have few values; the name of a job is not a label."""
     line = line.replace("VERSION", version("palaestra"))
 
     assert line in ask("/metrics")[1].splitlines()
 
 
 def test_the_error_for_a_taken_address_names_the_option():
-    """Two operators may run on one machine."""
+    """A user may run two operators on one machine and must choose another port."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         where = Address(*taken.getsockname()[:2])
 
@@ -97,6 +97,6 @@ def test_what_is_no_address_is_refused(text):
 
 
 def test_an_address_may_be_of_either_kind():
-    """IPv6 addresses have brackets."""
+    """An IPv6 address is written in brackets."""
     assert address("[::1]:8080") == ("::1", 8080)
     assert address("0.0.0.0:0") == ("0.0.0.0", 0)

@@ -1,4 +1,4 @@
-"""The command line's namespaces; a test with a real API server shows that they are watched."""
+"""The namespaces of the command line; a test with a real API server shows that they are watched."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""When the operator requests the reason why Kueue does not admit a Job, and when it does not."""
+"""The operator requests the reason why Kueue does not admit a Job only if the Job waits in a queue."""
 
 import pytest
 
@@ -29,7 +29,7 @@ class Server:
 
 @pytest.fixture
 def server():
-    """A server that counts its requests."""
+    """Return a server that records its requests."""
     return Server()
 
 
@@ -43,7 +43,7 @@ def job(uid="u", *, suspend=True, labels=QUEUED, status=None):
 
 
 def asked(server, *jobs, pods=()):
-    """Return the cache, and the reasons that it knows after the first seconds."""
+    """Return the cache, and the reasons that it has after the first wait."""
     admissions = KueueWorkloads(server, lambda: server.now)
     admissions.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
@@ -51,7 +51,7 @@ def asked(server, *jobs, pods=()):
 
 
 def test_the_workload_of_a_job_is_found_by_kueues_label(server):
-    """Its name is a hash, but the label has the uid of the Job."""
+    """The name of a Workload is a hash, but its label has the uid of the Job."""
     _, answers = asked(server, job())
 
     assert answers == Answers(facts={"u": SHORT}, again_s=RECHECK_S)
@@ -70,7 +70,7 @@ def test_the_workload_of_a_job_is_found_by_kueues_label(server):
     ids=["admitted", "no queue", "no labels", "ended", "its pod still saves"],
 )
 def test_nobody_is_asked_about_a_job_that_does_not_wait_in_a_queue(queued, pods, server):
-    """If no Job waits, no request is sent."""
+    """Without a waiting Job the operator must not send a request."""
     _, answers = asked(server, queued, pods=pods)
 
     assert (answers, server.asked) == (Answers(facts={}), [])
@@ -78,7 +78,7 @@ def test_nobody_is_asked_about_a_job_that_does_not_wait_in_a_queue(queued, pods,
 
 @pytest.mark.parametrize("refusal", [Forbidden(403, "Forbidden", "no"), NotFound(404, "NotFound", "no")])
 def test_a_refusal_is_no_word_and_no_error(refusal, server):
-    """The operator's role may be without Workloads, and Kueue may serve other versions."""
+    """The operator may lack the permission for Workloads, or Kueue may serve another API version."""
     server.refusal = refusal
 
     _, answers = asked(server, job())
@@ -87,7 +87,7 @@ def test_a_refusal_is_no_word_and_no_error(refusal, server):
 
 
 def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_said_stays(server):
-    """The error is logged like that of any other read, and does not fail every reconcile."""
+    """The error fails one reconcile and is logged; it must not fail the next ones."""
     admissions, _ = asked(server, job())
     server.refusal = ServerError(500, "InternalError", "conversion webhook failed")
     server.now += RECHECK_S
@@ -99,7 +99,7 @@ def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_sai
 
 
 def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(server):
-    """Thousands of Jobs may wait in queues for days without any problem."""
+    """Thousands of Jobs may wait in queues for days. Real problems of other pods must still be read."""
     admissions, hindrances = (kind(server, lambda: server.now) for kind in (KueueWorkloads, PodEvents))
     for number in range(REMEMBERED):
         admissions.of(("robots", f"job-{number}"), UID, [job(f"u{number}")], [])
@@ -113,7 +113,7 @@ def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(ser
 
 
 def test_a_job_that_was_admitted_and_taken_back_is_asked_about_anew(server):
-    """The old message of its Workload no longer holds."""
+    """The old message explained the first wait and may be wrong for the second."""
     admissions, _ = asked(server, job())
     admissions.of(KEY, UID, [job(suspend=False)], [])
 

@@ -1,4 +1,4 @@
-"""When the operator requests the events of a Job or pod, and when it does not."""
+"""The operator requests the events of a Job or a pod only if they may explain a wait or an end."""
 
 import pytest
 
@@ -20,7 +20,7 @@ class Server:
         self.about = "reason=FailedCreate"
 
     def list(self, resource, namespace, *, fields):
-        """Return the only event."""
+        """Return the events of the Job."""
         assert (resource.plural, namespace) == ("events", "robots")
         assert fields.startswith("involvedObject.uid=u")
         assert fields.endswith(f",{self.about}")
@@ -39,12 +39,12 @@ class Server:
 
 @pytest.fixture
 def server():
-    """A server that counts its requests."""
+    """Return a server that counts its requests."""
     return Server()
 
 
 def job(**changes):
-    """Return a Job that should have a pod."""
+    """Return a Job that lacks its pod."""
     return {
         "metadata": {"name": "job-0", "namespace": "robots", "uid": "u"},
         "spec": {},
@@ -62,12 +62,12 @@ def pod(phase):
 
 
 def events(answers):
-    """Return the known events."""
+    """Return the events that the operator has read."""
     return list(answers.facts.values())
 
 
 def test_a_new_job_is_given_some_seconds(server):
-    """Nearly every Job has a pod at once, so no request is sent."""
+    """Almost every Job gets a pod at once, so the operator waits before it requests events."""
     hindrances = PodEvents(server, lambda: server.now)
 
     found = hindrances.of(KEY, UID, [job()], [])
@@ -77,7 +77,7 @@ def test_a_new_job_is_given_some_seconds(server):
 
 
 def test_after_that_its_events_are_read_now_and_then(server):
-    """Not every reconcile reads them: a job is reconciled many times a second while its pods change."""
+    """While its pods change, a job is reconciled many times a second. Not every reconcile may read events."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -88,7 +88,7 @@ def test_after_that_its_events_are_read_now_and_then(server):
 
 
 def test_the_pauses_grow_to_five_minutes(server):
-    """A quota that is used up for a night needs no frequent requests."""
+    """A quota may be used up for a whole night, which needs no frequent requests."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -103,14 +103,14 @@ def test_the_pauses_grow_to_five_minutes(server):
 
 
 def look_at(hindrances, number):
-    """Return the known events of a Job without a pod, which belongs to one of many TrainingJobs."""
+    """Return the known events of a Job without a pod; each number is another TrainingJob."""
     name, uid = f"job-{number}", f"u{number}"
     raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
     return hindrances.of(("robots", name), f"job-{uid}", [raw], [])
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
-    """No namespace can exceed this; a reconcile before its turn sends no request."""
+    """The limit holds for all namespaces together. A reconcile before its turn sends no request."""
     hindrances = PodEvents(server, lambda: server.now)
     due = {number: look_at(hindrances, number).again_s for number in range(1500)}
     looks = 0
@@ -131,7 +131,7 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
 
 
 def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
-    """Those that are remembered keep their place, so that each gets its events."""
+    """Jobs that are already in the cache keep their entry, so each of them gets its events."""
     hindrances = PodEvents(server, lambda: server.now)
     for number in range(REMEMBERED):
         look_at(hindrances, number)
@@ -146,7 +146,7 @@ def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
 
 
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
-    """The second pod may be refused although the first was not."""
+    """The API server may refuse the second pod although it accepted the first."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [pod("Failed")])
     server.now += PATIENCE_S
@@ -165,7 +165,7 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     ids=["no Job", "a pod", "suspended", "ended"],
 )
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
-    """If no Job lacks a pod, no events are read."""
+    """If every Job has its pod, the operator must not request events."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
@@ -175,7 +175,7 @@ def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
 
 
 def waiting_pod(**status):
-    """Return a pod that is scheduled to a node."""
+    """Return a pod that a node has, but that has not started."""
     return {
         "metadata": {"uid": "u", "namespace": "robots"},
         "spec": {"nodeName": "node-1"},
@@ -184,7 +184,7 @@ def waiting_pod(**status):
 
 
 def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
-    """The operator waits some seconds first, as for a Job: most volumes are mounted at once."""
+    """Most volumes are mounted at once, so the operator waits some seconds before it requests events."""
     server.about = "type=Warning"
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [], [waiting_pod()])
@@ -206,7 +206,7 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     ids=["no node", "runs", "pulls images", "deleted"],
 )
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
-    """The pod's own status has the reason."""
+    """The status of this pod already has the reason."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S
@@ -216,7 +216,7 @@ def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
 
 
 def test_a_job_that_is_made_again_is_asked_about_anew(server):
-    """The events of the earlier job do not count, even if a test or a backup reuses the old uid."""
+    """The events of the earlier job do not apply, even if a restored backup has its old uid."""
     hindrances = PodEvents(server, lambda: server.now)
     hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
@@ -226,7 +226,7 @@ def test_a_job_that_is_made_again_is_asked_about_anew(server):
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
-    """No watch reports to the operator that the name is free."""
+    """The operator does not watch foreign Jobs, so it must read them to see that the name is free."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")
@@ -239,7 +239,7 @@ def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
 
 
 def test_who_is_in_the_cache_is_no_stranger(server):
-    """The object was the operator's own Job, which the cache did not have yet."""
+    """The Job belonged to the operator, but was not yet in its cache."""
     server.jobs["job-0"] = job()
     strangers = ForeignJobs(server, lambda: server.now)
     strangers.meet(KEY, UID, "job-0")
@@ -249,7 +249,7 @@ def test_who_is_in_the_cache_is_no_stranger(server):
 
 
 def ended(code, uid="p", created="2026-01-31T12:00:00Z", **status):
-    """Return a pod of the Job whose trainer ended with this exit code."""
+    """Return a pod of the Job whose trainer has ended with this exit code."""
     state = {"terminated": {"exitCode": code, "reason": "Error"}}
     raw = pod("Failed")
     raw["metadata"] |= {"uid": uid, "creationTimestamp": created}
@@ -259,14 +259,14 @@ def ended(code, uid="p", created="2026-01-31T12:00:00Z", **status):
 
 
 def asked_about(jobs, pods):
-    """Return the uids and selectors of the events that are requested."""
+    """Return the uid and the selector of each request for events."""
     hindrances = PodEvents(Server(), lambda: 0.0)
     return {*hindrances.of(KEY, UID, jobs, pods).facts, *hindrances.known(KEY, UID)}
 
 
 @pytest.mark.parametrize("code", [75, 137, 143])
 def test_the_signal_that_ended_the_newest_pod_is_asked_about(code):
-    """Only the kubelet's event reports that a probe failed."""
+    """Only the kubelet's event shows that a failed probe caused the signal."""
     older = ended(code, uid="older", created="2026-01-31T11:00:00Z")
 
     assert [each for each in asked_about([job()], [ended(code), older]) if each[1] == "reason=Killing"] == [
@@ -281,5 +281,5 @@ TAKEN = [{"type": "DisruptionTarget", "status": "True", "reason": "Preempted"}]
     ("code", "status"), [(1, {}), (75, {"reason": "Evicted"}), (75, {"conditions": TAKEN})]
 )
 def test_an_end_that_the_pod_explains_is_not_asked_about(code, status):
-    """Each request costs the API server a list of events."""
+    """For each request the API server must list events, so the operator avoids needless ones."""
     assert not [each for each in asked_about([job()], [ended(code, **status)]) if each[0] == "p"]

@@ -1,4 +1,4 @@
-"""The schedule of polls: slow pods take slots only from each other."""
+"""The schedule of polls: pods that respond slowly do not delay the others."""
 
 import heapq
 from collections import defaultdict
@@ -10,7 +10,7 @@ PERIOD_S, PROMPT_S, DEADLINE_S = 10.0, 1.0, 3.0
 
 
 def targets(count, *, namespace="robots", name="answers"):
-    """Return some trainers of one job."""
+    """Return poll targets that are trainers of one job."""
     return [
         PollTarget(key=(namespace, name), uid=f"{namespace}-{name}-{index}", host="10.0.0.1", port=1)
         for index in range(count)
@@ -18,7 +18,7 @@ def targets(count, *, namespace="robots", name="answers"):
 
 
 def simulated(followed, *, until_s, seconds=0.01):
-    """Return the times of the polls by uid.
+    """Return the times of the polls, by uid.
 
     A pod of the job `silent` does not respond before the deadline.
     """
@@ -41,7 +41,7 @@ def simulated(followed, *, until_s, seconds=0.01):
 
 
 def test_each_trainer_is_asked_every_period():
-    """This holds for a thousand trainers, from the first second on."""
+    """The period must hold for a thousand trainers, from the start on."""
     asked = simulated(targets(1000), until_s=60.0)
 
     assert len(asked) == 1000
@@ -50,7 +50,7 @@ def test_each_trainer_is_asked_every_period():
 
 
 def test_silent_pods_do_not_delay_the_trainers_that_answer():
-    """The job has 640 silent pods in the same namespace; once they are known, they delay nobody."""
+    """A job has 640 silent pods in the same namespace; after their first poll they delay no other pod."""
     ten = targets(10)
 
     asked = simulated([*targets(640, name="silent"), *ten], until_s=200.0)
@@ -61,7 +61,7 @@ def test_silent_pods_do_not_delay_the_trainers_that_answer():
 
 
 def test_a_namespace_full_of_silent_pods_does_not_delay_the_first_question_to_others():
-    """After a restart no pod is known yet, so the namespaces take turns."""
+    """After a restart the operator does not know yet which pods are silent, so namespaces take turns."""
     ten = targets(10)
 
     asked = simulated([*targets(640, namespace="theirs", name="silent"), *ten], until_s=5.0)
@@ -70,7 +70,7 @@ def test_a_namespace_full_of_silent_pods_does_not_delay_the_first_question_to_ot
 
 
 def test_a_silent_pod_is_asked_again():
-    """A node's network may fail for an hour and return."""
+    """The network of a node may fail for an hour and then work again."""
     silent = targets(1, name="silent")
 
     asked = simulated(silent, until_s=60.0)
@@ -79,7 +79,7 @@ def test_a_silent_pod_is_asked_again():
 
 
 def test_no_more_are_asked_at_once_than_there_are_places():
-    """Each pod may send 64 KiB."""
+    """Each response may have 64 KiB, so the number of parallel polls must be limited."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1000), 0.0)
 
@@ -90,7 +90,7 @@ def test_no_more_are_asked_at_once_than_there_are_places():
 
 
 def test_the_answer_of_a_pod_that_went_meanwhile_is_not_used():
-    """Its slot still becomes free again."""
+    """The pod is deleted during its poll; its slot must become free, and its response is ignored."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 0.0)
     schedule.follow(targets(1), 0.0)
     (entry,) = schedule.due(0.0)
@@ -103,7 +103,7 @@ def test_the_answer_of_a_pod_that_went_meanwhile_is_not_used():
 
 
 def test_what_is_kept_of_pods_that_went_is_bounded():
-    """A hundred thousand pods come and go in the life of an operator."""
+    """An operator sees a hundred thousand pods come and go, and must not keep memory for each."""
     schedule = PollSchedule(PERIOD_S, PROMPT_S, lambda: 1.0)
 
     for second in range(100):

@@ -1,4 +1,4 @@
-"""Pods are polled as trainers according to the events about them."""
+"""The operator derives the pods that it polls from the watch events of TrainingJobs, Jobs and pods."""
 
 import pytest
 
@@ -15,14 +15,14 @@ def named(name, uid, owner=None, **more):
 
 
 def pod(state="running", address="10.1.2.3", owner="job-uid", **metadata):
-    """Return a pod whose trainer's container is in a state."""
+    """Return a pod whose trainer container is in this state."""
     status = {"podIP": address, "containerStatuses": [{"name": "trainer", "state": {state: {}}}]}
     return named("job-r0-x", "pod-uid", owner, status=status, metadata=metadata)
 
 
 @pytest.fixture
 def trainers():
-    """Return the known objects of one TrainingJob with one Job."""
+    """Return poll targets that know one TrainingJob and its Job."""
     known = PollTargets()
     known.training_job(named("job", "tj-uid"), exists=True)
     known.job(named("job-r0", "job-uid", "tj-uid"), exists=True)
@@ -30,7 +30,7 @@ def trainers():
 
 
 def test_a_pod_whose_trainer_runs_is_asked(trainers):
-    """The poll goes to the pod's address, for the job that the pod belongs to."""
+    """The operator polls the address of the pod, and uses the response for the pod's job."""
     trainers.pod(pod(), exists=True)
 
     (target,) = trainers.targets()
@@ -64,7 +64,7 @@ def test_a_pod_whose_trainer_runs_is_asked(trainers):
     ],
 )
 def test_any_other_pod_is_not_asked(trainers, other):
-    """Any user can set a label, and an address that is a name would have to be resolved."""
+    """Any user can set a label on a pod; an address that is a host name would need a DNS lookup."""
     trainers.pod(pod(), exists=True)
     trainers.pod(other, exists=True)
 
@@ -72,7 +72,7 @@ def test_any_other_pod_is_not_asked(trainers, other):
 
 
 def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
-    """TrainingJob, Job and pod may be deleted in any order."""
+    """The TrainingJob, the Job and the pod may be deleted in any order."""
     trainers.pod(pod(), exists=True)
 
     trainers.job(named("job-r0", "job-uid", "tj-uid"), exists=False)
@@ -87,7 +87,7 @@ def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
 
 
 def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(trainers):
-    """Otherwise a user who may create Jobs could make the operator poll a thousand pods."""
+    """A user who may create Jobs must not be able to make the operator poll a thousand pods."""
     trainers.job(named("job-r0", "job-uid", "stranger"), exists=True)
     trainers.pod(pod(), exists=True)
 
@@ -95,7 +95,7 @@ def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(traine
 
 
 def test_an_address_of_ipv6_is_one(trainers):
-    """Clusters may use IPv6."""
+    """Pods in an IPv6 cluster must be polled too."""
     trainers.pod(pod(address="fd00::1"), exists=True)
 
     assert [each.host for each in trainers.targets()] == ["fd00::1"]

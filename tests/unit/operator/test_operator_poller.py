@@ -1,4 +1,4 @@
-"""Pods are not trusted: a poller limits the size and the time of their responses."""
+"""The poller does not trust pods: it limits the size and the duration of their responses."""
 
 import json
 import socketserver
@@ -20,7 +20,7 @@ WAIT_S = 60.0
 
 
 class Trainer(socketserver.ThreadingTCPServer):
-    """A server that sends the same bytes on every connection, and then waits until `silent` is set."""
+    """A server that sends the same bytes on every connection and then waits until `silent` is set."""
 
     daemon_threads = True
     block_on_close = False
@@ -33,19 +33,19 @@ class Trainer(socketserver.ThreadingTCPServer):
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
 
     def target(self, uid="pod", key=JOB):
-        """Return the server as a poll target."""
+        """Return a poll target with the address of this server."""
         return PollTarget(key=key, uid=uid, host="127.0.0.1", port=self.server_address[1])
 
     def asked(self, count):
-        """Wait for `count` further polls to end; the start of the next poll shows that the last has ended."""
+        """Wait until `count` further polls have ended; a poll has ended when the next one starts."""
         while self.questions.acquire(blocking=False):
-            pass  # polled before this call, which a busy machine delayed
+            pass  # ignore polls from before this call, which a busy machine may delay
         for _ in range(count + 1):
             assert self.questions.acquire(timeout=WAIT_S)
 
 
 class Answering(socketserver.BaseRequestHandler):
-    """Handle one connection."""
+    """The handler of one connection to `Trainer`."""
 
     def handle(self):
         """Send the response."""
@@ -61,7 +61,7 @@ class Answering(socketserver.BaseRequestHandler):
 
 @contextmanager
 def trainer(answer, silent=None):
-    """Serve one response."""
+    """Yield a server that sends one response."""
     server = Trainer(answer, silent)
     try:
         yield server
@@ -107,7 +107,7 @@ def test_a_running_trainer_says_where_it_stands():
     ids=["nothing", "another protocol", "redirect", "endless head", "list", "deep", "negative", "endless"],
 )
 def test_what_is_no_answer_is_unknown(answer):
-    """There is no exception and no guess, and no redirect is followed."""
+    """The poller raises no exception, guesses no values and follows no redirect."""
     with trainer(answer) as pod, polling(pod.target()) as poller:
         pod.asked(2)
 
@@ -115,7 +115,7 @@ def test_what_is_no_answer_is_unknown(answer):
 
 
 def test_a_trainer_that_drips_does_not_hold_the_others_up():
-    """The deadline holds for the whole response, not for the next byte."""
+    """The deadline applies to the whole response, not to each byte."""
     silent = threading.Event()
     with (
         trainer(OK + BODY[:20], silent) as slow,
@@ -128,9 +128,9 @@ def test_a_trainer_that_drips_does_not_hold_the_others_up():
 
 
 def test_silent_pods_delay_nobody():
-    """There are 640 of them.
+    """640 pods do not respond.
 
-    Each of ten other pods is polled every period, and its response is used at once.
+    The poller still polls ten other pods in every period and uses their responses at once.
     """
     silent, quick = threading.Event(), [trainer(OK + BODY) for _ in range(10)]
     with ExitStack() as stack:
@@ -146,7 +146,7 @@ def test_silent_pods_delay_nobody():
 
 
 def test_who_stops_answering_becomes_unknown_again():
-    """An old response does not show that the trainer lives; only the trainer itself reports a stall."""
+    """An old response does not prove that the trainer still runs; only the trainer can report a stall."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         before = set(poller.known())
@@ -157,7 +157,7 @@ def test_who_stops_answering_becomes_unknown_again():
 
 
 def test_what_a_pod_said_is_forgotten_with_it():
-    """The uid of a deleted pod never returns, and memory is finite."""
+    """The uid of a deleted pod never returns, so its response would use memory for nothing."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         poller.changed.clear()
@@ -168,7 +168,7 @@ def test_what_a_pod_said_is_forgotten_with_it():
 
 
 def test_an_answer_that_nobody_foresaw_ends_no_other_question(monkeypatch):
-    """The bytes of one pod must not end the thread, and with it the operator for everybody."""
+    """One pod's response must not end the thread, and with it the operator for all users."""
     read = TrainerStatus.from_json
     monkeypatch.setattr(TrainerStatus, "from_json", lambda body: read(body) if body["step"] != 8 else 1 // 0)
     with (
@@ -183,7 +183,7 @@ def test_an_answer_that_nobody_foresaw_ends_no_other_question(monkeypatch):
 
 
 def test_a_pod_that_lies_for_ever_is_logged_once():
-    """A thousand such pods would fill the log that everybody reads."""
+    """With a line for each poll, a thousand such pods would fill the operator's log."""
     with trainer(OK + b"[]") as pod, capture_logs() as logs, polling(pod.target()):
         pod.asked(5)
 
@@ -191,7 +191,7 @@ def test_a_pod_that_lies_for_ever_is_logged_once():
 
 
 def test_a_job_is_looked_at_when_its_trainer_says_something_new_only():
-    """A hundred idle trainers cause no work, although their ages grow."""
+    """The ages in a response always grow; without progress they must not cause a reconcile."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         assert poller.changed.wait(WAIT_S)
         poller.changed.clear()

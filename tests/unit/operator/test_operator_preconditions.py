@@ -1,4 +1,4 @@
-"""Decisions from an outdated cache are not carried out: a read and preconditions detect them."""
+"""The operator does not execute a decision from an outdated cache, which a read and preconditions reveal."""
 
 import pytest
 
@@ -17,14 +17,14 @@ STOP = Stop(job="job-0", replica=0, reason=Reason.STALLED, message="it", basis=B
 
 
 def a_pod(uid="pod-1", version="30", owner="job-uid", replica="0"):
-    """Return a pod of the replica as it is in the cluster."""
+    """Return a pod of the replica as the API server has it."""
     labels = {"palaestra.dev/job": "job", "palaestra.dev/job-uid": "u", "palaestra.dev/replica": replica}
     metadata = {"name": uid, "uid": uid, "resourceVersion": version, "labels": labels}
     return {"metadata": {**metadata, "ownerReferences": [{"uid": owner}]}, "status": {"phase": "Running"}}
 
 
 class Server:
-    """An API server with one TrainingJob and its pods, which records the writes."""
+    """An API server with one TrainingJob and its pods; it records the writes."""
 
     def __init__(self, version="7", pods=(), *, conflict=False):
         self.version, self.pods, self.conflict = version, pods, conflict
@@ -39,11 +39,11 @@ class Server:
         return list(self.pods)
 
     def merge(self, *arguments, **preconditions):
-        """Take or refuse a patch."""
+        """Accept or refuse a patch."""
         self._write("patch", arguments[2:], preconditions)
 
     def delete(self, *arguments, **preconditions):
-        """Take or refuse a deletion."""
+        """Accept or refuse a deletion."""
         self._write("delete", arguments[2:], preconditions)
 
     def _write(self, verb, arguments, preconditions):
@@ -53,7 +53,7 @@ class Server:
 
 
 def carry_out(api, *actions):
-    """Carry out actions, and return whether they were done."""
+    """Execute actions, and return whether all of them were executed."""
     try:
         Executor(api, FencedClient(api, lambda: True), ForeignJobs(api), RejectedCreations()).carry_out(
             RAW, actions
@@ -81,7 +81,7 @@ def carry_out(api, *actions):
     ],
 )  # fmt: skip
 def test_a_replica_is_stopped_only_if_all_is_as_it_was_when_that_was_decided(there, done):
-    """A watch that hangs for 90 s must not end a pod that has started in the meantime."""
+    """If a watch hangs for 90 s, the operator must not stop a pod that has started since."""
     api = Server(**there)
 
     assert carry_out(api, STOP) is done
@@ -89,7 +89,7 @@ def test_a_replica_is_stopped_only_if_all_is_as_it_was_when_that_was_decided(the
 
 
 def test_a_job_is_changed_only_in_the_version_that_was_decided_about():
-    """Between the read and the patch the job may be resumed, or created again under its name."""
+    """Between the read and the patch, another program may resume the Job or create it again."""
     api = Server(pods=[a_pod()])
 
     carry_out(api, STOP)
@@ -110,7 +110,7 @@ def test_a_job_is_changed_only_in_the_version_that_was_decided_about():
     ids=["a TrainingJob whose time to live is over", "a suspended Job"],
 )
 def test_a_deletion_is_of_one_version(action, expected):
-    """Until the last moment a person may change the time to live, and a queue may admit the Job."""
+    """Until the deletion a user may change the time to live, and a queue may admit the Job."""
     api, late, refusing = Server(), Server(version="8"), Server(conflict=True)
 
     assert carry_out(api, action)

@@ -1,4 +1,4 @@
-"""The operator keeps times on its monotonic clock, and only as long as it leads."""
+"""The operator measures waits with its monotonic clock, and keeps them only while it leads."""
 
 from datetime import UTC, datetime
 
@@ -14,14 +14,14 @@ WAITS = ReconcileRecord(waits={(0, "trainer", "uid"): 5.0})
 
 
 class Notes:
-    """A writer and a recorder that keep the patches."""
+    """A fake client and event recorder that keeps the patches."""
 
     def __init__(self):
         self.patches = []
         self.prunes = False
 
     def status(self, job, patch):
-        """Keep a patch of the status, and return the stored job. It is unchanged if everything was pruned."""
+        """Keep a patch of the status and return the stored job, which is unchanged if `prunes` is set."""
         self.patches.append(patch)
         version = job["metadata"]["resourceVersion"] if self.prunes else str(len(self.patches) + 1)
         return {"metadata": {"resourceVersion": version}}
@@ -29,13 +29,16 @@ class Notes:
 
 @pytest.fixture
 def notes():
-    """Return the object that keeps the patches."""
+    """Return the fake client."""
     return Notes()
 
 
 @pytest.fixture
 def tell(notes, monkeypatch):
-    """`tell(step=11, clock_s=30)` reports a step, and returns the seconds until it is written."""
+    """`tell(step=11, clock_s=30)` reports a step, and returns the seconds until the next write.
+
+    None if it wrote.
+    """
     reporting = StatusWriter(notes, None, lambda *_: None, lambda _, status: status)
     raw = {"metadata": {"namespace": "default", "name": "job", "resourceVersion": "1"}, "status": OLD}
 
@@ -48,7 +51,7 @@ def tell(notes, monkeypatch):
 
 
 def test_progress_is_held_back_by_the_monotonic_clock(tell, notes):
-    """If a wall clock were set back by an hour, no progress would be written for an hour."""
+    """If somebody set a wall clock back by an hour, the operator would write no progress for an hour."""
     assert tell(11, 100.0) is None
     assert tell(12, 120.0) == 10
     assert tell(13, 130.0) is None
@@ -56,7 +59,7 @@ def test_progress_is_held_back_by_the_monotonic_clock(tell, notes):
 
 
 def test_a_status_that_the_api_server_prunes_is_sent_once(tell, notes):
-    """An older definition drops unknown fields, so each reconcile would send the same patch again."""
+    """An older definition makes the API server drop fields, so each reconcile would send them again."""
     notes.prunes = True
 
     assert [tell(11, clock_s) for clock_s in (100.0, 200.0, 300.0)] == [None, None, None]
@@ -64,7 +67,7 @@ def test_a_status_that_the_api_server_prunes_is_sent_once(tell, notes):
 
 
 def test_a_job_that_is_made_again_begins_every_wait_anew():
-    """Its replicas have the same numbers as the earlier ones."""
+    """The replicas of the new job have the same numbers as those of the earlier job."""
     records = ReconcileRecords()
     records.keep(KEY, "first", WAITS)
 
@@ -73,7 +76,7 @@ def test_a_job_that_is_made_again_begins_every_wait_anew():
 
 
 def test_nothing_is_remembered_of_the_time_before_this_operator_led():
-    """An awaited change may have come and gone while another operator led."""
+    """While another operator led, the awaited change may have happened and been undone."""
     records = ReconcileRecords()
     records.keep(KEY, "first", WAITS)
 
@@ -83,7 +86,7 @@ def test_nothing_is_remembered_of_the_time_before_this_operator_led():
 
 
 def test_the_clock_of_waits_is_not_the_wall():
-    """Nobody can set that clock; a timestamp has a time zone."""
+    """Nobody can set the monotonic clock. Timestamps come from the wall clock and have a time zone."""
     times = now(WAITS)
 
     assert times.record == WAITS

@@ -1,4 +1,4 @@
-"""A refusal is remembered until the request succeeds; errors that pass by themselves are ignored."""
+"""The operator remembers a refusal until the request succeeds, and ignores temporary errors."""
 
 import pytest
 
@@ -22,7 +22,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
     ],
 )
 def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(error):
-    """The refusal is kept by replica, with the message of the API server or the webhook."""
+    """The status of the replica quotes the message of the API server or the webhook."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})
@@ -41,7 +41,7 @@ def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(e
     ],
 )
 def test_what_passes_by_itself_changes_nothing(error):
-    """Such an error is not reported, and does not replace an earlier one."""
+    """A temporary error is not shown to the user, and does not replace an earlier refusal."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {1: error})
@@ -53,7 +53,7 @@ def test_what_passes_by_itself_changes_nothing(error):
 
 
 def test_words_are_kept_as_long_as_the_status_shows_them():
-    """A webhook may send a whole page, and four thousand of them would fill memory that nobody reads."""
+    """A webhook may send a whole page, of which the status shows only the beginning."""
     denials = RejectedCreations()
 
     denials.learn(KEY, UID, {0: Forbidden(403, "Forbidden", "no " * 100_000)})

@@ -1,4 +1,4 @@
-"""The fields of this release's definition that a served one lacks; additional fields are allowed."""
+"""The fields of this release's definition that the cluster's definition lacks; extra fields are allowed."""
 
 import copy
 
@@ -11,14 +11,14 @@ OURS = schema()
 
 
 def changed(change):
-    """Return the missing fields of a definition with this change."""
+    """Return the fields that the definition lacks after this change."""
     served = copy.deepcopy(OURS)
     change(served["properties"]["status"]["properties"])
     return list(lacks(served, OURS))
 
 
 def test_this_release_s_own_definition_lacks_nothing():
-    """The definition of this release is complete."""
+    """The comparison must not report a difference between equal definitions."""
     assert list(lacks(OURS, OURS)) == []
 
 
@@ -38,12 +38,12 @@ def test_this_release_s_own_definition_lacks_nothing():
     ],
 )
 def test_what_an_older_definition_lacks_is_named_with_its_path(change, fact):
-    """The API server drops such a field, or refuses the status."""
+    """The API server drops such a field or refuses the whole status, so an administrator must know it."""
     assert changed(change) == [fact]
 
 
 def test_a_map_of_another_type_is_named():
-    """The comparison includes the items of maps and lists."""
+    """The comparison also covers the values of maps and the items of lists."""
     served = {"type": "object", "additionalProperties": {"type": "string"}}
     ours = {"type": "object", "additionalProperties": {"type": "integer"}}
 
@@ -51,5 +51,5 @@ def test_a_map_of_another_type_is_named():
 
 
 def test_what_a_newer_definition_has_besides_is_no_lack():
-    """An administrator upgrades the definition before the operators."""
+    """An administrator upgrades the definition before the operator."""
     assert changed(lambda status: status.update(ofTomorrow={"type": "string"})) == []

@@ -1,4 +1,4 @@
-"""The metric of waiting replicas, with their reasons."""
+"""The metric of replicas that wait, by the reason of the wait."""
 
 import pytest
 
@@ -8,12 +8,12 @@ from palaestra.operator.caches import waits
 
 
 def status(*replicas):
-    """Return a TrainingJob whose replicas have these states."""
+    """Return a TrainingJob whose status has these replicas."""
     return {"status": {"replicas": list(replicas)}}
 
 
 def test_each_replica_that_waits_counts_with_its_reason():
-    """Replicas of one job may wait for different reasons."""
+    """The replicas of one job may wait for different reasons."""
     job = status(
         {"phase": "Pending", "reason": "ImagePull"},
         {"phase": "Pending", "reason": "Unschedulable"},
@@ -39,15 +39,15 @@ def test_each_replica_that_waits_counts_with_its_reason():
     ids=["trains", "mends", "ended", "queued", "starts", "list", "empty", "text"],
 )
 def test_no_other_replica_counts(replica):
-    """A queue is not a problem, and a replica that trains or has ended waits for nothing."""
+    """To wait in a queue is not a problem; a replica that trains or has ended does not wait."""
     assert waits(status(replica)) == ()
 
 
 def test_a_job_without_a_status_has_no_replica_that_waits():
-    """No operator has reconciled it yet."""
+    """No operator has reconciled this job yet."""
     assert waits({}) == ()
 
 
 def test_every_reason_to_wait_is_a_warning():
-    """An alert counts these reasons, and each has a remedy in the table of reasons."""
+    """An alert counts these reasons, and its reader needs a remedy for each."""
     assert all(ROWS[reason].warning and ROWS[reason].remedy for reason in WAITING)

@@ -1,4 +1,4 @@
-"""Workers: the effect of a failed reconcile on its key and on the others."""
+"""A failed reconcile is retried, and does not delay the reconciles of other keys."""
 
 import threading
 
@@ -27,7 +27,7 @@ MODIFIED = 'Operation cannot be fulfilled on jobs.batch "bad-0": the object has 
 
 
 class Desk:
-    """One worker of a queue with short retries, and its metrics."""
+    """One worker, a queue with short retries, and the worker's metrics."""
 
     def __init__(self, reconcile):
         self.queue = WorkQueue(again=Backoff(first_s=0.01, cap_s=0.01))
@@ -38,13 +38,13 @@ class Desk:
         self.workers.start()
 
     def counted(self, result):
-        """Return the number of reconciles with that result."""
+        """Return the number of reconciles with this result."""
         return self.registry.get_sample_value("seconds_count", {"result": result}) or 0
 
 
 @pytest.fixture
 def desk():
-    """Return a function that opens a desk; it is closed afterwards."""
+    """Return a function that starts a desk, which ends with the test."""
     desks = []
 
     def begin(reconcile, *, opened=True):
@@ -67,7 +67,7 @@ def desk():
     ],
 )
 def test_a_bad_key_delays_no_other(trouble, result, desk):
-    """Even a single worker survives, and takes the next key."""
+    """The only worker survives the error and takes the next key."""
     done = threading.Event()
 
     def reconcile(key):
@@ -85,7 +85,7 @@ def test_a_bad_key_delays_no_other(trouble, result, desk):
 
 
 def test_a_key_that_failed_is_tried_again(desk):
-    """The cause may have passed."""
+    """The cause of the failure may be temporary."""
     tries = threading.Semaphore(0)
 
     def reconcile(key):
@@ -99,7 +99,7 @@ def test_a_key_that_failed_is_tried_again(desk):
 
 
 def test_a_key_is_looked_at_again_when_time_may_have_changed_something(desk):
-    """A deadline passes without any write."""
+    """A deadline passes without a change of any object, so no watch event causes a reconcile."""
     looks = threading.Semaphore(0)
 
     def reconcile(key):
@@ -113,7 +113,7 @@ def test_a_key_is_looked_at_again_when_time_may_have_changed_something(desk):
 
 
 def test_nothing_is_begun_while_another_leads(desk):
-    """The key waits and is not lost."""
+    """The key stays in the queue until this operator leads."""
     done = threading.Event()
     at_work = desk(lambda _: done.set(), opened=False)
     at_work.queue.add(GOOD)
@@ -125,7 +125,7 @@ def test_nothing_is_begun_while_another_leads(desk):
 
 
 def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
-    """A single conflict is harmless; a job that keeps failing must be logged, but not fill the log."""
+    """One conflict is harmless. A job that always fails must be logged, but must not fill the log."""
     tries = threading.Semaphore(0)
 
     def reconcile(key):
@@ -144,14 +144,14 @@ def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
 
 
 class Refusing:
-    """An API server in which somebody else always writes first."""
+    """An API server in which another program always writes first."""
 
     def get(self, *_):
-        """Return the TrainingJob as it was decided on."""
+        """Return the TrainingJob in the version of the decision."""
         return RAW
 
     def list(self, *_, **__):
-        """Return no pod."""
+        """Return an empty list of pods."""
         return []
 
     def merge(self, *_, **__):
@@ -172,7 +172,7 @@ class Refusing:
     ids=["stop", "suspend", "mark", "evict"],
 )
 def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_words(action, desk):
-    """A replica past its deadline that cannot be stopped must not silently train on."""
+    """Without the log line, a replica would train past its deadline and nobody would see the cause."""
     api = Refusing()
     acting = Executor(api, FencedClient(api, lambda: 1), None, RejectedCreations())
     tries = threading.Semaphore(0)
@@ -186,6 +186,6 @@ def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_
         assert all(tries.acquire(timeout=WAIT_S) for _ in range(10))
 
     repeated = [line for line in lines if line["event"] == "conflict repeats"]
-    # The operator continues to retry.
+    # The operator still retries the action.
     assert [(line["job"], line["times"]) for line in repeated[:2]] == [(BAD, 4), (BAD, 8)]
     assert MODIFIED in repeated[0]["error"]

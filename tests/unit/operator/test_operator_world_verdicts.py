@@ -1,4 +1,4 @@
-"""Worlds are checked for one job of a namespace at a time, and no worker waits for a check."""
+"""In each namespace the worlds of one job at a time are checked, and no worker waits for a check."""
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,12 +17,12 @@ EVIL, GOOD = ("evil", "a"), ("good", "a")
 
 
 def world(text: bytes = ROBOT, size: int = 0) -> GivenWorld:
-    """Return a world with a comment that gives it a size."""
+    """Return a world with a comment of the given size."""
     return GivenWorld(field="spec.simulators[0].world.inline", source=HEADER + text + b"\n#" + b"-" * size)
 
 
 def large(number: int = 0) -> GivenWorld:
-    """Return a world that is too large for a worker to check itself."""
+    """Return a world that is too large to be checked in a worker's thread."""
     return world(ROBOT + b"# %d" % number, MOST_BYTES_HERE)
 
 
@@ -34,7 +34,7 @@ class Begin(Protocol):
 
 
 class Slow:
-    """A process that checks worlds as soon as the test allows it."""
+    """A fake process that finishes each check only when the test allows it."""
 
     def __init__(self) -> None:
         self.may_end = threading.Semaphore(0)
@@ -43,7 +43,7 @@ class Slow:
         self.comes_to_nothing = False
 
     def check(self, worlds: Sequence[GivenWorld]) -> Mapping[str, WorldVerdict]:
-        """Return a verdict that all worlds are valid, or nothing."""
+        """Return the verdict that all worlds are valid, or no verdict."""
         self.asked += [each.source for each in worlds]
         assert self.may_end.acquire(timeout=60)
         return {} if self.comes_to_nothing else {each.digest: WorldVerdict() for each in worlds}
@@ -51,7 +51,7 @@ class Slow:
 
 @pytest.fixture
 def slow() -> Iterator[Slow]:
-    """Return a process whose checks end with the test at the latest."""
+    """Yield a fake process whose checks end with the test at the latest."""
     process = Slow()
     yield process
     process.may_end.release(100)
@@ -61,7 +61,7 @@ def slow() -> Iterator[Slow]:
 def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Begin]:
     """Return a function that starts a checker.
 
-    It ends with the test, and no turn ends early on a busy machine.
+    The checker ends with the test; a long limit keeps a turn from ending early on a busy machine.
     """
     monkeypatch.setattr("palaestra.operator.world_verdicts.HANDED_S", 60.0)
     begun: list[WorldChecker] = []
@@ -77,7 +77,7 @@ def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Begin]:
 
 
 def hand_over(checking: WorldChecker, slow: Slow, key: tuple[str, str], worlds: Sequence[GivenWorld]) -> None:
-    """Request verdicts, and again when the job is queued to hand its worlds over."""
+    """Request the verdicts of a job, and request them again when the checker has queued the job."""
     woken = slow.woken.count(key)
     assert checking.verdicts(key, worlds) == {}
     eventually(lambda: slow.woken.count(key) > woken)
@@ -85,7 +85,7 @@ def hand_over(checking: WorldChecker, slow: Slow, key: tuple[str, str], worlds: 
 
 
 def test_a_small_world_is_checked_at_once(begin: Begin, slow: Slow) -> None:
-    """The start of a process takes longer than such a check."""
+    """To start a process takes longer than the check of a small world."""
     checking = begin(slow)
     fine, wrong = world(), world(b"A{}")
 
@@ -97,14 +97,14 @@ def test_a_small_world_is_checked_at_once(begin: Begin, slow: Slow) -> None:
 
 
 def test_many_small_worlds_of_a_job_are_not(begin: Begin, slow: Slow) -> None:
-    """The limit is one for the whole job, which may have 32 worlds."""
+    """The size limit applies to all worlds of a job, which may have 32."""
     worlds = [world(ROBOT + b"# %d" % number, MOST_BYTES_HERE // 2) for number in range(3)]
 
     assert begin(slow).verdicts(EVIL, worlds) == {}
 
 
 def test_a_verdict_queues_the_job_and_is_remembered(begin: Begin, slow: Slow) -> None:
-    """The next reconcile plans the job, and later ones cost nothing."""
+    """The next reconcile plans the job, and later reconciles need no check."""
     checking, given = begin(slow), large()
     hand_over(checking, slow, EVIL, [given])
     assert checking.waits(EVIL)
@@ -118,7 +118,7 @@ def test_a_verdict_queues_the_job_and_is_remembered(begin: Begin, slow: Slow) ->
 
 
 def test_one_namespace_does_not_keep_another_waiting(begin: Begin, slow: Slow) -> None:
-    """Its jobs wait for each other, however many there are."""
+    """Thirty jobs of one namespace wait for each other, and the other namespace gets its turn."""
     checking = begin(slow)
     hand_over(checking, slow, EVIL, [large(0)])
     for number in range(1, 30):
@@ -132,7 +132,7 @@ def test_one_namespace_does_not_keep_another_waiting(begin: Begin, slow: Slow) -
 
 
 def test_namespaces_take_turns() -> None:
-    """If namespaces outnumber the parallel checks, none gets a second turn before the others had one."""
+    """With more namespaces than parallel checks, each must get its first turn before any gets a second."""
     turns = FairQueue()
     for key in [("a", "1"), ("a", "2"), ("b", "1"), ("b", "2"), ("c", "1")]:
         turns.hand_over(key, [large()])
@@ -148,7 +148,7 @@ def test_namespaces_take_turns() -> None:
 
 
 def test_a_job_that_is_gone_gives_its_turn_up(begin: Begin, slow: Slow) -> None:
-    """Otherwise the next job of its namespace would wait for worlds that never come."""
+    """A deleted job never hands its worlds over, so the next job of its namespace would wait for ever."""
     checking = begin(slow)
     checking.verdicts(EVIL, [large()])
     eventually(lambda: slow.woken == [EVIL])
@@ -160,7 +160,7 @@ def test_a_job_that_is_gone_gives_its_turn_up(begin: Begin, slow: Slow) -> None:
 
 
 def test_a_job_that_is_gone_leaves_the_line(begin: Begin, slow: Slow) -> None:
-    """Nothing about it is kept."""
+    """The checker must not keep data of a deleted job."""
     checking = begin(slow)
     hand_over(checking, slow, EVIL, [large()])
     checking.verdicts(("evil", "b"), [large(1)])
@@ -173,7 +173,7 @@ def test_a_job_that_is_gone_leaves_the_line(begin: Begin, slow: Slow) -> None:
 def test_a_check_without_a_verdict_is_tried_again(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A node without time or memory proves nothing about a world."""
+    """A check may fail because the node lacks time or memory, although the world is valid."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.PAUSE_S", 0.0)
     checking, slow.comes_to_nothing = begin(slow), True
     hand_over(checking, slow, EVIL, [large()])
@@ -190,7 +190,7 @@ def test_a_check_without_a_verdict_is_tried_again(
 def test_so_many_verdicts_are_remembered_and_no_more(
     begin: Begin, slow: Slow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An author may change a ConfigMap any number of times."""
+    """A user may change a ConfigMap any number of times, which must not fill the memory."""
     monkeypatch.setattr("palaestra.operator.world_verdicts.REMEMBERED", 1)
     checking = begin(slow)
     for given in (large(0), large(1)):
