@@ -1,4 +1,4 @@
-"""The controllerArgs of a robot that a simulator uses."""
+"""Read the controllerArgs of a robot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-# They let the controller step by itself or give the motors to other programs; our simulators do neither.
+# With the first argument the controller steps by itself; with the second, other programs control the motors.
+# Our simulators support neither.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
@@ -30,8 +31,8 @@ class ControllerArguments:
 def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
-    Both are required: without `--name` two robots collide, without `--synchronize` no client controls the
-    steps.
+    `--name` is required, because the topics of two robots without it would have the same names.
+    `--synchronize` is required, because without it no client controls the steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]

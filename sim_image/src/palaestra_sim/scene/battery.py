@@ -36,7 +36,7 @@ class Battery:
         return self._energy_j == 0.0
 
     def drain(self, duration_s: float) -> None:
-        """Subtract the energy that the robot consumes in that time."""
+        """Subtract the energy that the robot consumes in `duration_s`."""
         energy_j = self._energy_j
         if energy_j is not None:
             self._set(max(0.0, energy_j - self._power_w * duration_s))

@@ -61,7 +61,7 @@ class CameraInterface(Protocol):
         ...
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> Mapping[SceneNode, Corners]:
-        """Return the rectangle in which each owner is visible: the one around all its shapes.
+        """Return for each owner the rectangle around all its visible shapes.
 
         `owner` returns the node to which a shape belongs; None if the shape is not needed.
         """

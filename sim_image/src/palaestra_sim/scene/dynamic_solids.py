@@ -26,9 +26,9 @@ class DynamicFrame(Frame):
     Attributes:
         follow: returns the state to which the physics has moved it; None before a physics has a model.
         changed: the frames that the physics has to read; a frame that a client changed adds itself.
-        put: whether a client has set it since the physics last read it; the physics clears it.
-        speed: the linear and angular velocity that a client set, in the axes of the ground; the physics takes
-            them and sets None, which means no change.
+        put: whether a client has set this frame since the physics last read it; the physics clears the flag.
+        speed: the linear and angular velocity that a client set, in the axes of the ground; the physics uses
+            them and then sets None, which means no change.
     """
 
     moves = True

@@ -20,7 +20,7 @@ def parameters_of(node: SceneNode) -> SceneNode:
 
 
 def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint | None:
-    """Return the joint at `node`; None if it is refused. With `forces`, it has stops and resistance."""
+    """Return the joint at `node`, with stops and resistance if `forces`; None if its axis has length 0."""
     slides = node.type_name == "SliderJoint"
     parameters = parameters_of(node)
     along = reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0))

@@ -1,7 +1,7 @@
 """Links: parts that forces move on joints, and parts whose force on the robot is measured.
 
-A link is everything on the end of one joint, without the parts on further joints. It is mounted on another
-link, on a robot, on a dynamic solid, or on a fixed object.
+A link consists of all parts on the end of one joint, except the parts on further joints. It is mounted on
+another link, on a robot, on a dynamic solid, or on a fixed object.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Link:
 
     @property
     def start(self) -> Pose:
-        """Its frame in the outer frame, at the joint's position in the world file."""
+        """Its pose in the parent's frame, at the joint's position in the world file."""
         return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 

@@ -1,4 +1,4 @@
-"""Lookup tables: from the distance that a sensor detects to the value that it reports.
+"""Lookup tables, which map the distance that a sensor detects to the value that it reports.
 
 As in Webots, the response is linear between the rows and constant beyond both ends, with Gaussian noise as a
 fraction of the response.

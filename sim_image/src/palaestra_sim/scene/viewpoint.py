@@ -1,4 +1,4 @@
-"""The image of a whole world, as its Viewpoint shows it to people."""
+"""The image of a whole world from its Viewpoint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import NodeReader
 
-SIZE: Final = (800, 600)  # in Webots it is the size of the window
+SIZE: Final = (800, 600)  # Webots uses the size of its window instead
 
 
 def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> bool:

@@ -1,11 +1,12 @@
 """Find the PROTO files that belong to a world.
 
-A world names the file of each PROTO that it uses in an EXTERNPROTO line, and so does a PROTO file. An address
-with a scheme (https://, webots://) is a PROTO that Webots provides: its file is not read, and only its name
-is known. A relative address is relative to the folder of the file that names it.
+A world or a PROTO file has an EXTERNPROTO line with an address for each PROTO that it uses. An address with a
+scheme (https://, webots://) belongs to a PROTO that Webots provides. This module does not read the file of
+such a PROTO, and records only its name. A relative address is relative to the folder of the file with the
+line.
 
-Before R2022b there were no such lines: Webots found PROTOs by their names in the folder `protos/` of the
-world's project, and in its subfolders. Files of those releases are still handled so here.
+Files from before R2022b do not have such lines: Webots found PROTOs by their names in the folder `protos/` of
+the world's project, and in its subfolders. This module does the same for such files.
 
 A PROTO that cannot be used does not raise an error here, because the world may not need it: a stand-in may
 describe it, or its instances may be left out. Its error is in the result, for callers that need the PROTO.
@@ -33,7 +34,7 @@ List = Callable[[Path], Iterable[Path]]
 
 
 def _protos_below(folder: Path) -> list[Path]:
-    """Return the PROTO files in a folder and its subfolders, the least deep first."""
+    """Return the PROTO files in a folder and its subfolders, those with the shortest paths first."""
     return sorted(folder.rglob("*.proto"), key=lambda path: (len(path.parts), path))
 
 
@@ -41,9 +42,9 @@ def _protos_below(folder: Path) -> list[Path]:
 class Protos:
     """The PROTOs that a world and its PROTO files name, by type.
 
-    `local` were read from files. `remote` are the types whose addresses have a scheme. `refused` has the
-    errors of all other types: the file is missing, is not a PROTO, has a template, or names itself through
-    other files.
+    `local` has the PROTOs that were read from files. `remote` are the types whose addresses have a scheme.
+    `refused` has the errors of all other types: the file is missing, is not a PROTO, has a template, or names
+    itself through other files.
     """
 
     local: dict[str, Proto] = field(default_factory=dict)
@@ -99,7 +100,7 @@ class _Search:
         self._by_name: dict[str, Path] | None = None
 
     def follow(self, namer: _Namer) -> None:
-        """Add the PROTOs that a file names, and those that their files name."""
+        """Add the PROTOs that a file names, and all PROTOs that the files of these PROTOs name."""
         for token in namer.externs:
             address = unquoted(token)
             type_name = PurePosixPath(address).name.removesuffix(".proto")

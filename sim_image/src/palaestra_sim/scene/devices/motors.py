@@ -1,6 +1,6 @@
 """RotationalMotor and LinearMotor: every setter returns success, even if the motor ignores the value.
 
-Torques and forces require a motor that the physics moves by forces; for others the services fail.
+The services that set torques and forces fail, unless the physics moves the motor by forces.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _FIELDS: Final = """
 
 
 def _reader(limit: str) -> Callable[[DevicePart], Motor]:
-    """Return the function that reads a motor whose torque or force the field `limit` limits."""
+    """Return the function that reads a motor; its field `limit` has the largest torque or force."""
 
     def read(part: DevicePart) -> Motor:
         number = part.number
@@ -157,7 +157,7 @@ def _has_effort(motor: Motor) -> bool:
 
 
 def _switch(motor: Motor, effort: str) -> Handler:
-    """Return the service of a motor that moves with its whole torque or with none."""
+    """Return the service of a motor that moves with its full torque, or not at all."""
     done = {"success": True}
     most = motor.spec.max_torque_nm
 

@@ -15,7 +15,7 @@ from palaestra_sim.scene.old_axes import pointing
 
 
 class Packet(NamedTuple):
-    """A text; 1 / distance squared; and the unit vector to the emitter, in the receiver's frame."""
+    """A text, its strength (1 / distance squared), and the unit vector to the emitter in the own frame."""
 
     text: str
     strength: float
@@ -28,7 +28,7 @@ class Receiver:
 
     Attributes:
         listening: whether it is enabled; otherwise it receives nothing.
-        channel: on which it listens; -1 means all channels.
+        channel: the channel on which it listens; -1 means all channels.
         queue: the packets that arrived, the oldest first.
     """
 
@@ -52,7 +52,7 @@ class Receiver:
             self.queue.append(packet)
 
     def listen(self, period_ms: int) -> None:
-        """Listen from now on; with 0, stop and drop the queue."""
+        """Start to listen; if the period is 0, stop and drop the queue."""
         self.listening = period_ms > 0
         if not self.listening:
             self.queue.clear()

@@ -45,7 +45,7 @@ class Axes:
     """The response of a sensor with three axes.
 
     Attributes:
-        table: applied to each axis; None leaves the values unchanged.
+        table: the lookup table for each axis; None leaves the values unchanged.
         on: whether x, y and z are measured; if not, the value is NaN.
         resolution: the resolution of each value; -1 for exact values.
     """

@@ -1,7 +1,7 @@
 """The files that a model names: meshes, textures, parts of the model.
 
 MuJoCo opens every file that an attribute of a model names. A name is relative to the folder of the world, or
-to a folder that the model names. `project` has the folder that none of them may leave.
+to a folder that the model names. `project` refuses files outside of the model's project.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The files of a model on disk, and its project: the folder that holds them all.
 
-Models of a package share meshes, so a model may name files some folders above its own. The project is the
-nearest folder that holds all files that the model names, unless the user names a folder. It is never the
-whole file system, and no link may lead out of it: an untrusted model must not read files of the pod.
+Models of a package share meshes, so a model may name files in folders above its own. The project is the
+nearest folder that holds all files that the model names, unless the user names a folder. The project is never
+the whole file system, and no link may lead out of the project: an untrusted model must not read files of the
+pod.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _SMALLER: Final = "attach fewer models"
 
 
 class _Named(NamedTuple):
-    """An existing file, with the place that names it; `path` is relative to the folder of the world."""
+    """An existing file, and the element that names it; `path` is relative to the folder of the world."""
 
     source: Source
     element: Element
@@ -48,8 +49,8 @@ class Project:
 
     Args:
         world: path of the world.
-        description: its main file.
-        root: the folder that the user names; None for the nearest one that holds all files.
+        description: the description of its main file.
+        root: the folder that the user names; None for the nearest folder that holds all files.
 
     Attributes:
         roots: the elements of the included files that were read.
@@ -64,7 +65,7 @@ class Project:
         self._named: list[_Named] = []
 
     def open(self) -> None:
-        """Read all included files, and check the places of all files.
+        """Read all included files, and check that all files are inside the project.
 
         Raises:
             WorldError: an included file is wrong, or a file is outside of the project.
