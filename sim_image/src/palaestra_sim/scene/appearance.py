@@ -96,14 +96,14 @@ class Appearance:
 
     Args:
         view: the visible part of the world.
-        robots: returns its robots.
+        robots: returns the robots of the world.
     """
 
     def __init__(self, view: View, robots: Callable[[], Sequence[Robot]]) -> None:
         self._view = view
         self._robots = robots
         self._revision = 0
-        self._changes = -1  # the view's number of changes when the nodes were collected
+        self._changes = -1  # the count of changes in the view when the nodes were collected
         self._moves = -1
         self._nodes: list[_Node] = []
         self._offsets: list[tuple[Frame, Frame, Pose]] = []  # frames inside a frame that moves
@@ -200,7 +200,7 @@ class Appearance:
         self._revision += 1
 
     def _outlines(self, things: Sequence[Drawn]) -> Iterator[Drawn]:
-        """Yield the outlines of the robots that have no visible shapes."""
+        """Yield the collision shapes of the robots that have no visible shapes."""
         seen = {around for thing in things for around in (thing.node, *thing.node.ancestors())}
         for robot in self._robots():
             root = robot.parts.node
@@ -250,7 +250,7 @@ def _outline(node: SceneNode, place: Frame) -> Iterator[Drawn]:
 
 
 def _carrier(place: Frame) -> Frame:
-    """Return the nearest frame that moves by itself, or else the frame."""
+    """Return the frame, or the nearest frame around it, that moves by itself; else the frame."""
     return next((frame for frame in place.chain() if frame.moves), place)
 
 
@@ -279,7 +279,7 @@ def _make_unique(nodes: Sequence[_Node]) -> None:
 
 
 def _shape(thing: Drawn, carrier: Frame | None, table: MeshTable) -> VisualShape:
-    """Return a shape in the frame of its carrier."""
+    """Return a shape in the form of the protocol, in the frame of its carrier."""
     kind, size, pose = _KINDS[thing.kind], thing.size, thing.local
     index: int | None = None
     if thing.geometry == "Plane":

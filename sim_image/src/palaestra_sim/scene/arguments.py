@@ -8,8 +8,8 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-# With the first argument the controller steps by itself; with the second, other programs control the motors.
-# Our simulators support neither.
+# These arguments let the controller step by itself, or let other programs control the motors. Our simulators
+# support neither.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
@@ -18,7 +18,7 @@ class ControllerArguments:
     """The arguments that a simulator uses; like Webots' controller, it ignores unknown ones.
 
     Attributes:
-        name: the node's name and the prefix of all paths.
+        name: the name of the ROS node, and the prefix of all its paths.
         clock: whether to publish /clock.
         auto_publish: whether every sensor is enabled from the start.
     """

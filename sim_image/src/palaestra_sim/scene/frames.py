@@ -1,7 +1,7 @@
 """The frames of a world's nodes, each relative to the frame of its parent node.
 
 A frame has the `translation` and `rotation` that clients read and write. Only the frames of a robot with a
-body, of a dynamic solid, and of a joint's end point move by themselves. Every other frame stays as written.
+body, of a dynamic solid, and of a joint's end point move by themselves. Only clients move all other frames.
 
 Clients see poses in the axes of the world file, where z or y points up. Shapes and physics use the axes of
 the *ground*, where z points up.
@@ -21,7 +21,7 @@ class Frame:
     """The frame of one node.
 
     Attributes:
-        moves: whether it moves by itself, and not only when a client sets it.
+        moves: whether the frame moves by itself, and not only when a client sets it.
         parent: the frame of the parent node; None at the top of the world.
         translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
@@ -105,7 +105,7 @@ class Frame:
         return self.ground_pose.position[2]
 
     def chain(self) -> Iterator[Frame]:
-        """Yield this frame and those around it, up to the top of the world."""
+        """Yield this frame and its outer frames, up to the top of the world."""
         place: Frame | None = self
         while place is not None:
             yield place

@@ -60,7 +60,7 @@ class Pose(NamedTuple):
 
     @property
     def upright(self) -> bool:
-        """Whether the z axis points up within two degrees; a world saved while it ran is not exact."""
+        """Whether the z axis points up within two degrees, a tolerance for worlds saved while they ran."""
         return self.rotation[8] > _UPRIGHT
 
 

@@ -86,7 +86,7 @@ def on_background(picture: ImageBuffer, background: bytes | bytearray | memoryvi
 
 
 def _mixed(old: Color, new: Color, opacity: int) -> Color:
-    """Return a color over another one, in integer arithmetic like Webots."""
+    """Return a mix of two colors, in integer arithmetic like Webots."""
     rest = OPAQUE - opacity
     blue, green, red, alpha = ((rest * a + opacity * b) // OPAQUE for a, b in zip(old, new, strict=True))
     return blue, green, red, alpha

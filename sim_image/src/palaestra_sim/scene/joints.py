@@ -126,7 +126,7 @@ class JointFrame(Frame):
 
     @property
     def placeable(self) -> bool:
-        """Always False: only the joint moves it."""
+        """Always False, because only the joint moves this frame."""
         return False
 
     @property

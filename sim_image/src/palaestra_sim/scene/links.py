@@ -23,11 +23,11 @@ class Link:
 
     Attributes:
         node: its Solid.
-        place: its frame; that of the end of its joint, if it has one.
+        place: its frame; for a link on a joint, the frame of the joint's end.
         joint: the joint that moves it; None if it is fixed and the force on it is measured.
         shapes: the shapes with which it touches other objects.
         matter: the masses of its Solids.
-        force: its force on the object on which it is mounted, in N, in its own axes; set by the physics.
+        force: the force in N on the object that carries the link, in the link's axes; set by the physics.
     """
 
     node: SceneNode
@@ -44,7 +44,7 @@ class Link:
 
 
 def frames_between(outer: Frame | None, inner: Frame | None) -> Pose:
-    """Return the frame `inner` in the frame `outer` around it, with the current positions of all joints."""
+    """Return the pose of the frame `inner` in the frame `outer`, with the current positions of all joints."""
     pose = Pose()
     while inner is not None and inner is not outer:
         pose = _scaled(inner).after(pose)

@@ -18,7 +18,7 @@ class LookupTable:
     """The response of a sensor to a distance.
 
     Args:
-        rows: by increasing distance; without rows, the response is the distance itself.
+        rows: the rows by increasing distance; without rows, the response is the distance itself.
     """
 
     __slots__ = ("_bases", "_distances", "_noisy", "_slopes", "rows")

@@ -145,7 +145,7 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
 
 
 def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bool = False) -> float:
-    """Return the meters along a ray to the nearest triangle; infinite if it misses all of them.
+    """Return the meters along a ray to the nearest triangle; infinite if the ray misses all triangles.
 
     With `front`, the ray passes through the triangles that it meets from behind.
     """

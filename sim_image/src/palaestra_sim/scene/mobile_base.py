@@ -1,11 +1,11 @@
 """The mobile base of a robot, which computes the robot's speed from the commands to its wheels' motors.
 
 `wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
-acceleration of a robot. Here three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z.
-They are those of the Robotino 3's own controller (Webots,
-projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in its
-`base_accelerate`. A motor's own `acceleration` is an additional limit. They do not apply to a robot without
-physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
+acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 along x, 6 m/s2 along y, and
+20 rad/s2 about z. These limits are those of the Robotino 3's own controller (Webots,
+projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in
+`base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
+not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
 
 Every simulator uses this speed, so a robot responds to the same commands in the same way in all of them.
 """
@@ -87,7 +87,7 @@ class MobileBase:
         speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
-        # The number of steps that the change takes at the largest accelerations; it slows all three axes.
+        # The number of steps that the change takes at the largest accelerations, for all three axes together.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
         if steps > 1.0 and not self._kinematic:
             demands = [

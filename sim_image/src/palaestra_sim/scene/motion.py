@@ -1,8 +1,8 @@
 """The motion of a frame in the world, from the motion of its robot and of the joints that carry it.
 
-Velocities are in the axes of the world file, over the last basic step. They are computed from the speeds of
-the body and the motors, not from the change of a pose. So a client that moves a robot gives it no velocity,
-as in Webots.
+Velocities are in the axes of the world file, over the last basic step. A velocity is computed from the speeds
+of the body and the motors, not from the change of a pose. So a robot that a client moves to another position
+has no velocity, as in Webots.
 """
 
 from __future__ import annotations

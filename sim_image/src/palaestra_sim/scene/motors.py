@@ -1,4 +1,4 @@
-"""Motors, and the positions of their shafts: angles of rotational motors, lengths of linear ones.
+"""Motors, and the positions of their shafts: angles of rotational motors, lengths of linear motors.
 
 A motor has the commands of Webots: a target position and a velocity. With an infinite target, the motor turns
 at that velocity. With a finite target, it turns to the target, at most at that velocity. An invalid command
@@ -45,16 +45,16 @@ class MotorSpec:
 class Motor:
     """One motor: its commands, and the speed of its shaft.
 
-    The names are those of a rotational motor; the angles of a linear one are lengths in meters.
+    The names are those of a rotational motor; the angles of a linear motor are lengths in meters.
 
     Attributes:
         speed_rad_s: the speed of the shaft.
         angle_rad: the angle of the shaft, since the start or the last reset.
         asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
         gains: P, I and D of its controller.
-        kinematic: whether its joint has no physics. Then the available torque limits its acceleration, as in
-            Webots, and it keeps the commanded velocity up to its target.
-        changed: whether a command came since the physics last read it; the physics clears it.
+        kinematic: whether its joint has no physics. Then, as in Webots, the available torque limits the
+            acceleration, and the motor keeps the commanded velocity up to the target.
+        changed: whether a command came since the physics last read the motor; the physics clears this flag.
         damping: the damping of the joint, in N m s/rad, set by its brake; 0 without a brake.
         forceful: whether the physics moves it by forces.
         effort_nm: the torque that a client set instead of a position; None without such a command.

@@ -90,7 +90,7 @@ class Movies:
 
     @property
     def ready(self) -> bool:
-        """Whether a recording could start."""
+        """Whether a new recording can start."""
         return self._film is None
 
     def start(self, movie: Movie) -> bool:
@@ -126,7 +126,7 @@ class Movies:
         self._elapsed_ms += self._basic_step_ms
         if self._elapsed_ms % self._every_ms:
             return
-        camera = self._view(self._size)  # again for each frame, because a client may have moved the Viewpoint
+        camera = self._view(self._size)  # a new camera, because a client may have moved the Viewpoint
         if camera is not None:
             pixels = camera.colors()
             self._try(lambda: film.add(pixels))

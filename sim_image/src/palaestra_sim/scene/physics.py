@@ -32,7 +32,7 @@ class Figure(Protocol):
 
     Attributes:
         place: its frame.
-        body: its body in this physics; None without a drive, unless it is an upright obstacle of its own.
+        body: its body in this physics; None if it cannot drive and is not a free-standing obstacle.
         powered: whether its motors have energy to turn.
     """
 
@@ -68,7 +68,7 @@ class Abilities:
 class Push(NamedTuple):
     """A force in N and a torque in N m for one basic step, in the axes of the ground.
 
-    The force acts at `point`, in meters, or at the center of mass if that is None.
+    The force acts at `point`, in meters. If `point` is None, the force acts at the center of mass.
     """
 
     force: Vector = (0.0, 0.0, 0.0)
@@ -126,7 +126,7 @@ class Physics(Protocol):
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that only visible objects stop, except the robot itself."""
+        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
@@ -134,7 +134,7 @@ class Physics(Protocol):
         ...
 
     def show(self, view: View) -> None:
-        """Set the visible part of the world; a physics that does not render ignores it."""
+        """Set the visible part of the world; a physics that does not render ignores this call."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
@@ -145,7 +145,7 @@ class Physics(Protocol):
         """Return a writer for a movie; None if this physics does not render.
 
         Raises:
-            OSError: its file cannot be written.
+            OSError: the file of the movie cannot be written.
             UnsimulatedError: the encoder is not installed.
         """
         ...

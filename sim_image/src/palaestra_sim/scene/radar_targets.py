@@ -34,7 +34,7 @@ class RadarTarget:
     Attributes:
         place: its frame.
         cross_section_m2: its `radarCrossSection`.
-        shapes: its own and those of the Solids inside it.
+        shapes: its own shapes and those of the Solids inside it.
         nodes: itself and all nodes inside it.
     """
 
@@ -132,7 +132,7 @@ def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
 
 
 def _beyond(ahead: float, aside: float, size: float, half_rad: float) -> Iterator[float | None]:
-    """Yield the length of a box beyond each edge, the positive edge first; None for the whole box."""
+    """Yield the length of a box beyond each edge, the positive edge first; None if the box is outside."""
     for side in (-aside, aside):
         inside = math.sin(half_rad) * ahead + math.cos(half_rad) * side
         yield None if inside < -size / 2.0 else max(0.0, size / 2.0 - inside)

@@ -213,7 +213,7 @@ def _is_loose(node: SceneNode) -> bool:
 
 
 def _is_fixed(node: SceneNode) -> bool:
-    """Return whether a Solid is inside another Solid without a joint between: Webots makes them one body.
+    """Return whether a Solid is inside another Solid without a joint; Webots makes these one body.
 
     If the outer Solid has no physics, both are fixed to the world.
     """
@@ -277,7 +277,7 @@ def _read_solid(reading: NodeReader, node: SceneNode, place: Frame, scene: Scene
 
 
 def _stand(reading: NodeReader, shapes: Iterable[Shape], scene: SceneContents) -> None:
-    """Add shapes that are upright or lie flat to the obstacles."""
+    """Add shapes to the obstacles, and refuse tilted shapes that the physics does not support."""
     for shape in shapes:
         if not (shape.upright or scene.physics.abilities.leaning):
             reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")

@@ -1,10 +1,11 @@
 """One simulated robot: its motors, its sensors, and its noise.
 
-The seed of the noise is in the robot's `customData`, either as a whole number (`"7"`) or as JSON (`'{"seed":
-7}'`). It is read when the world is loaded and at each `simulation_reset`. Any other text leaves the seed
-unchanged. The initial seed is WorldInfo.randomSeed. After a reset, the noise depends only on the seed and on
-the number of steps: every sensor with noise draws a random number at every step, even while it is not
-enabled. The sensors draw in the order of their types in `DEVICES`, then in the order of the world file.
+The robot's `customData` contains the seed of the noise, either as a whole number (`"7"`) or as JSON
+(`'{"seed": 7}'`). The seed is read when the world is loaded and at each `simulation_reset`. Any other text
+leaves the seed unchanged. The initial seed is WorldInfo.randomSeed. After a reset, the noise depends only on
+the seed and on the number of steps. For this reason every sensor with noise draws a random number at every
+step, even while the sensor is not enabled. The sensors draw in the order of their types in `DEVICES`, then in
+the order of the world file.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Robot:
         samplers: functions that set the values of all sensors, in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
-        body: its body in the physics; None without a drive, unless it is an upright obstacle of its own.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         time_s: the time of the world since its start or its last reset.
         powered: whether its motors have energy to turn.
         links: the parts on its joints that forces move.
@@ -94,7 +95,7 @@ class Robot:
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that only visible objects stop; see `Carrier`."""
+        """Return such a function for beams that stop at visible objects; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -136,7 +137,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn the motors that are neither wheels nor moved by forces, for one basic step."""
+        """Turn for one basic step the motors that neither drive a wheel nor move by forces."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)

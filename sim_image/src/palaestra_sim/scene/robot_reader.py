@@ -65,7 +65,7 @@ class RobotParts:
     """A robot of the world file.
 
     Attributes:
-        body: its body in the physics; None without a drive, unless it is an upright obstacle of its own.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
         arguments: its controllerArgs; None if its controller is not "ros".
         links: the parts on its joints that forces move.
@@ -103,7 +103,7 @@ class _RobotReader:
         self._measured: list[Link] = []
         self._driven: list[Driven] = []
         self._idle: list[Rolling] = []  # wheels without motors
-        self._steering: list[Motor] = []  # they steer wheels
+        self._steering: list[Motor] = []  # motors that steer wheels
         self._parts: list[tuple[SceneNode, Frame]] = []
 
     def read(self) -> RobotParts:
@@ -175,7 +175,7 @@ class _RobotReader:
         )
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
-        """Return whether a robot without a drive has a body: it is upright, at the top of the world."""
+        """Return whether a robot without a drive is a free-standing obstacle: upright, at the top level."""
         return bool(shapes) and self._at_top and Frame(self._parent, *self._start).ground_pose.upright
 
     def _has_y_up(self) -> bool:
@@ -310,7 +310,7 @@ class _RobotReader:
         self._read_frame(end, inner)
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
-        """Read a joint without motors, such as a caster, as fixed, with all parts on it."""
+        """Read a joint without motors, such as that of a caster, as a fixed joint, with all parts on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
@@ -374,7 +374,7 @@ def _moves(place: Frame) -> bool:
 
 
 def _end_has_physics(joint: SceneNode) -> bool:
-    """Return whether the Solid at the end of a joint has physics; it may be in a Slot."""
+    """Return whether the Solid at the end of a joint, or in a Slot there, has physics."""
     return any(
         _end_has_physics(end) if end.type_name == "Slot" else bool(end.nodes("physics"))
         for end in joint.nodes("endPoint")

@@ -1,4 +1,4 @@
-"""Beams: the rays of sensors, before they are cast, in the frame of the robot that carries them."""
+"""Beams: the rays of sensors, before they are cast, in the frame of the robot that carries the sensors."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
     """Return the beam that starts at the origin of a frame, in a direction of this frame."""
     dx, dy, dz = turn(pose.rotation, direction)
     along = math.hypot(dx, dy)
-    # A vertical beam may have any direction along the floor. One computed from rounding errors would not have
-    # the length 1.
+    # A vertical beam may have any direction along the floor. A direction computed from rounding errors would
+    # not have the length 1.
     if along < _STEEPEST:
         dx, dy, along = _STEEPEST, 0.0, _STEEPEST
     slope = dz / along

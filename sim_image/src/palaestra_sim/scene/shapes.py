@@ -71,7 +71,7 @@ class Shape:
         return z - half, z + half
 
     def half_along(self, rotation: Matrix, axis: int) -> float:
-        """Return half its length along an axis of a frame, 0 to 2, in which it has that rotation."""
+        """Return half its length along an axis, 0 to 2, of a frame in which the shape has that rotation."""
         if self.kind == "ball":
             return self.size[2] / 2.0
         if self.kind == "capsule":

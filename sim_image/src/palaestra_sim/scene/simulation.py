@@ -346,7 +346,7 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Arrange the world again if `place` is part of a solid or floor, or a robot has another height."""
+        """Arrange the world again if `place` carries a solid or floor, or if a robot's height has changed."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
         lifted = self._heights != self._heights_now()

@@ -1,4 +1,4 @@
-"""Textures as infra-red sensors see them: how much light a shape returns at the point that a ray meets.
+"""Textures for infra-red sensors: the share of light that a shape returns at the point that a ray meets.
 
 The red of the texture's pixel is multiplied by the red of the base color. The coordinates of a point in the
 texture are those that Webots computes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox,
@@ -34,7 +34,7 @@ class Image:
     """The red of a texture: a byte for each pixel, row by row from the top left.
 
     Attributes:
-        repeats: whether it repeats along u and along v; else its edge continues.
+        repeats: whether the texture repeats along u and along v; otherwise the pixels of its edge continue.
     """
 
     width: int

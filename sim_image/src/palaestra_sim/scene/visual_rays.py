@@ -1,8 +1,8 @@
 """Cast rays against visible shapes, for infra-red DistanceSensors and for lidars without rendering. Pure.
 
 A ray stops at the first surface that faces it. It passes through the robot that carries the sensor, and
-through shapes that contain its origin. The reflection is that of reference/distancesensor.md of Webots,
-"Infra-Red Sensors".
+through shapes that contain its origin. The formula of the reflection is from reference/distancesensor.md of
+Webots, "Infra-Red Sensors".
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Glance(NamedTuple):
 
 
 class VisualRays:
-    """The rays of one robot with sensors, against all visible shapes.
+    """The rays of one robot's sensors, which stop at visible shapes.
 
     Args:
         view: the visible part of the world.

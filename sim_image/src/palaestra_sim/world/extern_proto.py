@@ -77,7 +77,7 @@ def local_protos(
 
     `world_path` is the file of the world, None without a file; `name` is its name in errors. Types in
     `without` are ignored: their files are not read, and the result does not contain them. `read` returns the
-    bytes of a file or raises OSError, `files_below` the PROTO files in a folder and its subfolders.
+    bytes of a file or raises OSError. `files_below` returns the PROTO files in a folder and its subfolders.
     """
     source = Source(data=world.source, name=name)
     search = _Search(world_path, without, read, files_below)
@@ -130,7 +130,7 @@ class _Search:
         return self._by_name.get(type_name)
 
     def _try(self, namer: _Namer, place: int, address: str, path: Path | None, type_name: str) -> None:
-        """Add the PROTO of a file, or its error."""
+        """Add the PROTO of a file, or the error of the file."""
         try:
             self._add(namer, place, address, path, type_name)
         except WorldError as error:

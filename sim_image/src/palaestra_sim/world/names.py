@@ -3,10 +3,10 @@
     <job>_r<replica>_<group>_<index><slot>_<robot>_<hash>
     move_to_target_r0_collect_1a_robotino_8c31f2
 
-The readable part is for people; it may be cut, and characters may be replaced. The hash covers the original
-values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter first, then
-`[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of 64 bytes
-without a check.
+The readable part is for people. It may be cut, and some characters may be replaced. The hash covers the
+original values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter
+first, then `[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of
+64 bytes without a check.
 """
 
 import hashlib

@@ -60,7 +60,7 @@ class Form:
     ) -> Iterator[ShapePart]:
         """Yield the parts of an object; a form with a length that is not positive has no parts.
 
-        `numbers` returns the numbers of a field, `points` the vectors of a field that is a list.
+        `numbers` returns the numbers of a field, and `points` returns the vectors of a field that is a list.
         """
         if self.when is not None and not self.when.value(numbers):
             return

@@ -183,7 +183,7 @@ class Reader:
         return token
 
     def _skip(self, text: bytes) -> bool:
-        """Move past the next token if it is this word or mark; return whether it was."""
+        """Move past the next token if its text is `text`; return whether the text was equal."""
         if self._next.text != text:
             return False
         self._take()

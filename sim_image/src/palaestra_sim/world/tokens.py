@@ -48,7 +48,7 @@ _PLACE_OF: Final[dict[str, int]] = {kind: place for place, kind in enumerate(_KI
 class Tokens(Sequence[Token]):
     """The tokens of a file, stored as kinds and offsets: nine bytes for each token.
 
-    A `Token` is created on access. All of them at once would take 150 MB for a file of 1 MB.
+    A `Token` is created on access. All tokens at once would take 150 MB for a file of 1 MB.
     """
 
     def __init__(self, data: bytes) -> None:

@@ -1,9 +1,9 @@
 """The devices of robots: one table, with a row for each type of node.
 
-A row (`DeviceType`) defines one type: the functions that read a device from the world and sample its value,
-its services, its topics with their messages, and the rule of its `enable`. The fault `wrong_value` needs no
-entry in the row, because it changes the messages of the topics. A new device is one file in this package and
-one line in `DEVICES`; CONTRIBUTING.md has the steps.
+A row (`DeviceType`) defines one type of device. The row has the functions that read a device from the world
+and sample its value, the services, the topics with their messages, and the rule of `enable`. The fault
+`wrong_value` needs no entry in the row, because its effect depends only on the topics. A new device is one
+file in this package and one line in `DEVICES`; CONTRIBUTING.md has the steps.
 
 - `device_type`: the definition of a row
 - `distance_sensor`, `touch_sensor`: rows of sensors for obstacles

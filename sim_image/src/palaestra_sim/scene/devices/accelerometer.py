@@ -1,4 +1,4 @@
-"""Accelerometer: its acceleration over the last basic step, plus the reaction to gravity.
+"""Accelerometer: the acceleration of the sensor over the last basic step, plus the reaction to gravity.
 
 At rest it reports WorldInfo.gravity upward. Webots computes the acceleration over the sensor's sampling
 period, which gives the same value for a period of one basic step. Source: WbAccelerometer.cpp of Webots.

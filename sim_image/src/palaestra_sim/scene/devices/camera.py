@@ -1,4 +1,4 @@
-"""Camera: its settings, and its images if the simulator renders.
+"""Camera: the settings of a camera, and its images if the simulator renders.
 
 Without rendering, `enable` and the services that save images return failure. Distortion, focus, exposure,
 motion blur and noise have no effect.

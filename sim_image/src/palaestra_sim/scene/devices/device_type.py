@@ -147,10 +147,10 @@ class DevicePart:
 
 
 class Carrier(Protocol):
-    """The robot that carries a device, for sampling.
+    """The interface of the robot that carries a device.
 
     Attributes:
-        body: its body in the physics; None without a drive, unless it is an upright obstacle of its own.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         time_s: the time of the world since its start or its last reset.
     """
 
@@ -166,7 +166,7 @@ class Carrier(Protocol):
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return the same function for beams that only visible objects stop, except the robot itself."""
+        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
@@ -267,17 +267,17 @@ class DeviceType(Generic[DeviceT]):
     Attributes:
         node: the type of its node.
         name: the name of a device whose node has no name.
-        fields: the fields of the node, in the syntax of `field_types`. `name` is not included, nor are the
-            fields of a Solid, if the node is a Solid.
+        fields: the fields of the node, in the syntax of `field_types`, except `name` and, if the node is a
+            Solid, except the fields that every Solid has.
         without_effect: the names of the fields that have an effect in Webots but in no simulator here,
             separated by spaces.
         solid: whether a node that is not on a joint is a Solid.
         role: one of `ROLES` for a device of a joint; "" for a device with its own frame on the robot.
         read: returns the device of a node.
         sampler: returns a function that sets the values of one robot's devices; None if they have no values.
-        services: returns the services of this type. Not included are the services that other types have too:
-            `get_model`, `get_name` and `get_node_type`; for devices of a joint, the names of the joint's
-            other devices; for devices with topics, `enable` and `get_sampling_period`.
+        services: returns the services that only this type has. Every device also has `get_model`, `get_name`
+            and `get_node_type`. A device of a joint also has services for the names of the joint's other
+            devices. A device with topics also has `enable` and `get_sampling_period`.
         topics: returns the topics that `enable` starts.
         streams: returns the other topics, each with its own `enable`.
         attach: connects a device to the robot that carries it.

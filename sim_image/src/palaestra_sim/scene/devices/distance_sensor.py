@@ -27,7 +27,7 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
-_MOST_RAYS: Final = 10_000  # the limit, because each ray is cast at every step
+_MOST_RAYS: Final = 10_000  # limit for the rays of a sensor, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
 _BEAMS_OF_SONAR: Final = 5  # number of beams for each ray of a sonar
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
@@ -58,7 +58,7 @@ class DistanceSensorType(IntEnum):
     LASER = 3
 
 
-# In lower case, because the case of letters does not matter.
+# The names are in lower case, because the case of letters in a world does not matter.
 _TYPES: Final = {
     "generic": DistanceSensorType.GENERIC,
     "infra-red": DistanceSensorType.INFRA_RED,
@@ -70,7 +70,7 @@ _TYPES: Final = {
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class DistanceSensor:
-    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
+    """Rays with their weights, and a lookup table; `value` is in the table's unit, such as volts.
 
     A sonar has five beams for each ray: the ray itself, and two pairs of beams next to it.
 
@@ -249,7 +249,7 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 
 
 def _returned(distances_m: Sequence[float]) -> Iterator[float]:
-    """Yield the distances of a sonar's rays that meet a surface at a small enough angle to return.
+    """Yield the distances of those rays of a sonar that meet a surface within 22.5 degrees of its normal.
 
     At an edge, the two beams of a pair may have different lengths. The beam whose length is closer to that of
     the ray decides.
@@ -263,7 +263,7 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, which is longer the less light returns."""
+    """Return the average distance, increased if less than the full light returns."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
     distance_m = _measured(sensor, [it.distance_m for it in glances])
     return distance_m + (distance_m / light - distance_m) * sensor.sensitivity

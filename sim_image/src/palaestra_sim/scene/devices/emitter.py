@@ -1,4 +1,4 @@
-"""Emitter: sends packets by radio; receivers on its channel get them after the next basic step."""
+"""Emitter: sends packets by radio; receivers on its channel get a packet after the next basic step."""
 
 from __future__ import annotations
 

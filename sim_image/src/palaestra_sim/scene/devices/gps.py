@@ -1,4 +1,4 @@
-"""GPS: its position in meters or in degrees, and its speed.
+"""GPS: the position of the sensor in meters or in degrees, and its speed.
 
 In the coordinate system "local", the position is that in the world plus WorldInfo.gpsReference. In the system
 "WGS84", the reference and the position are latitude and longitude in degrees and altitude in meters. Noise
@@ -55,7 +55,7 @@ class _Globe:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Gps:
-    """A receiver; `value` is x, y, z in meters, or latitude, longitude and altitude.
+    """A GPS receiver; `value` is x, y, z in meters, or latitude, longitude and altitude.
 
     Attributes:
         reference: the offset from the position in the world, in meters.
@@ -124,7 +124,7 @@ def _sampler(receivers: Sequence[Gps], robot: Carrier) -> Sample:
 
 def _receiver(gps: Gps, robot: Carrier) -> Sample:
     timer, gauss = StepTimer(robot), robot.gauss
-    noise = [0.0, 0.0, 0.0]  # of each axis, in standard deviations
+    noise = [0.0, 0.0, 0.0]  # the noise of each axis, in standard deviations
 
     def sample() -> None:
         elapsed_s, reset = timer.elapsed()

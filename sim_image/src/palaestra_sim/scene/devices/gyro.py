@@ -1,4 +1,4 @@
-"""Gyro: its angular velocity about its own axes, in rad/s.
+"""Gyro: the angular velocity of the sensor about its own axes, in rad/s.
 
 Webots measures the angular velocity of the nearest Solid with physics. Here the velocity includes that of
 every joint that carries the sensor. Source: WbGyro.cpp of Webots.

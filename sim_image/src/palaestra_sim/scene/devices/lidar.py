@@ -6,7 +6,7 @@ nearer than `minRange` or beyond `maxRange` is infinite.
 
 At each step, a rotating lidar casts the rays over which its head has turned since the step before. Its first
 ray points ahead, and the following rays go to the right, through a full turn. The distance of a ray is 0
-until the head has passed it. Source: WbLidar.cpp and RosLidar.cpp of Webots.
+until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class LightSensor:
         place: its frame; it looks along x.
         axes: the axes of the world that point east, north and up.
         filter: the shares of red, green and blue light that it measures.
-        period_ms: its sampling period; 0 while it is not enabled, and then it measures darkness.
+        period_ms: its sampling period; 0 while it is not enabled, so that it measures darkness.
     """
 
     name: str

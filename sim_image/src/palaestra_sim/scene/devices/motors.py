@@ -23,7 +23,7 @@ _FIELDS: Final = """
 
 
 def _reader(limit: str) -> Callable[[DevicePart], Motor]:
-    """Return the function that reads a motor; its field `limit` has the largest torque or force."""
+    """Return the function that reads a motor; the field `limit` has the motor's largest torque or force."""
 
     def read(part: DevicePart) -> Motor:
         number = part.number
@@ -99,7 +99,7 @@ class Feedback:
 
     @property
     def value(self) -> float:
-        """In N m or N, positive if it turns the motor forward."""
+        """The torque in N m, or the force in N; positive if it moves the motor forward."""
         return self.motor.feedback_nm
 
 

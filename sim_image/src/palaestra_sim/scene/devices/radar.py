@@ -121,7 +121,7 @@ class Radar:
         self.seen = []
 
     def sample(self, gauss: _Gauss) -> None:
-        """Detect the current targets if the radar is enabled; see `Carrier.gauss` for `gauss`."""
+        """Detect the current targets if the radar is enabled; `gauss` draws the noise."""
         if not self._enabled:
             return
         targets = [it for it in self._echoes.targets if it.place is not self.place]

@@ -1,4 +1,4 @@
-"""RangeFinder: its settings, and its distances if the simulator renders.
+"""RangeFinder: the settings of a depth camera, and its distances if the simulator renders.
 
 Without rendering, `enable` and `save_image` return failure. Distortion, motion blur and noise have no effect.
 """

@@ -1,4 +1,4 @@
-"""Receiver: a queue of the packets that emitters on the same channel have sent while it was enabled."""
+"""Receiver: the queue of the packets that emitters on its channel have sent while it was enabled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from palaestra_sim.scene.old_axes import pointing
 
 
 class Packet(NamedTuple):
-    """A text, its strength (1 / distance squared), and the unit vector to the emitter in the own frame."""
+    """A text, its strength (1 / distance squared), and the unit vector to the emitter.
+
+    The vector is in the frame of the receiver.
+    """
 
     text: str
     strength: float

@@ -98,7 +98,7 @@ def read_recognition(part: DevicePart, place: Frame, lens: Lens) -> Recognition 
 
 
 def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
-    """Return the services of a camera that recognizes objects, besides those of its stream."""
+    """Return the services of a camera that recognizes objects, except the services of its stream."""
     save = saver(recognition.lens, recognition.silent, lambda: recognition.picture)
     return (
         ("recognition_enable_segmentation", "get_bool", lambda _: {"value": recognition.segment(on=True)}),

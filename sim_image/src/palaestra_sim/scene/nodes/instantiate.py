@@ -168,7 +168,7 @@ class Instantiator:
         return node
 
     def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:
-        """Return the stand-in of a PROTO's instance: a Solid with its size and the fields of the PROTO."""
+        """Return a Solid with the size of a PROTO's instance, and with the fields of the PROTO."""
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name

@@ -116,7 +116,7 @@ class SceneNode:
             yield from node.descendants()
 
     def ancestors(self) -> Iterator[SceneNode]:
-        """Yield the nodes around it, from the inside out; the root is the last."""
+        """Yield its outer nodes, from the parent to the root."""
         node = self.parent
         while node is not None:
             yield node

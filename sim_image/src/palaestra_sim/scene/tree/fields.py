@@ -185,7 +185,7 @@ def _acceptable(type_: FieldType, value: Any) -> bool:
 
 
 def _positive(value: Any) -> bool:
-    """Return whether all numbers of a size are positive; Webots refuses a size that is not."""
+    """Return whether all numbers of a size are positive, as Webots requires."""
     numbers: tuple[float, ...] = value if isinstance(value, tuple) else (value,)
     return min(numbers) > 0.0
 

@@ -18,7 +18,7 @@ _TEXT: Final = "node"  # the name by which errors refer to an imported text
 
 
 class SceneTree:
-    """All nodes of one load of a world.
+    """All nodes of a loaded world.
 
     Args:
         world: the parsed world.

@@ -14,7 +14,7 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 
-# Nodes that affect the physics. All others are only visible, unless they are part of a boundingObject.
+# Nodes that affect the physics. Other nodes are only visible, unless they are part of a boundingObject.
 _ACTING: Final = DEVICES.keys() | frozenset(
     (
         "ContactProperties",

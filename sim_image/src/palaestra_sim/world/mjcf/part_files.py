@@ -40,7 +40,7 @@ class PartFiles:
         self._named_by.setdefault(part, set()).add(path)
 
     def trouble(self) -> str | None:
-        """Return the problem of a model that contains itself or has too many elements; None without one."""
+        """Return the problem of a model that contains itself or has too many elements; else None."""
         try:
             order = list(TopologicalSorter(self._named_by).static_order())
         except CycleError as error:
