@@ -137,7 +137,7 @@ class Movies:
         if film is None:
             return
         if self._elapsed_ms < self._every_ms:
-            log.warning("movie: nothing was recorded, because the simulation did not run; make steps")
+            log.warning("movie: nothing was recorded, because the simulation did not run; request steps")
             self.failed = True
         else:
             self._try(film.finish)

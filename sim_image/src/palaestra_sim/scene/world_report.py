@@ -63,7 +63,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
     if release := _old_release(simulation):
-        yield f"a world of {release}: its nodes are turned to the axes of today, as by Webots"
+        yield f"a world of {release}: its nodes are converted to the current axes, as in Webots"
     silent = silent_devices(simulation.robots)
     if silent:
         yield f"devices without readings, whose enable returns failure: {silent}"
@@ -113,11 +113,11 @@ def differences(simulation: Described) -> Iterator[str]:
     yield from _not_in_webots(devices)
     yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
-        yield f"{infrared} infra-red DistanceSensor: rays pass the robot itself"
+        yield f"{infrared} infra-red DistanceSensor: rays pass through the robot itself"
         if unread := simulation.unread_textures:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
-        yield f"{lidars} Lidar: rays pass the robot itself"
+        yield f"{lidars} Lidar: rays pass through the robot itself"
     yield from _without_physics(it for it in robots if not _of_a_model(it.node))
     if meshes:
         yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"

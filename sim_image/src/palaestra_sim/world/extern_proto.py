@@ -170,7 +170,7 @@ class _Search:
         except (OSError, ValueError) as error:  # ValueError: a path with a NUL character
             reason = getattr(error, "strerror", None) or error
             fact = f"{path} cannot be read: {reason}"
-            remedy = "correct the address; it counts from the folder of this file"
+            remedy = "correct the address; it is relative to the folder of this file"
             raise namer.source.error(place, fact, remedy) from None
         proto = parse_proto(data, str(path))
         if proto.name != type_name:
@@ -195,7 +195,7 @@ def _endless(namer: _Namer, type_name: str) -> Iterator[tuple[str, str]]:
         yield fact, f"remove {type_name} from {namer.type_name}"
     if len(above) > MAX_FILES_DEEP:
         fact = f"PROTO files name each other more than {MAX_FILES_DEEP} deep"
-        yield fact, "declare fewer PROTOs by others"
+        yield fact, "nest fewer PROTO files"
 
 
 def _plain(path: Path) -> Path:

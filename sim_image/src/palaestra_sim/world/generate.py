@@ -59,10 +59,10 @@ def _longer(found: Candidate, robot: Node, suffix: str) -> str:
     present = described(robot).ros_name
     if not present:
         fact = f'the robot "{robot_name(robot)}" has no ROS name'
-        raise found.source.error(robot.span[0], fact, 'add "--name=" with one to its controllerArgs')
+        raise found.source.error(robot.span[0], fact, 'add "--name=..." to its controllerArgs')
     if len((present + suffix).encode()) > MAX_NAME_BYTES:
         fact = f"the ROS name {present}{suffix} has more than {MAX_NAME_BYTES} bytes"
-        raise found.source.error(robot.span[0], fact, "shorten the one in controllerArgs")
+        raise found.source.error(robot.span[0], fact, "shorten the name in controllerArgs")
     return present + suffix
 
 

@@ -2,7 +2,7 @@
 
 A row (`DeviceType`) defines one type of device. The row has the functions that read a device from the world
 and sample its value, the services, the topics with their messages, and the rule of `enable`. The fault
-`wrong_value` needs no entry in the row, because its effect depends only on the topics. A new device is one
+`wrong_value` needs no entry in the row, because it changes messages of any type. A new device is one
 file in this package and one line in `DEVICES`; CONTRIBUTING.md has the steps.
 
 - `device_type`: the definition of a row

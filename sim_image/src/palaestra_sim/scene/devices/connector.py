@@ -94,7 +94,7 @@ def _angle(a: Vector, b: Vector) -> float:
 def _read(part: DevicePart) -> Connector:
     kind = part.text("type", "symmetric")
     if kind not in _MATCHING:
-        part.refuse(f"no connector is of type {kind!r}", f"use {', '.join(_MATCHING)}")
+        part.refuse(f"{kind!r} is not a type of connector", f"use {', '.join(_MATCHING)}")
         kind = "symmetric"
     return Connector(
         name=part.name,

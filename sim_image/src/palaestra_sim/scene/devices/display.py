@@ -82,7 +82,7 @@ class Display:
         size = self.picture.width, self.picture.height
         if camera.lens.size != size:
             raise UnsimulatedError(
-                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both one size"
+                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both the same size"
             )
         camera.eye.open()
         self.camera = camera
@@ -210,7 +210,7 @@ def _require_small(request: Any) -> None:
     for name, value in request._asdict().items():
         numbers = value if isinstance(value, list | tuple) else [value]
         if any(isinstance(number, int) and abs(number) > _LARGEST for number in numbers):
-            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; no display is as large")
+            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; use a smaller number")
 
 
 def _images(display: Display) -> tuple[Row, ...]:

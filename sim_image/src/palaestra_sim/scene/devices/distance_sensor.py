@@ -96,7 +96,7 @@ class DistanceSensor:
 def _read(part: DevicePart) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
-        part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
+        part.refuse(f"{type_name!r} is not a type of distance sensor", f"use {', '.join(_TYPES)}")
     rows = tuple(table_rows(part, _TABLE, "distances"))
     table = lookup_table(*(rows or _EMPTY))
     aperture_rad = part.number("aperture", 1.5708)

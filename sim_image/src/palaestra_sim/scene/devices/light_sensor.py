@@ -59,7 +59,7 @@ class LightSensor:
 def _read(part: DevicePart) -> LightSensor:
     *_, root = part.node.ancestors()
     if lamp := unknown_light(root):
-        part.lack(f"a light sensor in a world with {lamp}, whose light is not known")
+        part.lack(f"a light sensor in a world with {lamp}, whose light is not simulated")
     if any(lights_in(root)) and part.node.flag("occlusion", False):
         part.lack("a light sensor that sees shadows (occlusion)")
     rows = table_rows(part, _TABLE)

@@ -174,7 +174,7 @@ def _switch(motor: Motor, effort: str) -> Handler:
 def _unable(motor: Motor, effort: str) -> Handler:
     fact = f"{effort}s are not simulated"
     if motor.spec.forces:
-        fact = f"a driving wheel, or a part without physics, is not moved by a {effort}"
+        fact = f"a {effort} does not move a driving wheel or a part without physics"
 
     def fail(_request: Any) -> dict[str, Any]:
         raise UnsimulatedError(f"{fact}; set a position or velocity")

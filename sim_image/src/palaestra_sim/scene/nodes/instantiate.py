@@ -80,7 +80,7 @@ class Instantiator:
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
         if len(self.nodes) > MAX_NODES:  # raise at once, because 2 to the 60th nodes may follow
             fact = f"the world has more than {MAX_NODES} nodes"
-            raise scope.error(written, fact, "break a circle of PROTOs or of USE, or use fewer")
+            raise scope.error(written, fact, "remove a cycle of PROTOs or of USE, or use fewer nodes")
         try:
             source = scope.resolve(written)
         except WorldError as error:
@@ -125,7 +125,7 @@ class Instantiator:
     def _instance(self, proto: Proto, source: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
         if scope.depth >= MAX_DEPTH:
             fact = f"PROTOs are nested more than {MAX_DEPTH} deep"
-            self.refused.append(scope.error(source, fact, "break the circle"))
+            self.refused.append(scope.error(source, fact, "remove the cycle"))
             return None
         unknown = [name for name in source.fields if name not in proto.fields and " " not in name]
         for name in unknown:

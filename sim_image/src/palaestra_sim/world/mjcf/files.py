@@ -52,5 +52,5 @@ def absolutes(source: Source, root: Element) -> Iterator[WorldError]:
     """Yield an error for each name in a file that is not relative to the folder of the world."""
     for element, path in (*named_folders(root), *named_files(root)):
         if not is_relative(path):
-            fact = f"{path!r} does not count from the folder of the world"
+            fact = f"{path!r} is not relative to the folder of the world"
             yield source.error(element.start, fact, _RELATIVE)

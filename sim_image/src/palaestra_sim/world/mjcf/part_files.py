@@ -51,4 +51,4 @@ class PartFiles:
             for above in self._named_by.get(path, ()):
                 copies[path] = copies.get(path, 0) + copies.get(above, 0) * self._attaches.get(above, 1)
         total = sum(copies.get(path, 0) * size for path, size in self._sizes.items())
-        return f"the attached models have {total} elements; {_MOST} are the most" if total > _MOST else None
+        return f"the attached models have {total} elements; the limit is {_MOST}" if total > _MOST else None

@@ -87,7 +87,7 @@ class Project:
             for element, part in parts(root):
                 found = next(self._there(part, [*self._folders(description.root), folder_of_file]), None)
                 if found is None:
-                    fact = f"the file {part!r}, of which the model consists too, is missing"
+                    fact = f"the file {part!r}, which is part of the model, is missing"
                     yield source.error(element.start, fact, _NEXT_TO_IT)
                     continue
                 self._named.append(named := _Named(source, element, found))

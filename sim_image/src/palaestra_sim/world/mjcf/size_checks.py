@@ -47,7 +47,7 @@ def growing(source: Source, root: Element) -> Iterator[WorldError]:
         if element.tag == "replicate":
             size = copies = copies * size
         if element.tag in _MOST and size > _MOST[element.tag]:
-            fact = f"<{element.tag}> makes {size:.3g} of what is in it; {_MOST[element.tag]} are the most"
+            fact = f"<{element.tag}> has the size {size:.3g}; the limit is {_MOST[element.tag]}"
             yield source.error(element.start, fact, _REMEDY)
         waiting += [(child, copies) for child in element.children]
 
