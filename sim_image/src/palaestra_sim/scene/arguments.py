@@ -15,7 +15,7 @@ _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerArguments:
-    """The arguments that a simulator uses; like Webots' controller, it ignores unknown ones.
+    """The arguments that a simulator uses; like the controller of Webots, it ignores all other arguments.
 
     Attributes:
         name: the name of the ROS node, and the prefix of all its paths.

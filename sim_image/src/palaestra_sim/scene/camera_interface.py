@@ -21,7 +21,7 @@ class Lens:
 
     Attributes:
         size: width and height in pixels.
-        field_of_view_rad: from the left edge to the right one.
+        field_of_view_rad: the angle from the left edge to the right edge.
         near_m: the nearest visible distance.
         far_m: the farthest visible distance; 0 for no limit.
     """

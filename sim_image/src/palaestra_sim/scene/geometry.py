@@ -130,7 +130,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def turned(rotation: AxisAngle, by: Matrix) -> AxisAngle:
-    """Return a rotation after a turn `by` in its own frame."""
+    """Return a rotation, followed by the turn `by` about the rotated axes."""
     return to_axis_angle(multiply(from_axis_angle(rotation), by))
 
 

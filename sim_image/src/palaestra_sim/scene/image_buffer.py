@@ -26,7 +26,7 @@ class ImageBuffer:
     pixels: bytearray = field(default_factory=bytearray)
 
     def __post_init__(self) -> None:
-        """Create the pixels, if none are given."""
+        """Create transparent black pixels if `pixels` is empty."""
         if not self.pixels:
             self.pixels = bytearray(_BYTES * self.width * self.height)
 

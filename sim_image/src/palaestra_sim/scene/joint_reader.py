@@ -60,7 +60,7 @@ def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Lin
 
 
 def fill_door(reading: NodeReader, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
-    """Give a door its shapes and masses; `inner` are the links on it, `shapes` all shapes inside it."""
+    """Give a door its shapes and masses; `inner` are the links on the door, and `shapes` all its shapes."""
     links = [link, *inner]
     link.shapes = tuple(shape for shape in shapes if link_around(shape.place, links) is link)
     nodes = [node for node in (link.node, *link.node.descendants()) if node.nodes("physics")]

@@ -19,9 +19,9 @@ class Rubbing(NamedTuple):
     """The resistance of a joint to motion; for a slider, replace N m by N, and rad by m.
 
     Attributes:
-        damping: in N m s/rad.
-        friction: in N m; a motor with a position or velocity command overcomes it.
-        spring: in N m/rad, toward position 0.
+        damping: the damping constant in N m s/rad.
+        friction: the friction in N m; a motor with a position or velocity command overcomes it.
+        spring: the constant of a spring toward position 0, in N m/rad.
     """
 
     damping: float = 0.0

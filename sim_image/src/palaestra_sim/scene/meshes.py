@@ -212,7 +212,7 @@ def _normal(points: Sequence[Vector], largest: Vector) -> Vector | None:
 
 
 def _area(points: Sequence[Vector], triangle: Triangle) -> Vector:
-    """Return a normal as long as twice the area of a triangle."""
+    """Return a normal of a triangle; its length is twice the area of the triangle."""
     a, b, c = (points[index] for index in triangle)
     return cross(minus(b, a), minus(c, a))
 

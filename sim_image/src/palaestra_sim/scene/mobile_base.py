@@ -52,7 +52,7 @@ class MobileBase:
         return motor in self._wheels
 
     def halt(self) -> None:
-        """Stop all motion; the motors start from rest."""
+        """Stop all motion, including that of the motors."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
             wheel.halt()

@@ -126,7 +126,7 @@ class Motor:
         self.halt()
 
     def halt(self) -> None:
-        """Stop the shaft; the motor starts from rest."""
+        """Stop the shaft; the motor accelerates again from speed 0."""
         self.speed_rad_s = 0.0
         self._rate = 0.0  # current velocity of a kinematic motor
         self.changed = True

@@ -11,7 +11,7 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-DEFAULT: Final = "default"  # the material of a Solid that does not name one
+DEFAULT: Final = "default"  # the material of a Solid without a contactMaterial
 _COULOMB: Final = 1.0  # friction of two materials without ContactProperties
 _ENDLESS: Final = 100.0  # replaces -1, which stands for infinite friction in Webots
 

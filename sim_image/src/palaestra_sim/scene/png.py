@@ -36,7 +36,7 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
 
 
 def _rows(colors: bytearray, length: int) -> Iterator[bytes]:
-    """Yield each row after the number of its filter, which is 0 for no filter."""
+    """Yield the number of a filter (0 for no filter) and the pixels, for each row."""
     for at in range(0, len(colors), length):
         yield b"\0"
         yield bytes(colors[at : at + length])

@@ -61,7 +61,7 @@ class RadarTargets:
     """The targets of the radars of a world.
 
     Attributes:
-        targets: in the order of the world file.
+        targets: the targets, in the order of the world file.
         shapes: all shapes that may hide them.
     """
 

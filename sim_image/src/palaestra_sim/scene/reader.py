@@ -65,7 +65,7 @@ class SceneContents:
         loose: the dynamic solids, which move when they are pushed.
         heavy: Solids with physics that are fixed to another Solid, with their own shapes.
         doors: links that swing on joints without a robot.
-        robots: in the order of the world file.
+        robots: the robots, in the order of the world file.
         top: the frame around the whole world; None if z of the world points up.
         surroundings: the settings of the whole world.
         left_out: the unsupported nodes that the user left out, each with its position in the file.

@@ -36,8 +36,8 @@ class Robot:
 
     Attributes:
         name: Robot.name in the world file.
-        motors: by device name.
-        sensors: by device name; each has a `value` after a step.
+        motors: its motors, by device name.
+        sensors: its sensors, by device name; each has a `value` after a step.
         samplers: functions that set the values of all sensors, in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
@@ -126,7 +126,7 @@ class Robot:
         return trail.acceleration
 
     def begin(self, step_s: float) -> None:
-        """Begin a basic step; if the battery is empty, stand still."""
+        """Begin a basic step; a robot with an empty battery stands still."""
         self.time_s += step_s
         if self._has_battery:
             self.powered = not self._exhausted(step_s)

@@ -18,7 +18,7 @@ class Beam(NamedTuple):
     """A ray that may point up or down: its trace on the floor, its height, and its slope.
 
     Attributes:
-        ray: in the robot's frame, seen from above.
+        ray: the ray as seen from above, in the robot's frame.
         height_m: the height of its origin, in the robot's frame.
         slope: the height that it gains for each meter along the floor.
         reach_m: the distance beyond which the sensor's value is constant.

@@ -48,8 +48,8 @@ class Shape:
     def upright(self) -> bool:
         """Whether one of its axes is vertical, so that its outline is the same at every height.
 
-        A ball, a mesh and a shape that `lies` count as upright too. So does every shape of a stand-in: it is
-        an approximation anyway, so a tilted stand-in has the outline of an upright stand-in.
+        A ball, a mesh and a shape that `lies` count as upright too. So does every shape of a stand-in,
+        because stand-ins are approximations: a tilted stand-in has the outline of an upright stand-in.
         """
         rotation = self.pose.rotation
         return (

@@ -48,7 +48,7 @@ class Simulation:
 
     Attributes:
         tree: the nodes of the world.
-        robots: in the order of the world file.
+        robots: the robots, in the order of the world file.
         time_ms: simulated time; a reset sets it to 0.
         mode: the mode, which the program that paces the steps reads; `step` works in every mode.
         quit_status: the exit status that `quit` requested; None before.

@@ -110,7 +110,7 @@ class NodeReader:
             return default
         if max(map(abs, numbers)) > _LARGEST:
             self.refuse(
-                node, f"{node.type_name}.{field} has a number above {_LARGEST:g}", "write a smaller one"
+                node, f"{node.type_name}.{field} has a number above {_LARGEST:g}", "write a smaller number"
             )
             return default
         return numbers

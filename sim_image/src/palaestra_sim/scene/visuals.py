@@ -70,7 +70,7 @@ class Drawn:
         kind: "ball" is an ellipsoid if its sizes differ.
         size: x, y, z in meters; for round shapes 2 r, 2 r, height; for a mesh, its scale factors.
         color: the color of the whole shape.
-        local: its pose in the frame `place`, in meters of the world.
+        local: its pose in the frame `place`; the lengths are meters of the world, with all scales applied.
         place: the frame that carries it; None for the world.
         node: the Shape, or the stand-in.
         mesh: the triangles of the kind "mesh".

@@ -29,7 +29,7 @@ Rows = tuple[Twist, Twist, Twist]
 
 _PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
 _LEAST_GAIN: Final = 0.05  # minimum speed along the grip, as a fraction of the wheel's rim speed
-_LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for three ideal equations, 0 for dependent ones
+_LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for orthogonal equations, 0 for dependent equations
 _LEAST_ARM_M: Final = 1e-3  # if the longest arm is shorter than this, the wheels do not turn the robot
 _THREE: Final = 3
 _ROUNDED: Final = 1e-3  # tolerance in m and in rad, because files round the positions of wheels
@@ -46,7 +46,7 @@ class Wheel:
     Attributes:
         x_m, y_m: the position of its hub.
         axle: the axis about which a positive speed turns the wheel.
-        radius_m: from the hub to the floor.
+        radius_m: the distance from the hub to the floor.
         roller: the axis of the roller that touches the floor; None for a plain tire.
     """
 

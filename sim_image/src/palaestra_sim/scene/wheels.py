@@ -1,7 +1,8 @@
 """Find the parts that may drive a robot: hinges with motors and a round end, and the belts of tracks.
 
 A wheel is found by its geometry: a level axle, and a round end that has its center on the axle and reaches
-the floor. A belt counts as a wheel in the middle of the track, whose rim moves as many meters as its motor.
+the floor. A belt counts as a wheel in the middle of the track. The rim of this wheel moves as many meters as
+the motor of the track.
 """
 
 from __future__ import annotations

@@ -221,7 +221,7 @@ class _ProtoReader(Reader):
             raise self._error(token, fact, "remove it, or move it to a file of its own")
 
     def _expect(self, text: bytes, remedy: str) -> None:
-        """Move past the next token, which must be this word or mark."""
+        """Move past the next token, whose text must be `text`."""
         token = self._peek()
         if not self._skip(text):
             fact = f"{shown(token)} where {text.decode()} should be"

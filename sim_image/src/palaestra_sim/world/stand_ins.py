@@ -108,7 +108,7 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
 
 
 def _listed(names: object, place: str) -> Iterator[str]:
-    """Yield the types in one of the lists."""
+    """Yield the types in the list `flat` or `drawn`."""
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise StandInError(f'{place}: this is not a list of types; write ["Carpet"], before the first table')
     yield from names

@@ -1,4 +1,4 @@
-"""Connector: it detects whether another connector is near enough to connect.
+"""Connector: detects whether another connector is near enough to connect.
 
 If so, `lock` fails, because joining is not simulated. Connectors fit if they face each other; the x axis of
 each points outward. Source: WbConnector.cpp of Webots.

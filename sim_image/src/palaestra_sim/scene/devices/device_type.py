@@ -75,7 +75,7 @@ class Shaft:
 
 @dataclass(slots=True, kw_only=True)
 class DevicePart:
-    """The node of a device, while its robot is read.
+    """The node of a device, as the reader of its robot passes it to `DeviceType.read`.
 
     Attributes:
         reading: the reader of the world's nodes.
@@ -237,7 +237,7 @@ class Stream:
         prefix: the prefix of `enable` and `get_sampling_period`, relative to the name of the device.
         topics: the topics that this `enable` starts.
         silent: whether all periods are refused.
-        enabled: called after a change with the sampling period in ms; 0 means off.
+        enabled: called with the new sampling period in ms after a change; 0 means off.
     """
 
     prefix: str
@@ -283,7 +283,7 @@ class DeviceType(Generic[DeviceT]):
         attach: connects a device to the robot that carries it.
         enable: returns whether a period is accepted; 0, which stops publishing, is always accepted.
         silent: returns whether an attached device has no readings, so that all periods are refused.
-        enabled: called after a change with a device and its sampling period in ms; 0 means off.
+        enabled: called with a device and its new sampling period in ms after a change; 0 means off.
         sensor: the path of `enable` relative to the name of the device, "" for the name itself.
     """
 

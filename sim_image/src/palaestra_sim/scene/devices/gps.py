@@ -22,7 +22,7 @@ from palaestra_sim.scene.utm import UtmZone
 
 _LOCAL, _WGS84 = 0, 1  # the values that `get_coordinate_system` returns
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
-_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end there
+_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end at these values
 
 
 @dataclass(slots=True)

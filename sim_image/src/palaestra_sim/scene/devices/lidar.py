@@ -28,7 +28,7 @@ from palaestra_sim.scene.old_axes import looking
 
 _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
-_ROUNDING: Final = 1e-6  # added so that a turn by exactly one ray's share includes that ray
+_ROUNDING: Final = 1e-6  # tolerance, so that a turn by exactly the angle of one ray includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
 _FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
 _POINT_FIELDS: Final = [

@@ -1,4 +1,4 @@
-"""Pen: whether it writes, and its ink. Its lines are not drawn, because only people and cameras see them."""
+"""Pen: the state and the ink of a pen. No lines are drawn, because only people and cameras see them."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class RadarLimits:
     noise: tuple[float, float, float]
 
     def accept(self, speed: float) -> bool:
-        """Return whether a target that moves away at a speed is detected."""
+        """Return whether the radar detects a target that moves away at a speed in m/s."""
         if self.radial_m_s is not None and not self.radial_m_s[0] <= speed <= self.radial_m_s[1]:
             return False
         return abs(speed) >= self.absolute_m_s

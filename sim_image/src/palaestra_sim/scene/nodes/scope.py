@@ -22,7 +22,7 @@ class Scope:
 
     Attributes:
         source: the bytes of the file.
-        defs: the nodes of the file with a DEF name, by that name, in the order of the file.
+        defs: the nodes of the file that have a DEF name, by this name, in the order of the file.
         bindings: for a PROTO, the value of each field, with the scope in which the value is written.
         depth: the number of PROTO instances that contain this scope.
     """
@@ -64,7 +64,7 @@ class Scope:
 
 
 def definitions(nodes: Iterable[Node]) -> dict[str, list[Node]]:
-    """Return the nodes with a DEF name by that name, including nested nodes."""
+    """Return the nodes that have a DEF name, including nested nodes, by this name."""
     found: dict[str, list[Node]] = {}
     for node in walk(tuple(nodes)):
         if node.def_name is not None:

@@ -43,7 +43,7 @@ class NodeField:
 
     Attributes:
         node: its node.
-        name: as in the world file.
+        name: its name in the world file.
         kind: its declaration.
     """
 

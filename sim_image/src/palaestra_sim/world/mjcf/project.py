@@ -135,7 +135,7 @@ class Project:
         return (self._folder / named.path).resolve()
 
     def _note_assets(self, source: Source, root: Element, folder_of_file: str) -> None:
-        """Record the existing meshes, textures and other assets that a file in that folder names.
+        """Record the existing meshes, textures and other assets that a file in `folder_of_file` names.
 
         The assets of an attached model are next to that model.
         """
