@@ -250,7 +250,7 @@ def _outline(node: SceneNode, place: Frame) -> Iterator[Drawn]:
 
 
 def _carrier(place: Frame) -> Frame:
-    """Return the frame, or the nearest frame around it, that moves by itself; else the frame."""
+    """Return the innermost frame around `place` that moves by itself, or `place` if no frame moves."""
     return next((frame for frame in place.chain() if frame.moves), place)
 
 

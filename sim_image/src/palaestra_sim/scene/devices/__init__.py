@@ -8,7 +8,7 @@ file in this package and one line in `DEVICES`; CONTRIBUTING.md has the steps.
 - `device_type`: the definition of a row
 - `distance_sensor`, `touch_sensor`: rows of sensors for obstacles
 - `motors`, `brake`, `position_sensor`: rows of devices on joints
-- `lidar`: the row of a sensor with many rays, and `lidar_rays`: their directions
+- `lidar`, `lidar_rays`: the row of a sensor with many rays, and the directions of these rays
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: rows of sensors for position and motion
 - `altimeter`, `light_sensor`: rows of sensors for height and light
 - `emitter`, `receiver`: rows of radio devices
@@ -16,7 +16,7 @@ file in this package and one line in `DEVICES`; CONTRIBUTING.md has the steps.
 - `led`, `speaker`, `pen`, `display`: rows of devices that only store the values that a program sets
 - `camera`, `range_finder`: rows of devices with images
 - `camera_common`, `recognition`: the lens of both devices, and the objects that a camera recognizes
-- `radar`: the row of a sensor for the distances of targets
+- `radar`: the row of a sensor that measures the distances and speeds of targets
 - `vacuum_gripper`: the row of a gripper, which never holds an object here
 - `skin`: the row of animated meshes, which are not loaded here
 - `sensor_response`: lookup tables, resolution and axes, which several sensors share

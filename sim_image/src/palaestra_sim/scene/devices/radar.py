@@ -168,7 +168,7 @@ class Radar:
         return None if distance < low - slack else max(low, min(high, distance))
 
     def _speed(self, place: Frame, passed_s: float) -> float:
-        """Return the speed at which a target moves away; 0 if it has no previous sample."""
+        """Return the speed at which a target moves away; 0 if the target has no previous sample."""
         if passed_s <= 0.0 or place not in self._before or self.place not in self._before:
             return 0.0
         now = place.ground_pose.position, self.place.ground_pose.position

@@ -39,7 +39,7 @@ def no_actuator(found: Description) -> Iterator[WorldError]:
 
 
 def repeated(found: Description) -> Iterator[WorldError]:
-    """Two texts or numbers have the same name, so MuJoCo uses neither of them."""
+    """Two texts or numbers have the same name, so MuJoCo refuses the model."""
     for tag in ("text", "numeric"):
         seen = set()
         for name, element in custom(found.root, tag):
