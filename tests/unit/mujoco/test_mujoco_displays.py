@@ -65,5 +65,5 @@ def test_a_camera_of_another_size_is_not_attached(devices):
     """Webots would read memory outside of the camera's image."""
     _, display = devices("width 8 height 8")
 
-    with pytest.raises(UnsimulatedError, match="give both one size"):
+    with pytest.raises(UnsimulatedError, match="give both the same size"):
         display.attach("eye")

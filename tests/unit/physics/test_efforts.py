@@ -125,7 +125,7 @@ def test_a_driving_wheel_refuses_a_torque():
     robot = Simulation.load(builtin("arena"), MujocoPhysics()).robots[0]
     services, topics = rows(robot, "wheel0_joint")
 
-    with pytest.raises(UnsimulatedError, match="is not moved by a torque"):
+    with pytest.raises(UnsimulatedError, match="a torque does not move a driving wheel"):
         services["set_torque"](None)
     assert not topics
 

@@ -138,9 +138,9 @@ def test_a_light_that_a_supervisor_adds_is_seen():
 @pytest.mark.parametrize(
     ("world", "fields", "fact"),
     [
-        ("FloorLight { }", "", "a FloorLight, whose light is not known"),
-        ("CeilingLight { }", "", "a CeilingLight, whose light is not known"),
-        ('TexturedBackgroundLight { texture "dusk" }', "", "the texture dusk, whose light is not known"),
+        ("FloorLight { }", "", "a FloorLight, whose light is not simulated"),
+        ("CeilingLight { }", "", "a CeilingLight, whose light is not simulated"),
+        ('TexturedBackgroundLight { texture "dusk" }', "", "the texture dusk, whose light is not simulated"),
         ("PointLight { }", "occlusion TRUE", "a light sensor that sees shadows"),
     ],
 )

@@ -286,7 +286,7 @@ def test_a_sensor_answers_its_table(device):
 
 def test_a_table_whose_inputs_do_not_grow_is_refused(load):
     """No value could be interpolated between its rows."""
-    with pytest.raises(WorldError, match="the inputs of lookupTable do not grow; sort its rows"):
+    with pytest.raises(WorldError, match="the inputs of lookupTable do not increase; sort its rows"):
         load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
 
 

@@ -204,15 +204,15 @@ def test_what_cannot_be_simulated_is_refused(world, objects, fact):
 BAD_ROBOTS = {
     "an unknown part": (("DEF IR", "Minotaur { } DEF IR"), "the stub simulates no Minotaur on a robot"),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
-    "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
-    "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
-    "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not grow"),
+    "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "'radar' is not a type of distance sensor"),
+    "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable does not have rows of three numbers"),
+    "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not increase"),
     "a force sensor": (
         ('"touch sensor"', '"touch sensor" type "force"'),
         "a touch sensor that measures force",
     ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
-    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', a name that ROS does not take"),
+    "a name that ROS refuses": (('"ir1"', '"ir::1"'), "a device 'ir::1', a name that ROS does not accept"),
     "two names of one topic": (
         ('"ir1"', '"touch-sensor"'),
         "devices 'touch-sensor' and 'touch sensor', whose topics are both 'touch_sensor'",

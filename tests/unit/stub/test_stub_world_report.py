@@ -42,7 +42,7 @@ def test_an_old_world_is_turned_and_the_check_says_so(check):
     code, lines = check(old)
 
     assert code == 0
-    assert lines[-1] == "a world of R2020a: its nodes are turned to the axes of today, as by Webots"
+    assert lines[-1] == "a world of R2020a: its nodes are converted to the current axes, as in Webots"
 
 
 def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
@@ -99,7 +99,7 @@ def test_nodes_that_double_end_in_one_sentence(check, monkeypatch):
     code, said = check("\n".join(["DEF A0 Solid { }", *lines]))
 
     assert (code, len(said)) == (2, 1)
-    assert "the world has more than 500 nodes; break a circle of PROTOs or of USE" in said[0]
+    assert "the world has more than 500 nodes; remove a cycle of PROTOs or of USE" in said[0]
 
 
 def test_a_link_to_a_device_is_not_read(tmp_path, capsys):
@@ -176,9 +176,9 @@ def test_values_that_differ_from_webots_are_named(check):
 
     assert code == 0
     assert lines[1:] == [
-        "differs from Webots: 1 infra-red DistanceSensor: rays pass the robot itself",
+        "differs from Webots: 1 infra-red DistanceSensor: rays pass through the robot itself",
         "differs from Webots: 1 Shape with a texture that infra-red DistanceSensors do not see",
-        "differs from Webots: 1 Lidar: rays pass the robot itself",
+        "differs from Webots: 1 Lidar: rays pass through the robot itself",
         "differs from Webots: 1 Gyro on a robot without physics: Webots measures nothing there",
         "differs from Webots: 1 IndexedFaceSet as boundingObject: robots touch its convex hull",
         "differs from Webots: no Plane as boundingObject: rays meet a floor at height 0",

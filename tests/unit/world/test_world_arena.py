@@ -55,7 +55,7 @@ def sees(world: World) -> bool:
 
 def test_an_unknown_world_names_those_that_ship() -> None:
     """The argument is a name, not a path."""
-    message = 'no world "../secret" ships; choose one of arena, court, pen, seeing, two_robots'
+    message = 'no built-in world is called "../secret"; choose one of arena, court, pen, seeing, two_robots'
 
     with pytest.raises(UnknownWorldError, match=message):
         builtin("../secret")

@@ -89,9 +89,9 @@ def test_a_missing_file_is_refused_at_the_line_that_names_it() -> None:
 
     assert refusals(result) == {
         "Gone": "room.wbt:2:13: /project/worlds/Gone.proto cannot be read: No such file or directory; "
-        "correct the address; it counts from the folder of this file",
+        "correct the address; it is relative to the folder of this file",
         "Leg": "/project/worlds/Stool.proto:2:13: /project/worlds/Leg.proto cannot be read: "
-        "No such file or directory; correct the address; it counts from the folder of this file",
+        "No such file or directory; correct the address; it is relative to the folder of this file",
     }
     assert list(result.local) == ["Stool"]
 
@@ -126,7 +126,7 @@ def test_a_chain_of_files_has_a_bounded_length() -> None:
     result = found('EXTERNPROTO "P0.proto"', files)
 
     assert len(result.local) == 20
-    assert "more than 20 deep; declare fewer PROTOs by others" in refusals(result)["P20"]
+    assert "more than 20 deep; nest fewer PROTO files" in refusals(result)["P20"]
 
 
 def test_a_file_that_is_no_proto_is_refused_under_its_type() -> None:

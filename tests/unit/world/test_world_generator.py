@@ -427,13 +427,13 @@ def test_a_world_beside_another_has_a_suffix_behind_its_names_and_no_clock(world
     [
         (
             "",
-            'my.wbt:2:1: the robot "robotino" has no ROS name; add "--name=" with one to its controllerArgs',
+            'my.wbt:2:1: the robot "robotino" has no ROS name; add "--name=..." to its controllerArgs',
         ),
         (
             f'controllerArgs "--name={"a" * 62}"',
             (
                 f"my.wbt:2:1: the ROS name {'a' * 62}_2 has more than 63 bytes;"
-                " shorten the one in controllerArgs"
+                " shorten the name in controllerArgs"
             ),
         ),
     ],

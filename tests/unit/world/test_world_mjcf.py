@@ -123,7 +123,7 @@ def test_a_path_that_does_not_count_from_the_world_is_refused(path, element):
     """A model from somebody else must not read files of the pod."""
     source = with_custom(b"", element.format(path).encode())
 
-    with pytest.raises(WorldError, match="does not count from the folder of the world; write its path from"):
+    with pytest.raises(WorldError, match="is not relative to the folder of the world; write its path from"):
         check(source, relative_addresses=True)
 
 

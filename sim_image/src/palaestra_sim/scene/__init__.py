@@ -1,5 +1,5 @@
 """The contents of a world: robots with their devices, frames, nodes and fields, and the steps of time.
 
-Callers drive it: it contains no wire protocol. `devices` is the table of devices; `tree` is the view of a
-supervisor.
+This package contains no wire protocol: other packages call it to step the world and to read sensors.
+`devices` lists the device types. `tree` contains the nodes and fields that a supervisor reads and writes.
 """

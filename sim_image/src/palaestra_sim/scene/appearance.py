@@ -1,8 +1,8 @@
-"""The looks of a world and the poses of its parts, as data for viewers; see `palaestra_protocol.scene`.
+"""The visible shapes of a world and their poses, as data for viewers; see `palaestra_protocol.scene`.
 
-Nothing is computed before a request. A frame that moves by itself becomes a node with all that it carries.
-Each other frame with visible shapes becomes a node of its own, because a client may put it elsewhere.
-A robot without visible shapes has those with which it collides: the PROTOs that are built in have no others.
+The data is computed only on request. A frame that moves by itself becomes one node, with everything that it
+carries. Each other frame with visible shapes becomes a node of its own, because a client may move it. A robot
+without visible shapes, such as an instance of a built-in PROTO, is shown by its collision shapes.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ def pose_numbers(pose: Pose) -> PoseNumbers:
 
 @dataclass(slots=True)
 class MeshTable:
-    """The meshes of a scene, each once, as long as they are within the bounds of the protocol.
+    """The distinct meshes of a scene, within the limits of the protocol.
 
     Attributes:
-        meshes: so far.
-        refused: how often a mesh was too large.
+        meshes: the meshes so far.
+        refused: how often a mesh exceeded a limit.
     """
 
     meshes: list[Triangles] = field(default_factory=list)
@@ -68,7 +68,7 @@ class MeshTable:
     _triangles: int = 0
 
     def index(self, key: object, read: Callable[[], Triangles], points: int, triangles: int) -> int | None:
-        """Return the index of a mesh; None if it is too large. `read` is called once for each `key`."""
+        """Return the index of a mesh; None if it exceeds a limit. `read` is called once for each `key`."""
         if key in self._known:
             return self._known[key]
         within = self._points + points <= MOST_POINTS and self._triangles + triangles <= MOST_TRIANGLES
@@ -92,26 +92,26 @@ class _Node:
 
 
 class Appearance:
-    """What a viewer sees of one world.
+    """The visible shapes of one world and their poses, for viewers.
 
     Args:
         view: the visible part of the world.
-        robots: returns its robots.
+        robots: returns the robots of the world.
     """
 
     def __init__(self, view: View, robots: Callable[[], Sequence[Robot]]) -> None:
         self._view = view
         self._robots = robots
         self._revision = 0
-        self._changes = -1  # the view's number of changes when the nodes were collected
+        self._changes = -1  # the count of changes in the view when the nodes were collected
         self._moves = -1
         self._nodes: list[_Node] = []
-        self._offsets: list[tuple[Frame, Frame, Pose]] = []  # parts within what moves
-        self._elsewhere: dict[str, PoseNumbers] = {}  # nodes that a client has put elsewhere
+        self._offsets: list[tuple[Frame, Frame, Pose]] = []  # frames inside a frame that moves
+        self._elsewhere: dict[str, PoseNumbers] = {}  # poses of the nodes that a client has moved
         self._starts: dict[str, PoseNumbers] = {}
 
     def scene(self, world: str) -> VisibleScene:
-        """Return the looks of the world now; `world` is its name."""
+        """Return the visible shapes of the world, whose name is `world`."""
         self._refresh()
         table = MeshTable()
         names = {node.frame: node.name for node in self._nodes if node.frame is not None}
@@ -132,7 +132,7 @@ class Appearance:
         )
 
     def state(self, time_ms: int) -> SceneState:
-        """Return the poses of what moves, and the positions of the motors."""
+        """Return the poses of the nodes that move or were moved, and the positions of the motors."""
         self._refresh()
         poses = dict(self._elsewhere)
         for node in self._nodes[:MOST_NODES]:
@@ -163,7 +163,7 @@ class Appearance:
         )
 
     def _refresh(self) -> None:
-        """Collect the nodes again if the looks changed; else find the nodes that a client has moved."""
+        """Collect the nodes again if a visible shape changed; else find the nodes that a client has moved."""
         if self._view.changes != self._changes:
             self._collect()
         elif self._view.moves != self._moves:
@@ -200,7 +200,7 @@ class Appearance:
         self._revision += 1
 
     def _outlines(self, things: Sequence[Drawn]) -> Iterator[Drawn]:
-        """Yield the outlines of the robots that have no visible shapes."""
+        """Yield the collision shapes of the robots that have no visible shapes."""
         seen = {around for thing in things for around in (thing.node, *thing.node.ancestors())}
         for robot in self._robots():
             root = robot.parts.node
@@ -219,7 +219,7 @@ class Appearance:
         }
 
     def _names(self) -> Mapping[Frame | None, str]:
-        """Return the names of all frames: DEF, name or type; parts of a robot begin with its name."""
+        """Return the names of all frames: DEF, name or type of the node, after the name of its robot."""
         named: dict[Frame | None, str] = {}
         robots = {robot.parts.node: robot for robot in self._robots()}
         for node in self._view.root.descendants():
@@ -250,12 +250,12 @@ def _outline(node: SceneNode, place: Frame) -> Iterator[Drawn]:
 
 
 def _carrier(place: Frame) -> Frame:
-    """Return the nearest frame that moves by itself, or else the frame."""
+    """Return the innermost frame around `place` that moves by itself, or `place` if no frame moves."""
     return next((frame for frame in place.chain() if frame.moves), place)
 
 
 def _offset(place: Frame, carrier: Frame) -> Pose:
-    """Return a frame in one of those around it; the same bits wherever that one is."""
+    """Return the pose of a frame in an outer frame, bit for bit the same wherever the outer frame is."""
     pose = Pose()
     for frame in place.chain():
         if frame is carrier:
@@ -279,7 +279,7 @@ def _make_unique(nodes: Sequence[_Node]) -> None:
 
 
 def _shape(thing: Drawn, carrier: Frame | None, table: MeshTable) -> VisualShape:
-    """Return a shape in the frame of its carrier."""
+    """Return a shape in the form of the protocol, in the frame of its carrier."""
     kind, size, pose = _KINDS[thing.kind], thing.size, thing.local
     index: int | None = None
     if thing.geometry == "Plane":

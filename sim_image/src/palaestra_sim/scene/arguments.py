@@ -1,4 +1,4 @@
-"""The controllerArgs of a robot that a simulator uses."""
+"""Read the controllerArgs of a robot."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-# They let the controller step by itself or give the motors to other programs; our simulators do neither.
+# These arguments let the controller step by itself, or let other programs control the motors. Our simulators
+# support neither.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerArguments:
-    """The arguments that a simulator uses; like Webots' controller, it ignores unknown ones.
+    """The arguments that a simulator uses; like the controller of Webots, it ignores all other arguments.
 
     Attributes:
-        name: the node's name and the prefix of all paths.
+        name: the name of the ROS node, and the prefix of all its paths.
         clock: whether to publish /clock.
         auto_publish: whether every sensor is enabled from the start.
     """
@@ -30,8 +31,8 @@ class ControllerArguments:
 def read_arguments(reading: NodeReader, node: SceneNode) -> ControllerArguments:
     """Return the arguments of a robot whose controller is "ros".
 
-    Both are required: without `--name` two robots collide, without `--synchronize` no client controls the
-    steps.
+    `--name` is required, because the topics of two robots without it would have the same names.
+    `--synchronize` is required, because without it no client controls the steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]

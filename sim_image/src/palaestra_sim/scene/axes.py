@@ -1,8 +1,7 @@
 """Determine which axis of a world points up.
 
-Before R2020b the y axis of every world pointed up; since then WorldInfo.coordinateSystem chooses, with y as
-the default until R2022a.
-Source: WbWorldInfo of Webots.
+Before R2020b the y axis of every world pointed up. Since then WorldInfo.coordinateSystem selects the axis.
+Until R2022a its default was y. Source: WbWorldInfo of Webots.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ _SYSTEMS: Final = ("ENU", "NUE", "EUN")
 
 
 def read_axes(reading: NodeReader, node: SceneNode) -> Frame | None:
-    """Return the frame around a world whose y axis points up, or None if z does; record its axes.
+    """Return the frame around a world whose y axis points up, None if z points up; record the axes.
 
     `node` is the WorldInfo of the world, or its first node.
     """

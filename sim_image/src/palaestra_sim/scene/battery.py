@@ -1,8 +1,8 @@
-"""The battery of a robot, which its CPU drains; a robot with an empty battery stands still.
+"""The battery of a robot. The CPU of the robot drains it; a robot with an empty battery stands still.
 
 `Robot.battery` has the energy in joules, the capacity, and the power of a charger; chargers are not
-simulated. Motors consume nothing: in Webots their consumption depends on the torque, which is 0 without
-dynamics.
+simulated. Motors consume no energy here. In Webots their consumption depends on their torque, which is 0
+without dynamics.
 Source: WbRobot::energyConsumption, WbMotor::energyConsumption.
 """
 
@@ -36,7 +36,7 @@ class Battery:
         return self._energy_j == 0.0
 
     def drain(self, duration_s: float) -> None:
-        """Subtract the energy that the robot consumes in that time."""
+        """Subtract the energy that the robot consumes in `duration_s`."""
         energy_j = self._energy_j
         if energy_j is not None:
             self._set(max(0.0, energy_j - self._power_w * duration_s))

@@ -20,7 +20,7 @@ class Build:
         base: its wheels.
         outline: the shapes with which it collides, in its own frame.
         heights: z of the lower and upper end of the body, in its own frame.
-        links: the parts that forces move on its joints; empty in a physics without such joints.
+        links: the parts on its joints that forces move; empty in a physics without such joints.
         matter: the masses of the parts that are not on a link.
     """
 
@@ -37,11 +37,11 @@ class Body(Protocol):
     Attributes:
         base: its wheels.
         x, y: the position of its origin in the world, in meters, in the axes of the ground.
-        heading_rad: in (-pi, pi].
+        heading_rad: the heading, in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: the parts that were touched since the bumpers were last read, one bit each; the bumpers'
-            reader clears it.
+        touched: one bit for each part that was touched since the bumpers were last read; the code that reads
+            the bumpers clears it.
     """
 
     base: MobileBase
@@ -62,9 +62,9 @@ class Body(Protocol):
         ...
 
     def halt(self) -> None:
-        """Stop all motion; the motors start from rest."""
+        """Stop all motion, including that of the motors."""
         ...
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the body a velocity in world axes; its motors continue from there."""
+        """Give the body a velocity in world axes; its motors continue from this velocity."""
         ...

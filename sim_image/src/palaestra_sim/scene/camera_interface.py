@@ -21,7 +21,7 @@ class Lens:
 
     Attributes:
         size: width and height in pixels.
-        field_of_view_rad: from the left edge to the right one.
+        field_of_view_rad: the angle from the left edge to the right edge.
         near_m: the nearest visible distance.
         far_m: the farthest visible distance; 0 for no limit.
     """
@@ -61,7 +61,7 @@ class CameraInterface(Protocol):
         ...
 
     def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> Mapping[SceneNode, Corners]:
-        """Return the rectangle in which each owner is visible: the one around all its shapes.
+        """Return for each owner the rectangle around all its visible shapes.
 
         `owner` returns the node to which a shape belongs; None if the shape is not needed.
         """

@@ -26,9 +26,9 @@ class DynamicFrame(Frame):
     Attributes:
         follow: returns the state to which the physics has moved it; None before a physics has a model.
         changed: the frames that the physics has to read; a frame that a client changed adds itself.
-        put: whether a client has set it since the physics last read it; the physics clears it.
-        speed: the linear and angular velocity that a client set, in the axes of the ground; the physics takes
-            them and sets None, which means no change.
+        put: whether a client has set this frame since the physics last read it; the physics clears the flag.
+        speed: the linear and angular velocity that a client set, in the axes of the ground; the physics uses
+            them and then sets None, which means no change.
     """
 
     moves = True
@@ -74,13 +74,13 @@ class DynamicFrame(Frame):
         return self.follow()
 
     def push(self, velocity: Vector, turning: Vector) -> None:
-        """Give it a velocity in m/s and an angular velocity in rad/s, in the axes of the ground."""
+        """Give the solid a velocity in m/s and an angular velocity in rad/s, in the axes of the ground."""
         self.speed = velocity, turning
         if self.changed is not None:
             self.changed[self] = None
 
     def halt(self) -> None:
-        """Stop its motion."""
+        """Stop the motion of the solid."""
         self.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def return_to_start(self) -> None:
@@ -97,7 +97,7 @@ class DynamicFrame(Frame):
         return self.put or self.follow is None
 
     def _local(self) -> Pose:
-        """Return the pose to which the physics has moved it, in the parent's frame."""
+        """Return the pose to which the physics has moved the solid, in the parent's frame."""
         pose = self.course.pose
         return pose if self.parent is None else self.parent.ground_pose.inverse.after(pose)
 

@@ -1,7 +1,7 @@
 """The faces of an Extrusion: a cross-section that is moved along a spine. Pure.
 
-In Webots an Extrusion is a PROTO with a template, which becomes an IndexedFaceSet; so it does here.
-A bent spine with a `splineSubdivision` becomes a curve in Webots, which is not computed here.
+Webots converts an Extrusion to an IndexedFaceSet by a PROTO with a template; this module computes the same
+faces. Webots converts a bent spine with a `splineSubdivision` to a curve, which this module does not compute.
 Source: Extrusion.proto of Webots R2023b, and ISO/IEC 14772-1, 6.18.
 """
 
@@ -25,7 +25,7 @@ _DEFAULTS: Final = {
 _MOST: Final = 1000  # points of a spine or a cross-section; faces are cut in quadratic time
 _STRAIGHT: Final = 1e-9
 _LEAST_SPINE: Final = 2
-_LEAST_SECTION: Final = 4  # the last point of a triangle is its first again
+_LEAST_SECTION: Final = 4  # a triangle, whose last point repeats the first
 _TURN: Final = 4  # numbers of a rotation
 _PAIR: Final = 2
 
@@ -39,7 +39,7 @@ class Faces:
 
 
 def faces(fields: Mapping[str, Sequence[float]], *, begin_cap: bool, end_cap: bool) -> Faces | None:
-    """Return the faces of an Extrusion with these fields; None if they are incomplete, or it is curved."""
+    """Return the faces of an Extrusion; None if its fields are incomplete, or if it is curved."""
     values = {name: tuple(fields.get(name) or default) for name, default in _DEFAULTS.items()}
     section = list(zip(values["crossSection"][0::2], values["crossSection"][1::2], strict=False))
     flat = values["spine"]
@@ -83,7 +83,7 @@ def _placed(
 
 
 def _index(count: int, corners: int, *, begin_cap: bool, end_cap: bool) -> list[int]:
-    """Return the faces: the first cap, the sides, and the last cap. The last corner is the first again."""
+    """Return the faces: the first cap, the sides, and the last cap. The last corner repeats the first."""
     index: list[int] = []
     if begin_cap:
         index += [*range(corners - 1), -1]
@@ -126,7 +126,7 @@ def _axes(spine: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
 
 
 def _first_z(spine: Sequence[Vector], y: Vector) -> Vector:
-    """Return z at the start of an open spine: that of its first bend, or any if it is straight."""
+    """Return z at the start of an open spine: that of its first bend, or z turned with a straight spine."""
     bends = (
         cross(minus(spine[k + 1], spine[k]), minus(spine[k - 1], spine[k])) for k in range(1, len(spine) - 1)
     )
@@ -141,7 +141,7 @@ def _first_z(spine: Sequence[Vector], y: Vector) -> Vector:
 
 
 def _straight(spine: Sequence[Vector]) -> bool:
-    """Return whether all points are on one line, each farther from the first."""
+    """Return whether all points are on one line, in the order of their distances from the first point."""
     whole = minus(spine[-1], spine[0])
     length = math.hypot(*whole)
     parts = [minus(after, before) for before, after in pairwise(spine)]
@@ -150,13 +150,13 @@ def _straight(spine: Sequence[Vector]) -> bool:
 
 
 def _at(values: Sequence[float], place: int, count: int) -> Sequence[float]:
-    """Return the numbers of one point of the spine; the last ones count for all further points."""
+    """Return the numbers of one point of the spine; the last numbers apply to all further points."""
     place = min(place, len(values) // count - 1)
     return values[place * count : (place + 1) * count]
 
 
 def _turn_at(values: Mapping[str, Sequence[float]], place: int) -> Sequence[float] | None:
-    """Return the rotation at a point of the spine; a missing one is none, as in Webots."""
+    """Return the rotation at a point of the spine; None if it is missing, as in Webots."""
     found = values["orientation"][place * _TURN : (place + 1) * _TURN]
     return found if len(found) == _TURN and any(found[:3]) else None
 

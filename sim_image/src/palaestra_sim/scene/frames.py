@@ -1,10 +1,10 @@
-"""The frames of a world's nodes, each relative to the frame of the node around it.
+"""The frames of a world's nodes, each relative to the frame of its parent node.
 
-A frame has the `translation` and `rotation` that clients read and write. It stays as written, except for the
-frame of a robot with a body, of a dynamic solid, and of the end of a joint.
+A frame has the `translation` and `rotation` that clients read and write. Only the frames of a robot with a
+body, of a dynamic solid, and of a joint's end point move by themselves. Only clients move all other frames.
 
-Clients see poses in the axes of the world file, of which z or y points up. Shapes and physics use the axes of
-the *ground*, of which z points up.
+Clients see poses in the axes of the world file, where z or y points up. Shapes and physics use the axes of
+the *ground*, where z points up.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ class Frame:
     """The frame of one node.
 
     Attributes:
-        moves: whether it moves by itself, and not only when a client sets it.
-        parent: the frame of the node around it; None at the top of the world.
+        moves: whether the frame moves by itself, and not only when a client sets it.
+        parent: the frame of the parent node; None at the top of the world.
         translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
         scale: the length of a meter of this frame in the world, in meters.
@@ -59,17 +59,17 @@ class Frame:
 
     @property
     def placeable(self) -> bool:
-        """Whether a client may set it."""
+        """Whether a client may set this frame."""
         return True
 
     @property
     def pose(self) -> Pose:
-        """The frame, in the parent's."""
+        """The pose in the parent's frame."""
         return Pose(self.translation, from_axis_angle(self.rotation))
 
     @property
     def world_pose(self) -> Pose:
-        """The frame, in the world's."""
+        """The pose in the world."""
         parent, pose = self.parent, self.pose
         if parent is None:
             return pose
@@ -86,16 +86,16 @@ class Frame:
         return None if self.parent is None else self.parent.axes
 
     def to_ground(self, vector: Vector) -> Vector:
-        """Return a vector of the axes of the world file in those of the ground."""
+        """Return a vector, given in the axes of the world file, in the axes of the ground."""
         return vector if self.axes is None else turn(self.axes, vector)
 
     def from_ground(self, vector: Vector) -> Vector:
-        """Return a vector of the axes of the ground in those of the world file."""
+        """Return a vector, given in the axes of the ground, in the axes of the world file."""
         return vector if self.axes is None else turn(transposed(self.axes), vector)
 
     @property
     def ground_pose(self) -> Pose:
-        """The frame, in the axes of the ground."""
+        """The pose in the world, in the axes of the ground."""
         pose = self.world_pose
         return pose if self.axes is None else Pose(rotation=self.axes).after(pose)
 
@@ -105,7 +105,7 @@ class Frame:
         return self.ground_pose.position[2]
 
     def chain(self) -> Iterator[Frame]:
-        """Yield this frame and those around it, up to the top of the world."""
+        """Yield this frame and its outer frames, up to the top of the world."""
         place: Frame | None = self
         while place is not None:
             yield place

@@ -60,7 +60,7 @@ class Pose(NamedTuple):
 
     @property
     def upright(self) -> bool:
-        """Whether the z axis points up within two degrees; many worlds were saved during a simulation."""
+        """Whether the z axis points up within two degrees, a tolerance for worlds saved while they ran."""
         return self.rotation[8] > _UPRIGHT
 
 
@@ -130,7 +130,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def turned(rotation: AxisAngle, by: Matrix) -> AxisAngle:
-    """Return a rotation after a turn `by` in its own frame."""
+    """Return a rotation, followed by the turn `by` about the rotated axes."""
     return to_axis_angle(multiply(from_axis_angle(rotation), by))
 
 

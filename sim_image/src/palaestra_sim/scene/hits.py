@@ -1,6 +1,7 @@
-"""Where a ray meets the surface of a shape, exactly. Pure geometry, in the frame of the shape.
+"""Compute the exact distance along a ray to the surface of a shape. Pure geometry, in the frame of the shape.
 
-From inside a shape, that is where the ray leaves it, as in ODE, the physics of Webots.
+A ray that begins inside a shape meets the surface where it leaves the shape, as in ODE, the physics engine of
+Webots.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ _NEVER: Final = (math.inf, -math.inf)
 
 
 def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return the meters from `origin` along a unit vector to the surface; infinite if the ray misses it."""
+    """Return the meters from `origin` along a unit vector to the shape; infinite if the ray misses it."""
     if shape.mesh is not None:
         return nearest_triangle(shape.mesh, origin, direction)
     enter, leave = _span(shape, origin, direction)
@@ -27,7 +28,7 @@ def first_hit(shape: Shape, origin: Vector, direction: Vector) -> float:
 
 
 def _span(shape: Shape, origin: Vector, direction: Vector) -> tuple[float, float]:
-    """Return the two distances at which a line enters and leaves a convex shape; enter > leave: it misses."""
+    """Return the distances at which a line enters and leaves a convex shape; enter > leave if it misses."""
     half = shape.size[0] / 2.0, shape.size[1] / 2.0, shape.size[2] / 2.0
     match shape.kind:
         case "ball":
@@ -47,7 +48,7 @@ def _in_both(one: tuple[float, float], other: tuple[float, float]) -> tuple[floa
 
 
 def _in_capsule(origin: Vector, direction: Vector, radius: float, straight: float) -> tuple[float, float]:
-    """Return the span in a tube and in the balls at its ends, which together are convex."""
+    """Return the span of a line in a capsule, the convex union of a tube and the balls at its two ends."""
     x, y, z = origin
     parts = [
         _in_both(_in_ball((x, y), direction[:2], radius), _in_slab(z, direction[2], straight)),

@@ -1,6 +1,6 @@
 """An image of pixels, and functions that draw lines, ovals and polygons on it. Pure.
 
-Rows go from the top down, pixels from left to right; points outside the image are not drawn.
+Rows go from the top down, and pixels go from left to right. Points outside the image are not drawn.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class ImageBuffer:
     pixels: bytearray = field(default_factory=bytearray)
 
     def __post_init__(self) -> None:
-        """Create the pixels, if none are given."""
+        """Create transparent black pixels if `pixels` is empty."""
         if not self.pixels:
             self.pixels = bytearray(_BYTES * self.width * self.height)
 
@@ -37,7 +37,7 @@ class ImageBuffer:
         return blue, green, red, alpha
 
     def draw(self, points: Iterable[Point], color: Color, opacity: int = OPAQUE) -> None:
-        """Give those pixels a color, mixed with the existing one by the opacity, from 0 to 255."""
+        """Draw pixels in a color, mixed with their existing color by the opacity, from 0 to 255."""
         for x, y in points:
             if 0 <= x < self.width and 0 <= y < self.height:
                 start = _BYTES * (y * self.width + x)
@@ -62,7 +62,7 @@ class ImageBuffer:
         return ImageBuffer(width=size[0], height=size[1], pixels=bytearray().join(rows))
 
     def paste(self, other: ImageBuffer, x: int, y: int, *, blend: bool = False) -> None:
-        """Paste another image over this one; with `blend`, mix the colors by the alpha of the other."""
+        """Paste another image over this image; with `blend`, mix the colors by the other image's alpha."""
         for row in range(other.height):
             for column in range(other.width):
                 color = other.at(column, row)
@@ -86,7 +86,7 @@ def on_background(picture: ImageBuffer, background: bytes | bytearray | memoryvi
 
 
 def _mixed(old: Color, new: Color, opacity: int) -> Color:
-    """Return a color over another one, in integer arithmetic like Webots."""
+    """Return a mix of two colors, in integer arithmetic like Webots."""
     rest = OPAQUE - opacity
     blue, green, red, alpha = ((rest * a + opacity * b) // OPAQUE for a, b in zip(old, new, strict=True))
     return blue, green, red, alpha
@@ -132,7 +132,7 @@ def outline(corners: Sequence[Point]) -> Iterator[Point]:
 
 
 def filled_polygon(corners: Sequence[Point]) -> Iterator[Point]:
-    """Yield all pixels of a polygon: those of its sides, and those between each second pair of sides."""
+    """Yield all pixels of a polygon: those of its sides, and those inside by the even-odd rule."""
     yield from outline(corners)
     rows = [y for _, y in corners]
     sides = list(zip(corners, [*corners[1:], *corners[:1]], strict=True))

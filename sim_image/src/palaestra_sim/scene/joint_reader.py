@@ -20,7 +20,7 @@ def parameters_of(node: SceneNode) -> SceneNode:
 
 
 def read_joint(reading: NodeReader, node: SceneNode, *, forces: bool) -> Joint | None:
-    """Return the joint at `node`; None if it is refused. With `forces`, it has stops and resistance."""
+    """Return the joint at `node`, with stops and resistance if `forces`; None if its axis has length 0."""
     slides = node.type_name == "SliderJoint"
     parameters = parameters_of(node)
     along = reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0))
@@ -60,7 +60,7 @@ def read_door(reading: NodeReader, node: SceneNode, parent: Frame | None) -> Lin
 
 
 def fill_door(reading: NodeReader, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
-    """Give a door its shapes and masses; `inner` are the links on it, `shapes` all shapes inside it."""
+    """Give a door its shapes and masses; `inner` are the links on the door, and `shapes` all its shapes."""
     links = [link, *inner]
     link.shapes = tuple(shape for shape in shapes if link_around(shape.place, links) is link)
     nodes = [node for node in (link.node, *link.node.descendants()) if node.nodes("physics")]

@@ -1,7 +1,7 @@
-"""Joints, and the frames of their ends, which move as the motors turn.
+"""Joints, and the frames of their end points, which move as the motors turn.
 
-A hinge turns its end about an axis through the anchor, a slider moves its end along the axis. The frame in
-the world file applies at the joint's `position` in the file.
+A hinge turns its end point about an axis through the anchor. A slider moves its end point along the axis. The
+world file gives the pose of the end point at the `position` that the joint has in that file.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from palaestra_sim.scene.motors import Motor
 
 
 class Rubbing(NamedTuple):
-    """The resistance of a joint to motion; a slider has N instead of N m, and m instead of rad.
+    """The resistance of a joint to motion; for a slider, replace N m by N, and rad by m.
 
     Attributes:
-        damping: in N m s/rad.
-        friction: in N m; a motor that acts overcomes it.
-        spring: in N m/rad, toward position 0.
+        damping: the damping constant in N m s/rad.
+        friction: the friction in N m; a motor with a position or velocity command overcomes it.
+        spring: the constant of a spring toward position 0, in N m/rad.
     """
 
     damping: float = 0.0
@@ -41,8 +41,8 @@ class Joint:
         anchor: a point on the axis of a hinge, in meters.
         slides: whether it is a slider.
         start: the position in the file, in rad or m.
-        motor: the motor that moves it; None if it stays where it is set, unless a physics moves it.
-        stops: the positions that it never passes; equal ones mean no stops.
+        motor: the motor that moves it; None if only a client or a physics with forces moves it.
+        stops: the lowest and the highest position; if both are equal, the joint has no stops.
         rubbing: its resistance to motion.
         position: the position of a joint without a motor, in rad or m.
         speed: the speed of a joint without a motor, in rad/s or m/s.
@@ -65,21 +65,21 @@ class Joint:
 
     @property
     def now(self) -> float:
-        """Its position, in rad or m."""
+        """The current position, in rad or m."""
         return self.position if self.motor is None else self.motor.angle_rad
 
     @property
     def turning(self) -> float:
-        """Its speed, in rad/s or m/s."""
+        """The current speed, in rad/s or m/s."""
         return self.speed if self.motor is None else self.motor.speed_rad_s
 
     @property
     def braking(self) -> float:
-        """The damping by its brake, in N m s/rad."""
+        """The current damping by the brake, in N m s/rad."""
         return self.brake if self.motor is None else self.motor.damping
 
     def follow(self, position: float, speed: float) -> None:
-        """Set position and speed to those in a physics."""
+        """Set the position and the speed that the physics has computed."""
         if self.motor is None:
             self.position, self.speed = position, speed
         else:
@@ -90,7 +90,7 @@ class Joint:
         self.follow(self.now, 0.0)
 
     def put(self, position: float) -> None:
-        """Set its position, at rest; a motor holds it there, as in Webots."""
+        """Move the joint to a position and stop it; its motor holds that position, as in Webots."""
         if self.motor is None:
             self.position, self.speed = position, 0.0
         else:
@@ -111,7 +111,7 @@ class Joint:
 
 
 class JointFrame(Frame):
-    """The frame of the end of a joint."""
+    """The frame of a joint's end point."""
 
     moves = True
 
@@ -121,17 +121,17 @@ class JointFrame(Frame):
 
     @property
     def start(self) -> Pose:
-        """The frame in the parent's, at the joint's position in the world file."""
+        """The pose in the parent's frame, at the joint's position in the world file."""
         return Pose(self._translation, from_axis_angle(self._rotation))
 
     @property
     def placeable(self) -> bool:
-        """Always False: only the joint moves it."""
+        """Always False, because only the joint moves this frame."""
         return False
 
     @property
     def pose(self) -> Pose:
-        """The frame, in the parent's."""
+        """The current pose in the parent's frame."""
         return self.joint.carry(Pose(self._translation, from_axis_angle(self._rotation)))
 
     @property
@@ -153,7 +153,7 @@ class JointFrame(Frame):
         self._rotation = value
 
     def return_to_start(self) -> None:
-        """Return the joint to its start; a motor returns by itself."""
+        """Return a joint without a motor to its start; `Motor.reset` returns the other joints."""
         if self.joint.motor is None:
             self.joint.put(self.joint.start)
             self.joint.brake = 0.0

@@ -1,8 +1,8 @@
 """The lights of a world, and the irradiance at a sensor. Pure.
 
 A light's fields are read at each measurement, because a supervisor may change them. As in Webots, the
-direction of a light is in the axes of the world, whatever it is mounted on, and its location is not.
-Source: reference/lightsensor.md and WbLightSensor.cpp of Webots.
+direction of a light is in the axes of the world, but its location is in the frame of the node that contains
+it. Source: reference/lightsensor.md and WbLightSensor.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _BACKGROUND: Final = "TexturedBackgroundLight"
 _LIGHTS: Final = frozenset(("DirectionalLight", "PointLight", "SpotLight", _BACKGROUND))
-# PROTOs of Webots that contain lights; only their bodies are known here.
+# PROTOs of Webots that contain lights. Their stand-ins have no lights.
 _LAMPS: Final = frozenset(
     (
         "CeilingLight",
@@ -33,7 +33,7 @@ _MOUNTAINS: Final = "mountains"
 _FROM_MOUNTAINS: Final = (0.55, -0.6, -1.0)  # east, north, up
 _OF_MOUNTAINS, _AMBIENT_OF_MOUNTAINS = 2.7, 1.0  # intensities
 _EVERYWHERE: Final = (1.0, 0.0, 0.0)  # an attenuation that does not depend on the distance
-_LEAST: Final = 1e-300  # instead of a division by 0, whose result Webots cuts to the end of the lookup table
+_LEAST: Final = 1e-300  # replaces a divisor of 0; Webots limits that quotient to the end of the lookup table
 _WIDEST_RAD: Final = 0.785398  # the default of SpotLight.cutOffAngle
 _BEAM_RAD: Final = 1.570796
 
@@ -53,7 +53,7 @@ class Light:
     def irradiance(self, sensor: Pose, shares: Vector) -> float:
         """Return the irradiance in W/m2 at a sensor that looks along x, without shadows.
 
-        `shares` are those of red, green and blue light that it measures.
+        `shares` are the fractions of red, green and blue light that the sensor measures.
         """
         if not self.node.flag("on", True):
             return 0.0
@@ -61,7 +61,7 @@ class Light:
         return white * dot(shares, _vector(self.node, "color", (1.0, 1.0, 1.0))) / 3.0
 
     def _white(self, at: Vector, normal: Vector) -> float:
-        """Return the ambient and the direct part, for a white light."""
+        """Return the sum of the ambient and the direct irradiance, for a white light."""
         node = self.node
         if node.type_name == _BACKGROUND:
             direct = _cosine(normal, _opposite(self._from_mountains()))
@@ -92,7 +92,7 @@ class Light:
         return location if around is None else around.world_pose.carry(location)
 
     def _share_of_beam(self, cosine: float) -> float:
-        """Return the share of a spot's light beside its axis."""
+        """Return the share of a spot's light at an angle to its axis, given the cosine of the angle."""
         off = math.acos(min(1.0, cosine))
         widest = _number(self.node, "cutOffAngle", _WIDEST_RAD)
         beam = min(_number(self.node, "beamWidth", _BEAM_RAD), widest)
@@ -102,12 +102,12 @@ class Light:
 
 
 def lights_in(root: SceneNode) -> Iterator[SceneNode]:
-    """Yield the lights of a world; those of lamps are not known, see `unknown_light`."""
+    """Yield the lights of a world, except those inside the PROTOs of lamps; see `unknown_light`."""
     return (node for node in root.descendants() if node.type_name in _LIGHTS)
 
 
 def unknown_light(root: SceneNode) -> str | None:
-    """Return words for a node whose light is not known here, such as a lamp; None without such a node."""
+    """Return a description of a node whose light is not simulated, such as "a CeilingLight"; else None."""
     for node in root.descendants():
         if node.type_name == _BACKGROUND and (node.text("texture") or _MOUNTAINS) != _MOUNTAINS:
             return f"a {_BACKGROUND} with the texture {node.text('texture')}"

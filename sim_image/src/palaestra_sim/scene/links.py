@@ -1,7 +1,7 @@
 """Links: parts that forces move on joints, and parts whose force on the robot is measured.
 
-A link is everything on the end of one joint, without the parts on further joints. It is mounted on another
-link, on a robot, on a dynamic solid, or on a fixed object.
+A link consists of all parts on the end of one joint, except the parts on further joints. It is mounted on
+another link, on a robot, on a dynamic solid, or on a fixed object.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Link:
 
     Attributes:
         node: its Solid.
-        place: its frame; that of the end of its joint, if it has one.
+        place: its frame; for a link on a joint, the frame of the joint's end.
         joint: the joint that moves it; None if it is fixed and the force on it is measured.
         shapes: the shapes with which it touches other objects.
         matter: the masses of its Solids.
-        force: its force on the object on which it is mounted, in N, in its own axes; set by the physics.
+        force: the force in N on the object that carries the link, in the link's axes; set by the physics.
     """
 
     node: SceneNode
@@ -39,12 +39,12 @@ class Link:
 
     @property
     def start(self) -> Pose:
-        """Its frame in the outer frame, at the joint's position in the world file."""
+        """Its pose in the parent's frame, at the joint's position in the world file."""
         return self.place.start if isinstance(self.place, JointFrame) else self.place.pose
 
 
 def frames_between(outer: Frame | None, inner: Frame | None) -> Pose:
-    """Return the frame `inner` in the frame `outer` around it, with the current positions of all joints."""
+    """Return the pose of the frame `inner` in the frame `outer`, with the current positions of all joints."""
     pose = Pose()
     while inner is not None and inner is not outer:
         pose = _scaled(inner).after(pose)

@@ -22,8 +22,8 @@ class Loader:
     """Loads worlds for one kind of physics.
 
     Attributes:
-        physics: returns the physics of a world that is about to be read.
-        stand_ins: the user's own simple solids in place of PROTOs, by name.
+        physics: returns a new physics for a world.
+        stand_ins: the user's stand-ins, simple solids that replace PROTOs, by the name of the PROTO.
         leave_out: the nodes that the user leaves out, if they cannot be simulated.
     """
 
@@ -34,11 +34,11 @@ class Loader:
     def __call__(self, world_path: Path, mode: Mode) -> Simulation:
         """Return the simulation of a world and of the PROTOs in its project.
 
-        It starts in that mode.
+        The simulation starts in `mode`.
 
         Raises:
             WorldError: the file is wrong, or contains an object that cannot be simulated.
-            OSError: it cannot be read.
+            OSError: the file cannot be read.
         """
         source = read_bounded(world_path)
         world = parse(source, world_path.name)

@@ -1,4 +1,4 @@
-"""Lookup tables: from the distance that a sensor detects to the value that it reports.
+"""Lookup tables, which map the distance that a sensor detects to the value that it reports.
 
 As in Webots, the response is linear between the rows and constant beyond both ends, with Gaussian noise as a
 fraction of the response.
@@ -18,7 +18,7 @@ class LookupTable:
     """The response of a sensor to a distance.
 
     Args:
-        rows: by increasing distance; without rows, the response is the distance itself.
+        rows: the rows by increasing distance; without rows, the response is the distance itself.
     """
 
     __slots__ = ("_bases", "_distances", "_noisy", "_slopes", "rows")

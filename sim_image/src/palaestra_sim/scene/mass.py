@@ -1,6 +1,6 @@
-"""The mass of Solids, for a physics with masses: their shapes, and the mass of these.
+"""The masses of Solids, for a physics with masses.
 
-A Solid without a Physics node does not have its own mass. Source: Webots reference, Physics.
+A Solid without a Physics node has no mass of its own. Source: Webots reference, Physics.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class MassProperties:
         place: its frame.
         shapes: its boundingObject.
         mass_kg: 0 if it has no Physics node, or neither a mass nor a shape.
-        center: the center of mass in its frame, in meters; None for that of the shapes.
-        inertia: xx, yy, zz, xy, xz, yz about the center of mass in kg m2; None for that of the shapes.
+        center: the center of mass in its frame, in meters; None for the center of the shapes.
+        inertia: xx, yy, zz, xy, xz, yz about the center of mass in kg m2; None for the shapes' inertia.
     """
 
     place: Frame

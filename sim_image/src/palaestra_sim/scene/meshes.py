@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 from palaestra_sim.scene.geometry import Vector, cross, dot, minus
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-_SIDES: Final = 20  # a cone is drawn with so many sides
-_CORNERS: Final = 3  # a triangle has three
-_FEW: Final = 4  # a face with at most so many corners is treated as convex; most have three or four
+_SIDES: Final = 20  # number of sides of a cone
+_CORNERS: Final = 3  # number of corners of a triangle
+_FEW: Final = 4  # a face with up to this many corners is treated as convex
 _LARGEST_M: Final = 1e5
 _PARALLEL: Final = 1e-12
 _THIN_M: Final = 1e-4  # a mesh that is thinner than this counts as flat
@@ -36,7 +36,7 @@ class Mesh:
 
     @property
     def whole(self) -> _Part:
-        """All triangles, in boxes in boxes; they are sorted once."""
+        """The bounding-box tree of all triangles, which is built at the first use."""
         if not self._parts:
             points = self.points
             self._parts.append(_part([(points[a], points[b], points[c]) for a, b, c in self.triangles]))
@@ -44,12 +44,12 @@ class Mesh:
 
 
 class _Part(NamedTuple):
-    """Some triangles of a mesh.
+    """A node of the bounding-box tree of a mesh: some triangles, and the box around them.
 
     Attributes:
-        low, high: the corners of the box around them.
-        inner: their halves, if there are many.
-        corners: the corners of each triangle, if there are few.
+        low, high: two opposite corners of the box.
+        inner: the two halves of the triangles; empty in a leaf.
+        corners: in a leaf, the three corners of each triangle; else empty.
     """
 
     low: Vector
@@ -58,7 +58,7 @@ class _Part(NamedTuple):
     corners: tuple[Corners, ...]
 
     def reached(self, origin: Vector, direction: Vector, nearest_m: float) -> bool:
-        """Return whether a ray enters the box before it has travelled so far."""
+        """Return whether a ray enters the box within `nearest_m` meters of its origin."""
         enter, leave = 0.0, nearest_m
         for at, way, low, high in zip(origin, direction, self.low, self.high, strict=True):
             if -_PARALLEL < way < _PARALLEL:
@@ -71,7 +71,7 @@ class _Part(NamedTuple):
 
 
 def _part(corners: list[Corners]) -> _Part:
-    """Return triangles in halves of halves, along the longest side of the box around each."""
+    """Return the bounding-box tree of triangles, which are halved along the longest side of each box."""
     points = [point for three in corners for point in three]
     middle, size = box_of(points)
     low, high = (
@@ -145,9 +145,9 @@ def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
 
 
 def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bool = False) -> float:
-    """Return the meters along a ray to the nearest triangle; infinite if it misses all of them.
+    """Return the meters along a ray to the nearest triangle; infinite if the ray misses all triangles.
 
-    With `front`, a triangle is met from its outer side alone.
+    With `front`, the ray passes through the triangles that it meets from behind.
     """
     least, nearest_m = _PARALLEL if front else -math.inf, math.inf
     waiting = [mesh.whole]
@@ -161,7 +161,7 @@ def nearest_triangle(mesh: Mesh, origin: Vector, direction: Vector, *, front: bo
 
 
 def _to_triangle(origin: Vector, direction: Vector, corners: Corners, least: float) -> float:
-    """Return the meters to a triangle, as in Möller and Trumbore (1997); from behind `volume` is below 0."""
+    """Return the meters to a triangle, as in Möller and Trumbore (1997); `volume` < 0 from behind."""
     a, b, c = corners
     first, second, apart = minus(b, a), minus(c, a), minus(origin, a)
     across = cross(direction, second)
@@ -178,9 +178,9 @@ def _to_triangle(origin: Vector, direction: Vector, corners: Corners, least: flo
 
 
 def placed(mesh: Mesh, scale: Vector) -> Mesh | None:
-    """Return a mesh of a size, without points that are on no triangle; a flat one becomes 1 mm thick.
+    """Return a scaled mesh with only the points of its triangles; a flat mesh becomes 1 mm thick.
 
-    It is None if no triangle has an area.
+    The result is None if every triangle has the area 0.
     """
     used = sorted({index for triangle in mesh.triangles for index in triangle})
     at = {index: place for place, index in enumerate(used)}
@@ -204,7 +204,7 @@ def placed(mesh: Mesh, scale: Vector) -> Mesh | None:
 
 
 def _normal(points: Sequence[Vector], largest: Vector) -> Vector | None:
-    """Return the normal of a plane that has all points, along a vector; None if no plane has."""
+    """Return the unit vector along `largest` if it is the normal of a plane through all points, else None."""
     length = math.hypot(*largest)
     normal = largest[0] / length, largest[1] / length, largest[2] / length
     heights = [dot(normal, point) for point in points]
@@ -212,7 +212,7 @@ def _normal(points: Sequence[Vector], largest: Vector) -> Vector | None:
 
 
 def _area(points: Sequence[Vector], triangle: Triangle) -> Vector:
-    """Return a normal as long as twice the area of a triangle."""
+    """Return a normal of a triangle; its length is twice the area of the triangle."""
     a, b, c = (points[index] for index in triangle)
     return cross(minus(b, a), minus(c, a))
 
@@ -227,13 +227,13 @@ def box_of(points: Sequence[Vector]) -> tuple[Vector, Vector]:
 
 
 def volume_m3(mesh: Mesh) -> float:
-    """Return the volume that the triangles enclose; wrong if they have gaps."""
+    """Return the volume that the triangles enclose; it is wrong if the mesh has gaps."""
     points = mesh.points
     return abs(sum(dot(points[a], cross(points[b], points[c])) for a, b, c in mesh.triangles)) / 6.0
 
 
 def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
-    """Return an outline in the plane without its thinnest axis, counterclockwise."""
+    """Return an outline without the coordinate along which it is thinnest, counterclockwise."""
     normal = [
         sum(
             a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]
@@ -247,7 +247,7 @@ def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
 
 
 def _is_ear(flat: Sequence[tuple[float, float]], left: Sequence[int], at: int) -> bool:
-    """Return whether the remaining corner `at` can be cut off, because no other is inside its triangle."""
+    """Return whether the remaining corner `at` can be cut off: no other corner is inside its triangle."""
     a, b, c = flat[left[at - 1]], flat[left[at]], flat[left[(at + 1) % len(left)]]
     if _turn(a, b, c) <= 0.0:
         return False
@@ -263,7 +263,7 @@ def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 
 
 def _faces(indices: Sequence[float], count: int) -> Iterator[list[int]]:
-    """Yield the corners of each face; -1 ends one."""
+    """Yield the corners of each face; the index -1 ends a face."""
     face: list[int] = []
     for number in (*indices, -1.0):
         if number != -1.0:

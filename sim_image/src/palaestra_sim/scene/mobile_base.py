@@ -1,13 +1,13 @@
-"""The base of a robot: the speed of the robot, from the demands of its wheels' motors.
+"""The mobile base of a robot, which computes the robot's speed from the commands to its wheels' motors.
 
 `wheel_kinematics` relates wheel speeds to the robot's motion. In Webots torque and friction limit the
-acceleration of a robot. Here three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z.
-They are those of the Robotino 3's own controller
-(Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes,
-as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
-In a robot without physics, Webots itself limits the accelerations of the wheels: see `Motor.kinematic`.
+acceleration of a robot. Here three limits replace torque and friction: 10 m/s2 along x, 6 m/s2 along y, and
+20 rad/s2 about z. These limits are those of the Robotino 3's own controller (Webots,
+projects/robots/festo/robotino3/controllers/robotino3/base.c). The same factor slows all three axes, as in
+`base_accelerate` of that controller. A motor's own `acceleration` is an additional limit. The three limits do
+not apply to a robot without physics, whose wheel accelerations Webots itself limits (`Motor.kinematic`).
 
-Every simulator takes the speed from here, so a robot responds to its commands alike in all of them.
+Every simulator uses this speed, so a robot responds to the same commands in the same way in all of them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class MobileBase:
         drive: the kinematics of these wheels; None if they do not move the robot.
 
     Attributes:
-        drive: the argument.
+        drive: the kinematics of the wheels, or None, as passed.
         vx, vy, omega: the speed of the robot in m/s and rad/s, in its own axes.
     """
 
@@ -52,13 +52,13 @@ class MobileBase:
         return motor in self._wheels
 
     def halt(self) -> None:
-        """Stop all motion; the motors start from rest."""
+        """Stop all motion, including that of the motors."""
         self.vx = self.vy = self.omega = 0.0
         for wheel in self._wheels:
             wheel.halt()
 
     def push(self, vx: float, vy: float, omega: float) -> None:
-        """Give the robot a speed in its own axes; its motors continue from there."""
+        """Give the robot a speed in its own axes; its motors continue from this speed."""
         self.vx, self.vy, self.omega = vx, vy, omega
         if self.drive is not None:
             speeds = self.drive.wheel_speeds(vx, vy, omega)
@@ -87,7 +87,7 @@ class MobileBase:
         speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
         vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
-        # The number of steps at the largest acceleration; all three axes share it.
+        # The number of steps that the change takes at the largest accelerations, for all three axes together.
         steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
         if steps > 1.0 and not self._kinematic:
             demands = [
@@ -101,7 +101,7 @@ class MobileBase:
 
 
 class SteeredBase(MobileBase):
-    """The wheels of a robot of which some are steered; their angles change the drive."""
+    """The wheels of a robot with steered wheels, whose angles change the drive."""
 
     __slots__ = ("_steered",)
 

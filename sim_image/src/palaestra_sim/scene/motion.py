@@ -1,7 +1,8 @@
-"""The motion of a frame in the world: with its robot, and with the joints that carry it.
+"""The motion of a frame in the world, from the motion of its robot and of the joints that carry it.
 
-Velocities are in the axes of the world file, over the last basic step. They come from the speeds of body and
-motors, as those of Webots come from its physics. So a robot that a client moves elsewhere has no velocity.
+Velocities are in the axes of the world file, over the last basic step. A velocity is computed from the speeds
+of the body and the motors, not from the change of a pose. So a robot that a client moves to another position
+has no velocity, as in Webots.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class Motion(NamedTuple):
 
 
 def motion_of(place: Frame, body: Body | None) -> Motion:
-    """Return the motion of a frame on a robot; `body` is the robot's."""
+    """Return the motion of a frame on a robot; `body` is the body of that robot."""
     point = place.ground_pose.position
     velocity, turning = _REST, _REST
     if body is not None:
@@ -49,7 +50,7 @@ class Trail:
         self.reset()
 
     def reset(self) -> None:
-        """Reset the velocities: the frame is at rest, and was before."""
+        """Forget the last step; the acceleration is zero until the next step begins."""
         self._before = _REST
         self._step_s = 0.0
 

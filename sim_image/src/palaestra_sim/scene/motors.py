@@ -1,11 +1,11 @@
-"""Motors, and the positions of their shafts: angles of rotational motors, lengths of linear ones.
+"""Motors, and the positions of their shafts: angles of rotational motors, lengths of linear motors.
 
-A motor has the commands of Webots: a target position and a velocity. With a target of infinity it turns at
-that velocity; with a finite target it turns to the target, at most at that velocity. An invalid command is
-ignored without an error, because the ROS interface always returns success.
+A motor has the commands of Webots: a target position and a velocity. With an infinite target, the motor turns
+at that velocity. With a finite target, it turns to the target, at most at that velocity. An invalid command
+is ignored without an error, because the ROS interface always returns success.
 
-Where the end of a joint has physics, a PID controller demands the speed. Without physics, Webots moves the
-joint itself, without that controller: see `Motor.kinematic`. Source: Webots reference, Motor.
+If the end of a joint has physics, a PID controller computes the speed. Without physics, Webots moves the
+joint without this controller (`Motor.kinematic`). Source: Webots reference, Motor.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-_REACHED: Final = 1e-6  # in rad or m: this close to its target, a joint without physics rests, as in Webots
+_REACHED: Final = 1e-6  # rad or m: a joint without physics stops this close to its target, as in Webots
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorSpec:
     """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
 
-    Units of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited. Equal `min_rad` and
-    `max_rad` mean that commands have no limits. Equal `stops` mean that the joint has no stops, which the
-    shaft never passes. `start_rad` is the position in the world file. `gains` are P, I and D of its
-    controller. `multiplier` scales the positions, velocities and torques that a client sets. `forces`:
-    whether the physics has forces.
+    Units of a linear motor: m, m/s, N. An `acceleration_rad_s2` of -1 is unlimited. Equal `min_rad` and
+    `max_rad` mean that commands have no limits. The shaft never passes the `stops`; equal `stops` mean that
+    the joint has no stops. `start_rad` is the position in the world file. `gains` are P, I and D of its
+    controller. `multiplier` scales the positions, velocities and torques that a client sets. `forces` is True
+    if the physics has forces.
     """
 
     name: str
@@ -45,20 +45,20 @@ class MotorSpec:
 class Motor:
     """One motor: its commands, and the speed of its shaft.
 
-    The names are those of a rotational motor; the angles of a linear one are lengths in meters.
+    The names are those of a rotational motor; the angles of a linear motor are lengths in meters.
 
     Attributes:
         speed_rad_s: the speed of the shaft.
         angle_rad: the angle of the shaft, since the start or the last reset.
         asked_rad, asked_velocity_rad_s: the commands as a client reads them back, before the multiplier.
         gains: P, I and D of its controller.
-        kinematic: whether its joint has no physics. Then the available torque limits its acceleration, as in
-            Webots, and it keeps the commanded velocity up to its target.
-        changed: whether a command came since the physics last read it; the physics clears it.
+        kinematic: whether its joint has no physics. Then, as in Webots, the available torque limits the
+            acceleration, and the motor keeps the commanded velocity up to the target.
+        changed: whether a command came since the physics last read the motor; the physics clears this flag.
         damping: the damping of the joint, in N m s/rad, set by its brake; 0 without a brake.
         forceful: whether the physics moves it by forces.
-        effort_nm: the torque that a client set instead of a position; None if there is no such command.
-        feedback_nm: the torque that it applied in the last basic step.
+        effort_nm: the torque that a client set instead of a position; None without such a command.
+        feedback_nm: the torque that the motor applied in the last basic step.
     """
 
     __slots__ = (
@@ -105,7 +105,7 @@ class Motor:
         self.reset()
 
     def reset(self) -> None:
-        """Return to the initial state: position control, at the start, as fast as allowed."""
+        """Return to the initial state: position control to the start position, at the largest velocity."""
         self.target_rad = self.asked_rad = self.spec.start_rad
         self.velocity_rad_s = self.asked_velocity_rad_s = self.spec.max_velocity_rad_s
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
@@ -126,13 +126,13 @@ class Motor:
         self.halt()
 
     def halt(self) -> None:
-        """Stop the shaft; the motor starts from rest."""
+        """Stop the shaft; the motor accelerates again from speed 0."""
         self.speed_rad_s = 0.0
         self._rate = 0.0  # current velocity of a kinematic motor
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:
-        """Turn to `target_rad`, or with infinity at the commanded velocity. NaN is ignored."""
+        """Turn to `target_rad`; if it is infinite, turn at the commanded velocity. NaN is ignored."""
         if math.isnan(target_rad):
             return
         self.asked_rad = target_rad
@@ -183,7 +183,7 @@ class Motor:
     def set_effort(self, torque_nm: float) -> None:
         """Apply a torque, times the multiplier, until the next position command. NaN is ignored.
 
-        It is clamped to the available torque. It has an effect only if the motor is `forceful`.
+        The torque is clamped to the available torque. It has an effect only if the motor is `forceful`.
         """
         if math.isnan(torque_nm):
             return
@@ -198,7 +198,7 @@ class Motor:
             self.changed = True
 
     def demand(self, step_s: float) -> float:
-        """Return the speed in rad/s that the motor demands in the next `step_s` seconds, once a step."""
+        """Return the speed in rad/s that the motor demands in the next step; call this once for each step."""
         if self.kinematic:
             return self._kinematic_speed(step_s)
         if not self.available_torque_nm:
@@ -225,7 +225,7 @@ class Motor:
         return max(-limit, min(limit, wanted))
 
     def _kinematic_speed(self, step_s: float) -> float:
-        """Return the speed in the next step for a joint without physics; it ends at the target."""
+        """Return the speed in the next step for a joint without physics; the motion ends at the target."""
         gap = self.target_rad - self.angle_rad
         endless = math.isinf(gap)
         if abs(gap) < _REACHED or (endless and self._at_limit()):
@@ -249,7 +249,7 @@ class Motor:
         return (self.angle_rad >= high and velocity >= 0.0) or (self.angle_rad <= low and velocity <= 0.0)
 
     def advance(self, step_s: float) -> None:
-        """Turn the shaft for `step_s` seconds, as far as the stops of its joint."""
+        """Turn the shaft for `step_s` seconds, at most to a stop of its joint."""
         self.speed_rad_s = self.demand(step_s)
         self.angle_rad += self.speed_rad_s * step_s
         low, high = self.spec.stops
@@ -259,6 +259,6 @@ class Motor:
 
     @property
     def steady(self) -> bool:
-        """Return whether the shaft turns at the commanded speed, which stays until the next command."""
+        """Return whether the shaft keeps its current speed until the next command."""
         endless = math.isinf(self.target_rad) and self.speed_rad_s == self.velocity_rad_s
         return endless and not (self.kinematic and self.spec.min_rad != self.spec.max_rad)

@@ -1,7 +1,7 @@
 """Movies of the Viewpoint's view, in simulated time.
 
-A frame is rendered after each basic step that is due: 25 times per second of the movie, as far as whole steps
-allow, and at most once a step. A movie that fails leaves no file, and the reason is logged.
+A movie has 25 frames per second, rounded so that a frame is rendered after a whole number of basic steps. A
+movie that fails leaves no file, and the reason is logged.
 Source: WbVideoRecorder.cpp of Webots.
 """
 
@@ -42,13 +42,13 @@ class Movie:
 
 
 class VideoWriter(Protocol):
-    """The file of a movie. It appears at its path when it is finished; to abandon it, drop the object."""
+    """The file of a movie, which appears at its path when it is finished; to abandon it, drop this object."""
 
     def add(self, pixels: bytes | memoryview) -> None:
         """Add a frame: blue, green, red and alpha of each pixel.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         ...
 
@@ -56,13 +56,13 @@ class VideoWriter(Protocol):
         """Complete the file and move it to its path.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         ...
 
 
 class Movies:
-    """The movies of one world, one at a time.
+    """Records the movies of one world, one at a time.
 
     Args:
         view: returns a camera of that size at the current Viewpoint; None if the simulator does not render.
@@ -90,7 +90,7 @@ class Movies:
 
     @property
     def ready(self) -> bool:
-        """Whether a recording could start."""
+        """Whether a new recording can start."""
         return self._film is None
 
     def start(self, movie: Movie) -> bool:
@@ -119,14 +119,14 @@ class Movies:
         return not self.failed
 
     def stepped(self) -> None:
-        """Record the state after a basic step, if it is due."""
+        """Record a frame after a basic step, if a frame is due."""
         film = self._film
         if film is None:
             return
         self._elapsed_ms += self._basic_step_ms
         if self._elapsed_ms % self._every_ms:
             return
-        camera = self._view(self._size)  # again for each frame, because a client may have moved the Viewpoint
+        camera = self._view(self._size)  # a new camera, because a client may have moved the Viewpoint
         if camera is not None:
             pixels = camera.colors()
             self._try(lambda: film.add(pixels))
@@ -137,7 +137,7 @@ class Movies:
         if film is None:
             return
         if self._elapsed_ms < self._every_ms:
-            log.warning("movie: nothing was recorded, because the simulation did not run; make steps")
+            log.warning("movie: nothing was recorded, because the simulation did not run; request steps")
             self.failed = True
         else:
             self._try(film.finish)
@@ -165,7 +165,7 @@ def _require_possible(movie: Movie) -> None:
     """Check the parameters of a requested movie.
 
     Raises:
-        UnsimulatedError: it cannot be recorded with these parameters.
+        UnsimulatedError: a movie with these parameters cannot be recorded.
     """
     if not movie.path.lower().endswith(".mp4"):
         raise UnsimulatedError(

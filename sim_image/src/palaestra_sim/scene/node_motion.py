@@ -1,4 +1,4 @@
-"""The motion of nodes, and the forces on them: velocities, forces and torques, for a supervisor.
+"""The velocities of nodes, and the forces and torques on them, for a supervisor.
 
 Robots and dynamic solids move. All other nodes are at rest, and forces and velocities do not affect them.
 """
@@ -49,7 +49,7 @@ class NodeMotion:
         return place.from_ground(velocity), place.from_ground(turning)
 
     def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
-        """Give a node a velocity; a robot's motors bring it back to their commands within a few steps."""
+        """Give a node a velocity; a robot's motors return to their commanded speeds within a few steps."""
         robot, thing = self._robot_of(node), self._loose_of(node)
         if thing is not None:
             thing.place.push(thing.place.to_ground(velocity), thing.place.to_ground(turning))
@@ -72,10 +72,10 @@ class NodeMotion:
         """Apply a force in N in the next basic step.
 
         Args:
-            node: the node on which it acts.
-            force: in the axes of the node if `relative`.
-            relative: whether the force is in the axes of the node.
-            offset: where it acts, in the frame of the node, in meters; None for the center of mass.
+            node: the node on which the force acts.
+            force: the force in N.
+            relative: whether `force` is in the axes of the node, and not in those of the world.
+            offset: the point at which it acts, in meters in the node's frame; None for the center of mass.
 
         Raises:
             UnsimulatedError: this physics has no forces, or the node has no frame.

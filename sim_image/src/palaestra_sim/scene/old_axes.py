@@ -1,9 +1,9 @@
 """Nodes of files from before R2022a, whose axes Webots converts when it loads them.
 
 In these files robots looked along -z, cylinders stood along y, and many devices looked along other axes.
-Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. Here a
-RangeFinder is rotated too, so that it looks in the direction that its author intended.
-Source: WbNodeUtilities::fixBackwardCompatibility of Webots.
+Webots rotates these nodes, and the instances of its own PROTOs, whose files have the current axes. This
+module also rotates a RangeFinder, so that it looks in the direction that its author intended. Source:
+WbNodeUtilities::fixBackwardCompatibility of Webots.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from palaestra_sim.scene.frames import Y_UP, Frame
 from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, to_axis_angle, transposed, turned
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 
-# Each has the current axes as columns, in those of the file.
+# The columns of each matrix are the current axes, in the axes of the file.
 _LOOKING: Final[Matrix] = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
 _POINTING: Final[Matrix] = (0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _STANDING: Final = Pose(rotation=transposed(Y_UP))
@@ -26,7 +26,7 @@ def of_old_axes(node: SceneNode) -> bool:
 
 
 def standing(node: SceneNode, frame: Pose) -> Pose:
-    """Return the frame, along z, of a shape or a Track that is along y in an old file."""
+    """Return the frame of a shape or a Track that stands along z; in an old file, along y."""
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_STANDING)

@@ -1,8 +1,8 @@
 """The interface of a physics for the scene: bodies that move, rays, contacts, and images.
 
-The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's is kinematic;
-another one can replace it by implementing this Protocol. It uses the axes of the ground, of which z points
-up; the world file may have others.
+The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's physics is
+kinematic; any class that implements the Protocol `Physics` can replace it. A physics uses the axes of the
+ground, where z points up, even if y points up in the world file.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Figure(Protocol):
 
     Attributes:
         place: its frame.
-        body: None if nothing moves it and nothing can collide with it.
-        powered: whether its motors turn.
+        body: its body in this physics; None if it cannot drive and is not a free-standing obstacle.
+        powered: whether its motors have energy to turn.
     """
 
     place: Frame
@@ -42,7 +42,7 @@ class Figure(Protocol):
 
     @property
     def links(self) -> Sequence[Link]:
-        """The parts that forces move on its joints, outer ones first."""
+        """The parts on its joints that forces move, outer parts first."""
         ...
 
 
@@ -68,7 +68,7 @@ class Abilities:
 class Push(NamedTuple):
     """A force in N and a torque in N m for one basic step, in the axes of the ground.
 
-    The force acts at `point`, in meters, or at the center of mass if that is None.
+    The force acts at `point`, in meters. If `point` is None, the force acts at the center of mass.
     """
 
     force: Vector = (0.0, 0.0, 0.0)
@@ -97,7 +97,7 @@ class Physics(Protocol):
         ...
 
     def begin(self, surroundings: PhysicsSettings) -> None:
-        """Set the options of the whole world, before its contents are arranged."""
+        """Set the options of the whole world, before `arrange` sets its contents."""
         ...
 
     def arrange(
@@ -122,11 +122,11 @@ class Physics(Protocol):
         ...
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return a function that returns the distance that each beam of a robot travels now, in meters."""
+        """Return a function that returns how far each beam of a robot travels, in meters."""
         ...
 
     def see(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that meet visible objects and pass through the robot itself."""
+        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
         ...
 
     def push(self, target: Figure | DynamicSolid, push: Push) -> None:
@@ -134,7 +134,7 @@ class Physics(Protocol):
         ...
 
     def show(self, view: View) -> None:
-        """Set the visible part of the world; a physics that does not render ignores it."""
+        """Set the visible part of the world; a physics that does not render ignores this call."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
@@ -145,11 +145,11 @@ class Physics(Protocol):
         """Return a writer for a movie; None if this physics does not render.
 
         Raises:
-            OSError: its file cannot be written.
+            OSError: the file of the movie cannot be written.
             UnsimulatedError: the encoder is not installed.
         """
         ...
 
     def contacts(self) -> Iterable[ContactPoint]:
-        """Return the contact points of robots with obstacles and with each other now."""
+        """Return the current contact points of robots with obstacles and with each other."""
         ...

@@ -11,7 +11,7 @@ from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.validation import NodeReader
 
-DEFAULT: Final = "default"  # the material of a Solid that does not name one
+DEFAULT: Final = "default"  # the material of a Solid without a contactMaterial
 _COULOMB: Final = 1.0  # friction of two materials without ContactProperties
 _ENDLESS: Final = 100.0  # replaces -1, which stands for infinite friction in Webots
 
@@ -39,10 +39,10 @@ class PhysicsSettings:
     """The settings of a whole world.
 
     Attributes:
-        gravity_m_s2: downward.
-        frictions: the coefficients of pairs of materials, for those that have ContactProperties.
+        gravity_m_s2: the downward acceleration.
+        frictions: the friction coefficients of the pairs of materials that have ContactProperties.
         floor: the material of the floors.
-        floors: the floors of the world; without any, the world has one at height 0.
+        floors: the floors of the world; if empty, the world has one floor at height 0.
     """
 
     gravity_m_s2: float = 9.81
@@ -80,6 +80,6 @@ def material_of(node: SceneNode) -> str:
 
 
 def _coefficient(properties: SceneNode) -> float:
-    """Return one coefficient; if it differs by direction, the mean."""
+    """Return the friction coefficient; if it differs by direction, return the mean."""
     numbers = properties.numbers("coulombFriction") or (_COULOMB,)
     return sum(_ENDLESS if number < 0.0 else number for number in numbers) / len(numbers)

@@ -1,6 +1,7 @@
-"""Images as files: PNG is written without a library, all else needs Pillow, which is loaded on demand.
+"""Read and write image files.
 
-Paths are absolute, or relative to the working directory of the simulator.
+Writing a PNG file needs no library. Everything else needs Pillow, which is imported on demand. Paths are
+absolute, or relative to the working directory of the simulator.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ def save(
     Args:
         path: the path of the file.
         size: width and height.
-        pixels: blue, green, red and alpha of each, row by row from the top left.
+        pixels: blue, green, red and alpha of each pixel, row by row from the top left.
         quality: the quality of a JPEG file, from 1 to 100.
-        alpha: whether a PNG file stores it.
+        alpha: whether a PNG file stores the alpha values.
 
     Raises:
         UnsimulatedError: the name is not that of a PNG or JPEG file, or Pillow is missing.
@@ -73,7 +74,7 @@ def _opened(file: str | BytesIO) -> ImageBuffer | None:
 
 
 def decode(data: bytes) -> ImageBuffer | None:
-    """Return the picture of the bytes of a PNG or JPEG file; None if they are of none.
+    """Return the image in the bytes of a PNG or JPEG file; None if the bytes are not such a file.
 
     Raises:
         UnsimulatedError: Pillow is missing.
@@ -85,7 +86,7 @@ def pillow(module: str) -> Any:
     """Return a module of Pillow.
 
     Raises:
-        UnsimulatedError: it is not installed.
+        UnsimulatedError: Pillow is not installed.
     """
     try:
         return import_module(f"PIL.{module}")

@@ -1,4 +1,4 @@
-"""Images as bytes of PNG, with 8 bits per channel, without a library.
+"""Encode images as PNG with 8 bits per channel, without a library.
 
 Source: https://www.w3.org/TR/png/
 """
@@ -21,8 +21,8 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
 
     Args:
         size: width and height.
-        pixels: blue, green, red and alpha of each, row by row from the top left.
-        alpha: whether the file stores it.
+        pixels: blue, green, red and alpha of each pixel, row by row from the top left.
+        alpha: whether the file stores the alpha values.
     """
     width, height = size
     order = (2, 1, 0, 3) if alpha else (2, 1, 0)
@@ -36,7 +36,7 @@ def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alp
 
 
 def _rows(colors: bytearray, length: int) -> Iterator[bytes]:
-    """Yield each row after the number of its filter, which is 0 for no filter."""
+    """Yield the number of a filter (0 for no filter) and the pixels, for each row."""
     for at in range(0, len(colors), length):
         yield b"\0"
         yield bytes(colors[at : at + length])

@@ -1,7 +1,7 @@
 """The targets of radars: Solids with a `radarCrossSection`, and the shapes that hide them. Pure geometry.
 
-The size of a Solid is that of the boxes around its shapes, along the axes of the radar; without shapes it is
-a point. Parts outside the field of view do not count. Floors hide nothing, and neither does the robot itself.
+The size of a Solid is that of the box around its shapes, along the axes of the radar. A Solid without shapes
+is a point. Parts outside the field of view do not count. Floors and the radar's own robot hide no target.
 Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
 """
 
@@ -34,7 +34,7 @@ class RadarTarget:
     Attributes:
         place: its frame.
         cross_section_m2: its `radarCrossSection`.
-        shapes: its own and those of the Solids inside it.
+        shapes: its own shapes and those of the Solids inside it.
         nodes: itself and all nodes inside it.
     """
 
@@ -44,7 +44,7 @@ class RadarTarget:
     nodes: frozenset[SceneNode]
 
     def seen_from(self, radar: Pose, field_of_view_rad: tuple[float, float]) -> Bounds | None:
-        """Return the part of it in a field of view, horizontal and vertical; None if no part is in it.
+        """Return the box around its part in a field of view (horizontal, vertical); None if it is outside.
 
         `radar` is in the axes of the ground.
         """
@@ -61,7 +61,7 @@ class RadarTargets:
     """The targets of the radars of a world.
 
     Attributes:
-        targets: in the order of the world file.
+        targets: the targets, in the order of the world file.
         shapes: all shapes that may hide them.
     """
 
@@ -71,8 +71,8 @@ class RadarTargets:
     def free_path(self, target: RadarTarget, start: Vector, robot: frozenset[SceneNode]) -> float:
         """Return the distance from `start`, toward the origin of a target, to the first obstacle.
 
-        In meters, infinite if there is no obstacle. `robot` has the nodes of the robot that carries the
-        radar.
+        The distance is in meters, and infinite without an obstacle. `robot` contains the nodes of the robot
+        that carries the radar.
         """
         end = target.place.ground_pose.position
         way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
@@ -132,7 +132,7 @@ def _cut(box: Bounds, across_rad: float, up_rad: float) -> Bounds | None:
 
 
 def _beyond(ahead: float, aside: float, size: float, half_rad: float) -> Iterator[float | None]:
-    """Yield the length beyond each edge, of the positive side first; None if the whole box is beyond it."""
+    """Yield the length of a box beyond each edge, the positive edge first; None if the box is outside."""
     for side in (-aside, aside):
         inside = math.sin(half_rad) * ahead + math.cos(half_rad) * side
         yield None if inside < -size / 2.0 else max(0.0, size / 2.0 - inside)

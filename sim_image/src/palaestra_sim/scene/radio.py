@@ -1,4 +1,4 @@
-"""The radio between emitters and receivers: it decides which receivers get a packet."""
+"""The radio between emitters and receivers, which decides which receivers get a packet."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from palaestra_sim.scene.geometry import transposed, turn
 
 
 class Radio:
-    """Carries packets from the devices of each robot of a world to those of the others.
+    """Delivers packets from the emitters of each robot to the receivers of all other robots.
 
     Args:
-        robots: the devices of each.
+        robots: for each robot, its devices.
     """
 
     def __init__(self, robots: Iterable[Iterable[object]]) -> None:

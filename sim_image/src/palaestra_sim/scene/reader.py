@@ -1,7 +1,8 @@
 """Read the simulated contents of a world file.
 
-Nodes that are only visible are skipped. Upright nodes with a boundingObject are obstacles, and robots drive.
-Any other node with an effect in Webots, such as an unknown PROTO, is refused with its place in the file.
+The reader skips nodes that are only visible. It reads robots, and makes obstacles of upright nodes with a
+boundingObject. It refuses any other node that has an effect in Webots, such as an unknown PROTO, and reports
+the node's position in the file.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ DRAWN_ONLY: Final = frozenset(
         "WorldInfo",
     )
 )
-# A device without a robot is a Solid like others.
+# A device outside of a robot is an ordinary Solid.
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 _ONE_AXIS: Final = frozenset(("HingeJoint", "SliderJoint"))
@@ -57,18 +58,18 @@ class SceneContents:
     """The contents of a world.
 
     Attributes:
-        physics: moves the robots.
+        physics: the physics that moves the robots.
         basic_step_ms: WorldInfo.basicTimeStep.
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         loose: the dynamic solids, which move when they are pushed.
         heavy: Solids with physics that are fixed to another Solid, with their own shapes.
         doors: links that swing on joints without a robot.
-        robots: in the order of the world file.
+        robots: the robots, in the order of the world file.
         top: the frame around the whole world; None if z of the world points up.
         surroundings: the settings of the whole world.
-        left_out: the unsupported nodes that the user left out, each with its place.
-        leave_out: the nodes that the user leaves out.
+        left_out: the unsupported nodes that the user left out, each with its position in the file.
+        leave_out: the nodes that the user leaves out if they are unsupported.
     """
 
     physics: Physics
@@ -86,14 +87,14 @@ class SceneContents:
 
 
 def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> SceneContents:
-    """Return the contents of a world, and give its nodes their frames; its robots have bodies of `physics`.
+    """Return the contents of a world, and give its nodes their frames; `physics` makes its robots' bodies.
 
     Raises:
-        WorldError: it has objects that cannot be simulated; the error lists all of them.
+        WorldError: the world has objects that cannot be simulated; the error lists all of them.
     """
     reading = NodeReader(tree.refused, leave_out, physics.abilities.name)
     scene = SceneContents(physics=physics)
-    # First, because devices read WorldInfo too, wherever it is in the file.
+    # WorldInfo is read first, because devices read it too, wherever it is in the file.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
             reading.world_info = node
@@ -116,12 +117,12 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
 
 
 def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: SceneContents) -> SceneContents:
-    """Return the contents that nodes inside one parent add to a world, and give them their frames.
+    """Return the contents that nodes inside one parent add to a world, and give these nodes their frames.
 
     `to` has the contents of the world so far.
 
     Raises:
-        WorldError: they have objects that cannot be simulated.
+        WorldError: the nodes contain objects that cannot be simulated.
     """
     reading = NodeReader((), to.leave_out, to.physics.abilities.name)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
@@ -163,7 +164,7 @@ def _read(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: Sce
 
 
 def _read_joint(reading: NodeReader, node: SceneNode, parent: Frame | None, scene: SceneContents) -> None:
-    """Read a joint that does not belong to a robot: without physics nothing moves its end."""
+    """Read a joint that does not belong to a robot; an end without physics is fixed."""
     if scene.physics.abilities.joints and node.type_name in _ONE_AXIS:
         link = read_door(reading, node, parent)
         if link is not None:
@@ -212,9 +213,9 @@ def _is_loose(node: SceneNode) -> bool:
 
 
 def _is_fixed(node: SceneNode) -> bool:
-    """Return whether a Solid is inside another one without a joint, so that Webots makes them one body.
+    """Return whether a Solid is inside another Solid without a joint; Webots makes these one body.
 
-    If the other one has no physics, both are fixed to the world.
+    If the outer Solid has no physics, both are fixed to the world.
     """
     for around in node.ancestors():
         if around.type_name in _JOINTS:
@@ -276,7 +277,7 @@ def _read_solid(reading: NodeReader, node: SceneNode, place: Frame, scene: Scene
 
 
 def _stand(reading: NodeReader, shapes: Iterable[Shape], scene: SceneContents) -> None:
-    """Add shapes that are upright or lie flat to the obstacles."""
+    """Add shapes to the obstacles, and refuse tilted shapes that the physics does not support."""
     for shape in shapes:
         if not (shape.upright or scene.physics.abilities.leaning):
             reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")

@@ -1,10 +1,11 @@
 """One simulated robot: its motors, its sensors, and its noise.
 
-The seed of the noise is in the robot's `customData`, either as a whole number (`"7"`) or as JSON
-(`'{"seed": 7}'`). It is read when the world is loaded and at each `simulation_reset`. Any other text leaves
-the seed unchanged; the first one is WorldInfo.randomSeed. After a reset, the noise depends only on the seed
-and on the number of steps. Every sensor with noise draws at every step, even while it is not enabled: types
-in the order of the table of devices, sensors in that of the world file.
+The robot's `customData` contains the seed of the noise, either as a whole number (`"7"`) or as JSON
+(`'{"seed": 7}'`). The seed is read when the world is loaded and at each `simulation_reset`. Any other text
+leaves the seed unchanged. The initial seed is WorldInfo.randomSeed. After a reset, the noise depends only on
+the seed and on the number of steps. For this reason every sensor with noise draws a random number at every
+step, even while the sensor is not enabled. The sensors draw in the order of their types in `DEVICES`, then in
+the order of the world file.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ class Robot:
 
     Attributes:
         name: Robot.name in the world file.
-        motors: by device name.
-        sensors: by device name; each has a `value` after a step.
+        motors: its motors, by device name.
+        sensors: its sensors, by device name; each has a `value` after a step.
         samplers: functions that set the values of all sensors, in this order.
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
-        body: None if nothing moves it and nothing can collide with it.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         time_s: the time of the world since its start or its last reset.
-        powered: whether its motors turn; without energy they do not.
-        links: the parts that forces move on its joints.
+        powered: whether its motors have energy to turn.
+        links: the parts on its joints that forces move.
         battery: its battery; its value is -1 if the robot has no battery.
     """
 
@@ -82,7 +83,7 @@ class Robot:
 
     @property
     def custom_data(self) -> str:
-        """The customData field, as it is now."""
+        """The current value of the customData field."""
         return self.parts.node.text("customData") or ""
 
     @custom_data.setter
@@ -90,19 +91,19 @@ class Robot:
         self.parts.node.fields["customData"] = FieldContent([text])
 
     def look(self, beams: Sequence[Beam]) -> Cast:
-        """Return a function for the distance that each beam travels now, in meters; see `Carrier`."""
+        """Return a function that returns how far each beam travels, in meters; see `Carrier`."""
         return self._physics.look(self, beams)
 
     def see(self, beams: Sequence[Beam]) -> Cast:
-        """Return the same function for beams that meet visible objects; see `Carrier`."""
+        """Return such a function for beams that stop at visible objects; see `Carrier`."""
         return self._physics.see(self, beams)
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function that returns what each infra-red beam meets now; see `Carrier`."""
+        """Return a function that returns the surface that each infra-red beam meets; see `Carrier`."""
         return VisualRays(self._view, self.place, beams, textures=True).cast
 
     def lights(self) -> Sequence[SceneNode]:
-        """Return the lights of the world now; see `Carrier`."""
+        """Return the current lights of the world; see `Carrier`."""
         return self._view.lights()
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
@@ -119,13 +120,13 @@ class Robot:
         return motion_of(place, self.body)
 
     def follow(self, place: Frame) -> Callable[[], Vector]:
-        """Return a function for the acceleration of a frame; see `Carrier`."""
+        """Return a function that returns the acceleration of a frame; see `Carrier`."""
         trail = Trail(place, self.body)
         self._trails.append(trail)
         return trail.acceleration
 
     def begin(self, step_s: float) -> None:
-        """Begin a basic step; if the battery is empty, stand still."""
+        """Begin a basic step; a robot with an empty battery stands still."""
         self.time_s += step_s
         if self._has_battery:
             self.powered = not self._exhausted(step_s)
@@ -136,7 +137,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn the motors that are neither wheels nor moved by forces, for one basic step."""
+        """Turn for one basic step the motors that neither drive a wheel nor move by forces."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)
@@ -146,7 +147,7 @@ class Robot:
         return self.battery.empty
 
     def reset(self) -> None:
-        """Return to the start in the world file: pose, rest, motors, battery, noise; customData is kept."""
+        """Stop, and return pose, motors, battery and noise to their start; customData is kept."""
         self.battery.reset()
         self.time_s = 0.0
         self.powered = True

@@ -20,8 +20,8 @@ from palaestra_sim.scene.geometry import (
 class RobotFrame(Frame):
     """The frame of a robot with a body, which drives upright at a constant height.
 
-    It is at the top of the world, which never moves or turns, so the pose of the body is also that of the
-    frame. The body uses the axes of the ground.
+    The robot is at the top of the world, not inside another node, so its frame has the pose of the body. The
+    body uses the axes of the ground.
     """
 
     moves = True
@@ -35,7 +35,7 @@ class RobotFrame(Frame):
 
     @property
     def translation(self) -> Vector:
-        """X and y of the body, and the height of the world file or the last write; in the file's axes."""
+        """X and y of the body, and the height that the file or a client has set last, in the file's axes."""
         return self.from_ground((self._body.x, self._body.y, self._height_m))
 
     @translation.setter
@@ -45,7 +45,7 @@ class RobotFrame(Frame):
 
     @property
     def rotation(self) -> AxisAngle:
-        """The heading of the body, about the z axis if that of the world points up."""
+        """The heading of the body as axis and angle, in the axes of the world file."""
         heading = (0.0, 0.0, 1.0, self._body.heading_rad)
         if self.axes is None:
             return heading
@@ -60,18 +60,18 @@ class RobotFrame(Frame):
 
     @property
     def height_m(self) -> float:
-        """The height of its origin in the world."""
+        """The height of the robot's origin in the world."""
         return self._height_m
 
 
 class TurnedFrame(Frame):
     """The frame of a robot in the world file, relative to its frame with z up.
 
-    Clients read and write the frame of the file; the upright frame follows.
+    Clients read and write this frame; a write moves the upright frame too.
 
     Args:
         upright: the frame with z up.
-        turn: the rotation of the file's frame in it.
+        turn: the rotation of this frame in the upright frame.
     """
 
     def __init__(self, upright: Frame, turn: Matrix) -> None:
@@ -81,7 +81,7 @@ class TurnedFrame(Frame):
 
     @property
     def pose(self) -> Pose:
-        """The frame, in the parent of the upright frame."""
+        """The pose in the upright frame."""
         return Pose(rotation=self._turn)
 
     @property
@@ -95,7 +95,7 @@ class TurnedFrame(Frame):
 
     @property
     def rotation(self) -> AxisAngle:
-        """The rotation of the file's frame, in the frame around the robot."""
+        """The rotation of this frame, in the parent of the upright frame."""
         return turned(self._upright.rotation, self._turn)
 
     @rotation.setter
@@ -103,5 +103,5 @@ class TurnedFrame(Frame):
         self._upright.rotation = turned(value, transposed(self._turn))
 
     def return_to_start(self) -> None:
-        """Return together with the upright frame."""
+        """Return the upright frame, and with it this frame, to the pose in the world file."""
         self._upright.return_to_start()

@@ -1,7 +1,7 @@
 """Find the joints of a robot that forces move, in a physics with forces.
 
-These are joints with a motor that is not a wheel's, and joints without a motor whose end has physics. A joint
-on a wheel is part of the wheel. A caster on the floor follows a driving robot without forces.
+The parts on such a joint have physics. A joint that drives or steers a wheel does not count, nor does a joint
+on a wheel. A caster on the floor does not count either, because it follows a driving robot without forces.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.validation import NodeReader
 from palaestra_sim.scene.wheels import Driven
 
-_CLEARANCE_M: Final = 0.01  # the end of a joint that is nearer to the floor rolls on it
+_CLEARANCE_M: Final = 0.01  # a joint's end that is nearer than this to the floor rolls on the floor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +28,11 @@ class Parts:
     """The parts of one robot, in its own frame, with all joints as in the world file.
 
     Attributes:
-        nodes: each node with its frame, outer ones first.
-        shapes: all shapes that may touch something.
+        nodes: each node with its frame, outer nodes first.
+        shapes: all shapes that can collide with something.
         wheels: the wheels that drive the robot.
         steering: the motors that steer its wheels.
-        measured: parts whose force on the robot is measured, still without shapes and masses.
+        measured: links whose force on the robot a sensor measures; they have no shapes and masses yet.
     """
 
     nodes: Sequence[tuple[SceneNode, Frame]]
@@ -48,7 +48,7 @@ class Parts:
 
 
 def links_among(reading: NodeReader, parts: Parts) -> tuple[tuple[Link, ...], tuple[MassProperties, ...]]:
-    """Return the links of a robot, outer ones first, and the masses of the parts that are not on a link."""
+    """Return the links of a robot, outer links first, and the masses of the parts that are not on a link."""
     links = [
         Link(node=node, place=place, joint=place.joint)
         for node, place in parts.nodes
@@ -66,7 +66,7 @@ def links_among(reading: NodeReader, parts: Parts) -> tuple[tuple[Link, ...], tu
 
 
 def shapes_on(link: Link | None, links: Sequence[Link], shapes: Sequence[Shape]) -> tuple[Shape, ...]:
-    """Return the shapes on a link, each once; for None, those that are not on any link."""
+    """Return the distinct shapes on a link; for None, the shapes that are not on any link."""
     found = {
         (shape.node.number, shape.place): shape
         for shape in shapes

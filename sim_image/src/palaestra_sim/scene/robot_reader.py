@@ -1,8 +1,8 @@
 """Read a Robot node: its outline, its joints, its wheels, and its devices.
 
 Hinges and tracks with motors may be wheels (`wheels`). All wheels together form the drive
-(`wheel_kinematics`). Other parts on joints move with them, but touch nothing, unless the physics moves joints
-by forces (`robot_links`). A robot without an outline and without wheels has no body.
+(`wheel_kinematics`). Other parts on joints move with their joint, but collide with nothing, unless the
+physics moves joints by forces (`robot_links`). A robot without an outline and without wheels has no body.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from palaestra_sim.scene.wheel_reader import read_rolling
 from palaestra_sim.scene.wheels import Driven, Rolling, tires_among, wheels_among
 
 _LIGHTS: Final = ("DirectionalLight", "PointLight", "SpotLight")
-# A SolidReference closes a loop of joints; the solid is read at its own place.
+# A SolidReference closes a loop of joints. Its solid is read where the world file defines it.
 _INERT: Final = frozenset(("Shape", "CadShape", *_LIGHTS, "Slot", "SolidReference", "TrackWheel"))
 _MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
 _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
@@ -56,7 +56,8 @@ _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 _NAME_IT: Final = (
     "give it a name of its own of letters, digits and underscores, or leave it out (--leave-out)"
 )
-_STEP_M: Final = 0.005  # robots drive over lower steps; in real worlds, they begin slightly inside the floor
+# Robots drive over lower steps. Real worlds need this, because their robots start slightly inside the floor.
+_STEP_M: Final = 0.005
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -64,10 +65,10 @@ class RobotParts:
     """A robot of the world file.
 
     Attributes:
-        body: None if nothing can collide with it.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
         arguments: its controllerArgs; None if its controller is not "ros".
-        links: the parts that forces move on its joints.
+        links: the parts on its joints that forces move.
     """
 
     node: SceneNode
@@ -102,7 +103,7 @@ class _RobotReader:
         self._measured: list[Link] = []
         self._driven: list[Driven] = []
         self._idle: list[Rolling] = []  # wheels without motors
-        self._steering: list[Motor] = []  # they steer wheels
+        self._steering: list[Motor] = []  # motors that steer wheels
         self._parts: list[tuple[SceneNode, Frame]] = []
 
     def read(self) -> RobotParts:
@@ -114,7 +115,7 @@ class _RobotReader:
         self._read_children(node, self._frame)
         wheels, drive = self._find_drive()
         if node.nodes("physics"):
-            for found in wheels:  # the robot with its wheels is one body, so they count as having physics
+            for found in wheels:  # robot and wheels are one body, so the wheels count as having physics
                 found.motor.kinematic = False
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
         links: tuple[Link, ...] = ()
@@ -174,7 +175,7 @@ class _RobotReader:
         )
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
-        """Return whether a robot without a drive has a body: it is upright, at the top of the world."""
+        """Return whether a robot without a drive is a free-standing obstacle: upright, at the top level."""
         return bool(shapes) and self._at_top and Frame(self._parent, *self._start).ground_pose.upright
 
     def _has_y_up(self) -> bool:
@@ -185,7 +186,7 @@ class _RobotReader:
 
     @property
     def _start(self) -> tuple[Vector, AxisAngle]:
-        """The initial position and rotation of the robot's frame with z up, in the frame around it."""
+        """The initial position and rotation of the robot's frame with z up, in the parent's frame."""
         translation, rotation = _where(self._reading, self._node)
         if self._y_points_up:
             rotation = turned(rotation, transposed(Y_UP))
@@ -226,7 +227,7 @@ class _RobotReader:
             part.place = part_place
 
     def _lacks(self, node: SceneNode, fact: str) -> None:
-        """Record an object that cannot be simulated; on a robot without clients, just leave it out."""
+        """Record an object that cannot be simulated; if the controller is not "ros", leave it out instead."""
         if self._by_ros:
             self._reading.lacks(node, fact)
         else:
@@ -309,7 +310,7 @@ class _RobotReader:
         self._read_frame(end, inner)
 
     def _read_loose_joint(self, node: SceneNode, place: Frame) -> None:
-        """Read a joint without motors, such as a caster, as fixed, with all parts on it."""
+        """Read a joint without motors, such as that of a caster, as a fixed joint, with all parts on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
@@ -373,7 +374,7 @@ def _moves(place: Frame) -> bool:
 
 
 def _end_has_physics(joint: SceneNode) -> bool:
-    """Return whether the Solid at the end of a joint has physics; it may be in a Slot."""
+    """Return whether the Solid at the end of a joint, or in a Slot there, has physics."""
     return any(
         _end_has_physics(end) if end.type_name == "Slot" else bool(end.nodes("physics"))
         for end in joint.nodes("endPoint")

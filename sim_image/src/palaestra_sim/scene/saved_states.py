@@ -30,7 +30,7 @@ class NodeState:
         ]
 
     def load(self) -> None:
-        """Return the nodes to this moment."""
+        """Restore the saved frames and joint positions."""
         for place, translation, rotation in self._places:
             place.translation, place.rotation = translation, rotation
         for joint, position in self._joints:

@@ -1,4 +1,4 @@
-"""Beams: the rays of sensors, before they are cast, in the frame of the robot that carries them."""
+"""Beams: the rays of sensors, before they are cast, in the frame of the robot that carries the sensors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Beam(NamedTuple):
     """A ray that may point up or down: its trace on the floor, its height, and its slope.
 
     Attributes:
-        ray: in the robot's frame, seen from above.
+        ray: the ray as seen from above, in the robot's frame.
         height_m: the height of its origin, in the robot's frame.
         slope: the height that it gains for each meter along the floor.
         reach_m: the distance beyond which the sensor's value is constant.
@@ -45,7 +45,8 @@ def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
     """Return the beam that starts at the origin of a frame, in a direction of this frame."""
     dx, dy, dz = turn(pose.rotation, direction)
     along = math.hypot(dx, dy)
-    # Any direction is right; a direction made of rounding errors would not have length 1.
+    # A vertical beam may have any direction along the floor. A direction computed from rounding errors would
+    # not have the length 1.
     if along < _STEEPEST:
         dx, dy, along = _STEEPEST, 0.0, _STEEPEST
     slope = dz / along

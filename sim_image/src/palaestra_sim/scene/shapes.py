@@ -1,4 +1,4 @@
-"""From a boundingObject to shapes."""
+"""Read the shapes of a boundingObject."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ Kind = Literal["box", "cylinder", "ball", "capsule", "mesh"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """A box, cylinder, ball, capsule or mesh in the frame of its place.
+    """A box, cylinder, ball, capsule or mesh, at a pose `local` in the frame `place`.
 
     Attributes:
-        size: x, y, z in meters; of what is round 2 r, 2 r, height; of a capsule with its caps.
-        mesh: of kind "mesh"; its middle is the origin of the frame.
+        size: x, y, z in meters; for round shapes 2 r, 2 r, height; the height of a capsule includes its caps.
+        mesh: the triangles of the kind "mesh", with their middle at the origin.
     """
 
     kind: Kind
@@ -46,10 +46,10 @@ class Shape:
 
     @property
     def upright(self) -> bool:
-        """Whether one of its axes is vertical, so that it has one outline from its lower to its upper end.
+        """Whether one of its axes is vertical, so that its outline is the same at every height.
 
-        A stand-in always counts as upright: its shapes are approximations anyway, so a tilted one has the
-        outline of an upright one.
+        A ball, a mesh and a shape that `lies` count as upright too. So does every shape of a stand-in,
+        because stand-ins are approximations: a tilted stand-in has the outline of an upright stand-in.
         """
         rotation = self.pose.rotation
         return (
@@ -71,7 +71,7 @@ class Shape:
         return z - half, z + half
 
     def half_along(self, rotation: Matrix, axis: int) -> float:
-        """Return half its length along an axis of a frame, 0 to 2, in which it has that rotation."""
+        """Return half its length along an axis, 0 to 2, of a frame in which the shape has that rotation."""
         if self.kind == "ball":
             return self.size[2] / 2.0
         if self.kind == "capsule":
@@ -84,7 +84,7 @@ class Shape:
 
 
 def bounding_shapes(reading: NodeReader, owner: SceneNode, place: Frame) -> Iterator[Shape]:
-    """Yield the shapes of a node's boundingObject that can be simulated; the others are refused."""
+    """Yield the shapes of a node's boundingObject that can be simulated; refuse the other shapes."""
     grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
         yield from _shapes(reading, node, place, grown)
@@ -97,12 +97,12 @@ class _Grown(NamedTuple):
     scale: Vector
 
     def at(self, position: Vector) -> Pose:
-        """Return the frame at a position in this one."""
+        """Return the pose of a frame at a position in this frame, with the same axes."""
         x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
         return self.frame.after(Pose((x, y, z)))
 
     def inside(self, pose: Pose, scale: Vector) -> _Grown:
-        """Return the frame of a node in this one; it must not be rotated if this one is distorted."""
+        """Return the frame of a node in this frame; the node must not be rotated if `even` is False."""
         x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
         return _Grown(self.at(pose.position).after(Pose(rotation=pose.rotation)), (x, y, z))
 

@@ -48,13 +48,13 @@ class Simulation:
 
     Attributes:
         tree: the nodes of the world.
-        robots: in the order of the world file.
+        robots: the robots, in the order of the world file.
         time_ms: simulated time; a reset sets it to 0.
-        mode: for the program that paces the steps; `step` itself works in all three.
+        mode: the mode, which the program that paces the steps reads; `step` works in every mode.
         quit_status: the exit status that `quit` requested; None before.
         motion: the motion of robots and dynamic solids, for a supervisor.
         movies: recordings of the Viewpoint's view.
-        appearance: what a viewer sees.
+        appearance: the visible shapes and poses, for viewers.
     """
 
     def __init__(self, tree: SceneTree, scene: SceneContents, mode: Mode) -> None:
@@ -107,7 +107,7 @@ class Simulation:
 
         Args:
             world: the parsed world.
-            physics: moves its robots.
+            physics: the physics that moves its robots.
             name: the name of its file, in errors.
             mode: the mode at the start.
             descriptions: the descriptions of the types that are not base types.
@@ -120,7 +120,7 @@ class Simulation:
         return cls(tree, read_scene(tree, physics, leave_out), mode)
 
     def read_textures(self, read: ReadFile) -> None:
-        """Let infra-red sensors see textures, whose files `read` returns."""
+        """Let infra-red sensors see textures; `read` returns the bytes of a texture's file."""
         self._view.textures = Textures(read)
 
     @property
@@ -130,7 +130,7 @@ class Simulation:
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:
-        """The unsupported nodes that the user left out, each with its place."""
+        """The unsupported nodes that the user left out, and unknown PROTO fields, each with its position."""
         return (*self.scene.left_out, *self.tree.ignored)
 
     @property
@@ -168,7 +168,7 @@ class Simulation:
             self._basic_step()
 
     def sample(self) -> None:
-        """Set the value of every sensor to that of this moment."""
+        """Set every sensor to its value at the current time."""
         for sample in self._samplers:
             sample()
 
@@ -179,13 +179,13 @@ class Simulation:
     def reset(self) -> None:
         """Request a reset of the world within the next basic step.
 
-        Restored: time, poses of all solids and robots, motors, noise (with the current seed in customData).
-        Not restored: other fields that were written.
+        The reset restores the time, the poses of all solids and robots, the motors, and the noise with the
+        current seed in customData. It does not restore other fields that a client has written.
         """
         self._reset_asked = True
 
     def reset_physics(self) -> None:
-        """Stop all motion, at once."""
+        """Stop all motion immediately."""
         for robot in self.robots:
             robot.halt()
         for thing in self.scene.loose:
@@ -218,9 +218,9 @@ class Simulation:
         self._moved(node.place)
 
     def add(self, text: str, field: NodeField, index: int) -> bool:
-        """Insert the nodes of `text` into a field, at once; return False if the index is not valid.
+        """Insert the nodes of `text` into a field immediately; return False if the index is not valid.
 
-        A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
+        A reset removes the nodes again. A negative `index` counts from the end: -1 is after the last node.
 
         Raises:
             WorldError: the text is wrong, or contains an object that cannot be simulated.
@@ -254,10 +254,10 @@ class Simulation:
         return True
 
     def remove(self, node: SceneNode) -> None:
-        """Remove a node and all nodes inside it, at once; a reset does not restore it.
+        """Remove a node and all nodes inside it immediately; a reset does not restore them.
 
         Raises:
-            UnsimulatedError: the simulation cannot continue without it.
+            UnsimulatedError: the simulation cannot continue without the node.
         """
         require_removable(node)
         gone = {node, *node.descendants()}
@@ -294,7 +294,7 @@ class Simulation:
         self._states.save(node, name)
 
     def load_state(self, node: SceneNode, name: str) -> None:
-        """Return a node to a saved state, at rest; "__init__" is the state in the world file.
+        """Return a node to a saved state and stop its motion; "__init__" is the state in the world file.
 
         Raises:
             UnsimulatedError: no state of that name was saved.
@@ -346,7 +346,7 @@ class Simulation:
             self._arrange()
 
     def _moved(self, place: Frame) -> None:
-        """Arrange the world again if `place` is part of a solid or floor, or a robot has another height."""
+        """Arrange the world again if `place` carries a solid or floor, or if a robot's height has changed."""
         places = [shape.place for shape in self.scene.solids]
         places += [floor.place for floor in self.scene.surroundings.floors]
         lifted = self._heights != self._heights_now()
@@ -355,7 +355,7 @@ class Simulation:
             self._arrange()
 
     def _heights_now(self) -> list[float]:
-        """Return the heights in meters of the robots that only a client can lift."""
+        """Return the heights in meters of all robots with a body; only a client lifts such a robot."""
         return [robot.place.height_m for robot in self.robots if robot.body is not None]
 
     def _arrange(self) -> None:

@@ -1,9 +1,9 @@
 """Relate the motion of a robot with steered wheels, such as a car, to the speeds and angles of its wheels.
 
-The plain tires of a fixed axle leave two motions: ahead, and a turn about a point on the axle. Each steered
-tire forbids the mixture of both that would move it sideways. Two steered tires whose angles do not fit
-together slide as little as possible. The driven tires then give the speed, by least squares, so it does not
-matter which axle is driven.
+The plain tires of a fixed axle permit two motions: ahead, and a turn about a point on the axle. A steered
+tire must not slide sideways, which fixes the ratio of these two motions. If the angles of two steered tires
+contradict each other, the drive uses the motion in which both slide least. The speeds of the driven tires
+then give the speed of the robot by least squares, whichever axle is driven.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from typing import Final
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.wheel_kinematics import Direction, Twist, Wheel
 
-_PARALLEL: Final = 0.05  # tires are parallel up to this sine of the angle between them, 2.9 degrees
-_LEAST_GAIN: Final = 1e-3  # a smaller share of a driven tire's rim speed does not move the robot
-_LEAST_ARM_M: Final = 1e-3  # from the fixed axle to the farthest steered tire
+_PARALLEL: Final = 0.05  # largest sine of the angle between parallel tires: 2.9 degrees
+_LEAST_GAIN: Final = 1e-3  # driven tires that roll less than this per unit of motion do not move the robot
+_LEAST_ARM_M: Final = 1e-3  # least distance from the fixed axle to the farthest steered tire
 
 
 class Steer:
     """The joint that steers a tire: its axis is vertical in the robot's frame.
 
     Args:
-        motor: has the angle of the joint.
-        start_rad: the angle at which the tire has the place of the world file.
+        motor: the motor of the joint; the motor has the joint's angle.
+        start_rad: the joint's angle when the tire has its pose of the world file.
         pivot: x and y of the axis, in meters.
         up: 1 if a positive angle turns to the left, -1 if it turns to the right.
     """
@@ -41,7 +41,7 @@ class Steer:
 
     @property
     def angle_rad(self) -> float:
-        """How far the tire is turned to the left from its place in the world file."""
+        """The angle in radians by which the tire is turned to the left of its pose in the world file."""
         return self._up * (self.motor.angle_rad - self._start_rad)
 
 
@@ -50,9 +50,9 @@ class Tire:
     """A plain tire on the floor.
 
     Attributes:
-        wheel: its place in the world file.
+        wheel: its position, axle and radius in the world file.
         driven: whether a motor turns it.
-        steer: None on a fixed axle.
+        steer: the joint that steers it; None on a fixed axle.
     """
 
     wheel: Wheel
@@ -60,7 +60,7 @@ class Tire:
     steer: Steer | None = None
 
     def placed(self, angle_rad: float) -> tuple[float, float, Direction]:
-        """Return x and y of its hub, and the direction in which it rolls, if it is turned by an angle."""
+        """Return x and y of the hub, and the direction in which the tire rolls, at a steering angle."""
         x, y, (ahead, aside) = self.wheel.x_m, self.wheel.y_m, self.wheel.forward
         if self.steer is None:
             return x, y, (ahead, aside)
@@ -71,12 +71,12 @@ class Tire:
 
 
 class SteeredDrive:
-    """The motion of a robot as a function of its driven wheels' speeds, at the angles of its steered ones.
+    """The motion of a robot as a function of the speeds of its driven tires, at the current steering angles.
 
     Attributes:
-        freedoms: 2, because it rolls ahead and turns.
-        to_twist: as in `Drive`, at the angles of now.
-        to_speeds: as in `Drive`, at the angles of now.
+        freedoms: 2, because the robot drives ahead and turns.
+        to_twist: as in `Drive`, at the current angles.
+        to_speeds: as in `Drive`, at the current angles.
     """
 
     __slots__ = ("_angles", "_forward", "_pivot", "_steers", "_tires", "freedoms", "to_speeds", "to_twist")
@@ -93,7 +93,7 @@ class SteeredDrive:
         self.changed()
 
     def changed(self) -> bool:
-        """Take the angles of now; return whether they differ from those before."""
+        """Read the current angles; return whether they differ from those of the previous call."""
         angles = tuple(0.0 if it is None else it.angle_rad for it in self._steers)
         if angles == self._angles:
             return False
@@ -112,7 +112,7 @@ class SteeredDrive:
         return tuple(x * vx + y * vy + turning * omega for x, y, turning in self.to_speeds)
 
     def _solve(self) -> None:
-        """Compute the rows at the angles of now."""
+        """Compute `to_twist` and `to_speeds` at the current angles."""
         placed = [tire.placed(angle) for tire, angle in zip(self._tires, self._angles, strict=True)]
         motion = self._motion([it for it, steer in zip(placed, self._steers, strict=True) if steer])
         holds = [
@@ -125,8 +125,8 @@ class SteeredDrive:
             (ahead[0] * (vx - omega * y) + ahead[1] * (vy + omega * x)) / radius_m
             for x, y, ahead, radius_m in holds
         ]
-        # The equations are about each wheel's rim speed in m/s, so that a large wheel does not count more
-        # than a small one.
+        # The least squares compare rim speeds in m/s, so that a large wheel does not count more than a small
+        # wheel.
         weights = [gain * hold[3] ** 2 for gain, hold in zip(gains, holds, strict=True)]
         total = sum(weight * gain for weight, gain in zip(weights, gains, strict=True))
         if total < _LEAST_GAIN**2:
@@ -140,7 +140,7 @@ class SteeredDrive:
         )
 
     def _motion(self, steered: Sequence[tuple[float, float, Direction]]) -> Twist:
-        """Return the motion of the robot's origin, of any speed, in which the steered tires slide least."""
+        """Return the motion of the robot in which the steered tires slide least, at an arbitrary speed."""
         (fx, fy), (px, py) = self._forward, self._pivot
         longest = max(math.hypot(x - px, y - py) for x, y, _ in steered)
         ahead = turning = mixed = 0.0
@@ -159,7 +159,7 @@ class SteeredDrive:
 
 
 def find_steered_drive(tires: Sequence[Tire]) -> SteeredDrive | None:
-    """Return the drive of a robot with these tires; None if they are not steered, or have no fixed axle."""
+    """Return the drive of a robot with these tires; None if it has no steered tires or no fixed axle."""
     fixed = [tire.wheel for tire in tires if tire.steer is None]
     steered = [tire for tire in tires if tire.steer is not None]
     if not fixed or not steered or not any(tire.driven for tire in tires):

@@ -1,8 +1,8 @@
-"""The steps that robots requested; the world moves after all robots that it waits for have requested one.
+"""The steps that robots request; the world moves when each robot for which it waits has requested a step.
 
 A robot whose `synchronization` is TRUE holds the world until it requests a step. Steps of different lengths
-are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all of
-them wait.
+are served in parts: the world advances by the shortest remaining time. While the simulation is paused, all
+steps wait.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Simulated(Protocol):
     """The interface of a simulation for its steps; another simulator can implement it too.
 
     Attributes:
-        mode: in PAUSE nothing moves.
+        mode: the simulation mode; nothing moves in PAUSE.
         quit_status: None until a client has requested the end; after that nothing moves.
     """
 
@@ -33,7 +33,7 @@ class Simulated(Protocol):
         ...
 
     def sample(self) -> None:
-        """Set the value of every sensor to that of this moment."""
+        """Set every sensor to its value at the current time."""
         ...
 
 
@@ -62,7 +62,7 @@ class Stepping:
         self.advance()
 
     def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
-        """Request a step; `done(True)` is called, maybe at once, after the world advanced by `duration_ms`.
+        """Request a step; when the world has advanced by `duration_ms`, maybe at once, call `done(True)`.
 
         If the simulator ends before that, `done(False)` is called.
         """

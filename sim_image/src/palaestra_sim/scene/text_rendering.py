@@ -20,7 +20,7 @@ def letters(text: str, corner: Point, font: Font, size: tuple[int, int]) -> Iter
     """Yield the pixels of a text, each with its coverage, from 1 to 255.
 
     Args:
-        text: one line or more.
+        text: a text of one or more lines.
         corner: the upper left corner of the first letter.
         font: the font of all letters.
         size: the size of the image; pixels outside it are not yielded.

@@ -1,8 +1,8 @@
-"""Textures as infra-red sensors see them: how much light a shape returns at the point that a ray meets.
+"""Textures for infra-red sensors: the share of light that a shape returns at the point that a ray meets.
 
-The red of the texture's pixel counts times that of the base color. The coordinates of a point in the texture
-are those that Webots takes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox, WbCylinder,
-WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
+The red of the texture's pixel is multiplied by the red of the base color. The coordinates of a point in the
+texture are those that Webots computes for its rays. Source: WbShape::pickColor, pickUVCoordinate of WbBox,
+WbCylinder, WbPlane and WbSphere, WbImageTexture::pickColor and wren's TextureTransform of Webots.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from palaestra_sim.world.source import Source
 
 ReadFile = Callable[[Source, str], bytes]
 Coordinates = tuple[float, float]
-# A function that maps a point of a shape to its place in a texture; the box around the shape has the
-# corners -1 and 1.
+# A function that maps a point of a shape to its coordinates in a texture. The box around the shape reaches
+# from -1 to 1 on each axis.
 Mapped = Callable[[Vector], Coordinates]
 _END: Final = 1.0 - 1e-7  # share of half a cylinder's height; a point beyond it is on an end
-_UP: Final = 2  # the axis
+_UP: Final = 2  # index of the z axis
 _PIXEL: Final = 4  # blue, green, red, alpha
 _RED: Final = 2
 
@@ -34,7 +34,7 @@ class Image:
     """The red of a texture: a byte for each pixel, row by row from the top left.
 
     Attributes:
-        repeats: whether it repeats along u and along v; else its edge continues.
+        repeats: whether the texture repeats along u and along v; otherwise the pixels of its edge continue.
     """
 
     width: int
@@ -43,7 +43,7 @@ class Image:
     repeats: tuple[bool, bool]
 
     def at(self, place: Coordinates) -> float:
-        """Return the red at a place, 0 to 1; u is to the right and v is down."""
+        """Return the red at coordinates u (to the right) and v (down), 0 to 1."""
         u, v = (_bounded(part, repeat=repeat) for part, repeat in zip(place, self.repeats, strict=True))
         row = min(int(v * self.height), self.height - 1)
         column = min(int(u * self.width), self.width - 1)
@@ -52,13 +52,13 @@ class Image:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paint:
-    """What a textured shape looks like to infra-red light.
+    """The look of a textured shape in infra-red light.
 
     Attributes:
-        red: the red of its base color, 0 to 1, as far as it is opaque.
-        roughness: without `rough`.
-        image, rough, hollow: its color, its roughness, and its occlusion.
-        mapped: from a point to a place in its textures.
+        red: the red of its base color times its opacity, 0 to 1.
+        roughness: its roughness if `rough` is None.
+        image, rough, hollow: the textures of its color, its roughness, and its occlusion.
+        mapped: maps a point to coordinates in its textures.
     """
 
     red: float
@@ -85,10 +85,11 @@ def returned_light(red: float, roughness: float, occlusion: float = 0.0) -> floa
 
 
 class Textures:
-    """The textures of a world; each image is read when a ray needs it first.
+    """The textures of a world; each image is read at its first use.
 
     Args:
-        read: returns the bytes of a file, from the file that names it and an address; None: there are none.
+        read: returns the bytes of an image, from the file that refers to it and its address there; None if
+            the world has no images.
     """
 
     def __init__(self, read: ReadFile | None = None) -> None:
@@ -98,7 +99,7 @@ class Textures:
     def paint(
         self, look: SceneNode, geometry: str, opaque: float, tiles: Coordinates = (1.0, 1.0)
     ) -> Paint | None:
-        """Return the paint of a shape; None if no texture of it counts, or none can be read.
+        """Return the paint of a shape; None without a texture that infra-red sensors see.
 
         Args:
             look: its Appearance or PBRAppearance.
@@ -174,7 +175,7 @@ def _on_plane(point: Vector) -> Coordinates:
 
 
 def _on_box(point: Vector) -> Coordinates:
-    """Return the place on the side that a point is on: each side has the whole texture."""
+    """Return the coordinates of a point of a box, of which each side has the whole texture."""
     x, y, z = point
     side = max(range(3), key=lambda axis: abs(point[axis]))
     if side == _UP:
@@ -205,11 +206,11 @@ MAPPINGS: Final[Mapping[str, Mapped]] = {
     "Plane": _on_plane,
     "Sphere": _on_ball,
 }
-"""By the type of the geometry; textures of others do not count."""
+"""For each type of geometry, its mapping; infra-red sensors do not see textures on other types."""
 
 
 def _transform(node: SceneNode | None) -> Callable[[Coordinates], Coordinates]:
-    """Return the effect of a TextureTransform: moved, turned and scaled about its center, with v down."""
+    """Return the function of a TextureTransform: move, turn and scale about its center, with v down."""
     if node is None:
         return lambda place: place
     move_u, move_v = _pair(node, "translation", (0.0, 0.0))

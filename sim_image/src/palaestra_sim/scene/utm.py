@@ -28,7 +28,7 @@ class UtmZone:
     """The zone and the hemisphere of a point.
 
     Attributes:
-        longitude_deg: of the meridian in the middle of the zone.
+        longitude_deg: the longitude of the zone's central meridian.
         southern: whether the point is south of the equator.
     """
 
@@ -91,7 +91,7 @@ def _meridian(latitude: float) -> float:
 
 
 def _footpoint(distance_m: float) -> float:
-    """Return the latitude, in rad, that is so far along the meridian from the equator."""
+    """Return the latitude in rad at a distance from the equator along the meridian."""
     mean = distance_m / (_RADIUS_M * _RECTIFYING)
     return (
         mean

@@ -1,9 +1,9 @@
-"""Validate a scene while it is read: check numbers, and record unsupported objects with their places.
+"""Validate a scene while it is read: check numbers, and record unsupported objects with their positions.
 
 Two kinds of errors exist. A *mistake* of the author, such as a string in place of a number, is always
 refused. An *unsupported* object, which Webots would simulate, is refused too, unless the user leaves out
-nodes of that type. In both cases reading continues: `conclude` raises one error for everything that was
-refused, with lines and columns.
+nodes of that type. In both cases reading continues. At the end, `conclude` raises one error that lists all
+refused nodes with their lines and columns.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.old_axes import of_instance, of_old_axes
 
 _DRAWN: Final = frozenset(("CadShape", "Shape"))
-_LARGEST: Final = 1e100  # squares of larger ones would overflow
+_LARGEST: Final = 1e100  # squares of larger numbers would overflow
 ELSEWHERE: Final = "leave it out (--leave-out), or run this world with driver webots"
 
 
@@ -44,19 +44,19 @@ class LeaveOut:
 
 
 class NodeReader:
-    """The state of reading a world's nodes: it checks their numbers, and collects the errors.
+    """Reads the fields of a world's nodes, checks their numbers, and collects the errors.
 
     Args:
         refused: mistakes that are already known.
         leave_out: the nodes that the user leaves out.
-        simulator: its name.
+        simulator: the name of the simulator.
 
     Attributes:
         leave_out: the nodes that the user leaves out.
-        simulator: its name, for messages.
-        left_out: the nodes that were left out, each with its place and the reason.
+        simulator: the name of the simulator, for messages.
+        left_out: the nodes that were left out, each with its position and the reason.
         world_info: the WorldInfo of the world; None if it is missing.
-        system: one letter for the direction of each axis: east, north, up.
+        system: one letter for the direction of each axis, such as "ENU" for east, north and up.
         top: the frame around the whole world; None if z of the world points up.
         floors: the frame, and the pose in it, of each level Plane that faces up.
     """
@@ -91,10 +91,10 @@ class NodeReader:
             self.left_out.append(node.origin.error(fact, "left out"))
 
     def conclude(self) -> None:
-        """Do nothing if nothing was refused.
+        """Raise an error if a node was refused.
 
         Raises:
-            WorldError: it lists everything that was refused.
+            WorldError: it lists all mistakes and all refused nodes.
         """
         if error := refusal(self._refused):
             raise error
@@ -110,7 +110,7 @@ class NodeReader:
             return default
         if max(map(abs, numbers)) > _LARGEST:
             self.refuse(
-                node, f"{node.type_name}.{field} has a number above {_LARGEST:g}", "write a smaller one"
+                node, f"{node.type_name}.{field} has a number above {_LARGEST:g}", "write a smaller number"
             )
             return default
         return numbers
@@ -157,5 +157,5 @@ class NodeReader:
         return 1.0
 
     def pose(self, node: SceneNode) -> Pose:
-        """Return the frame of a node in the frame around it."""
+        """Return the pose of a node in the frame of its parent."""
         return Pose(self.translation(node), from_axis_angle(self.rotation(node)))

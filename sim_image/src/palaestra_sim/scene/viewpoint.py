@@ -1,4 +1,4 @@
-"""The image of a whole world, as its Viewpoint shows it to people."""
+"""The image of a whole world from its Viewpoint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_sim.scene.old_axes import looking
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.validation import NodeReader
 
-SIZE: Final = (800, 600)  # in Webots it is the size of the window
+SIZE: Final = (800, 600)  # Webots uses the size of its window instead
 
 
 def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> bool:
@@ -29,7 +29,7 @@ def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> CameraInte
     """Return a camera at the current Viewpoint; None if the simulator does not render."""
     reading = NodeReader()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
-    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # angle of the longer side, as in Webots
+    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # along the longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))

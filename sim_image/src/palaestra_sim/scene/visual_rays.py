@@ -1,8 +1,8 @@
-"""Rays that meet visible shapes: infra-red DistanceSensors, and lidars if the physics does not render. Pure.
+"""Cast rays against visible shapes, for infra-red DistanceSensors and for lidars without rendering. Pure.
 
 A ray stops at the first surface that faces it. It passes through the robot that carries the sensor, and
-through shapes that contain its origin. Source of the reflection: reference/distancesensor.md of Webots,
-"Infra-Red Sensors".
+through shapes that contain its origin. The formula of the reflection is from reference/distancesensor.md of
+Webots, "Infra-Red Sensors".
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Glance(NamedTuple):
     """The result of casting a ray.
 
     Attributes:
-        distance_m: to the shape, or the reach of the ray if it meets none.
-        reflection: the share of infra-red light that the shape returns; 1 if the ray meets none.
+        distance_m: the distance to the shape; the reach of the ray if it meets no shape.
+        reflection: the share of infra-red light that the shape returns; 1 if the ray meets no shape.
     """
 
     distance_m: float
@@ -36,13 +36,13 @@ class Glance(NamedTuple):
 
 
 class VisualRays:
-    """The rays of one robot with sensors, against all visible shapes.
+    """The rays of one robot's sensors, which stop at visible shapes.
 
     Args:
         view: the visible part of the world.
         carrier: the frame of the robot.
-        beams: in the frame of the robot.
-        textures: whether they count for the light that returns.
+        beams: the rays, in the frame of the robot.
+        textures: whether textures affect the reflection.
     """
 
     def __init__(self, view: View, carrier: Frame, beams: Sequence[Beam], *, textures: bool = False) -> None:
@@ -58,7 +58,7 @@ class VisualRays:
         self._moving: list[_Target] = []
 
     def cast(self) -> list[Glance]:
-        """Return the result for each ray now."""
+        """Return the current result of each ray."""
         self._refresh()
         for target in self._moving:
             target.place()
@@ -67,7 +67,7 @@ class VisualRays:
         return [glance for origin, rays in self._bundles for glance in _bundle(targets, pose, origin, rays)]
 
     def _refresh(self) -> None:
-        """Update the shapes that do not move by themselves, if one was changed or moved."""
+        """Collect the shapes again if a shape was changed, or if a client moved one."""
         seen = (self._view.changes, self._view.moves)
         if seen == self._seen:
             return
@@ -97,7 +97,7 @@ class _Target:
         self.place()
 
     def place(self) -> None:
-        """Update the pose to that of this moment."""
+        """Update the pose to the current pose of the shape."""
         thing = self._thing
         frame = Pose() if thing.place is None else thing.place.world_pose
         pose = frame.after(thing.local)
@@ -108,7 +108,7 @@ class _Target:
         self.half_height_m = self.radius_m if thing.mesh else box_m
 
     def light(self, origin: Vector, direction: Vector, distance_m: float) -> float:
-        """Return the share of light that returns from where a ray meets the shape; all in its frame."""
+        """Return the share of light that returns where a ray, in the shape's frame, meets the shape."""
         if self._paint is None:
             return self.reflection
         x, y, z = (
@@ -208,7 +208,7 @@ def _box(origin: Vector, direction: Vector, half: Vector) -> float:
 
 
 def _sheet(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the meters to the upper side of a box, the only one that a Plane has."""
+    """Return the meters to the upper side of a box; a Plane has only this side."""
     above = origin[2] - half[2]
     if above < 0.0 or direction[2] > -_PARALLEL:
         return math.inf
@@ -218,14 +218,14 @@ def _sheet(origin: Vector, direction: Vector, half: Vector) -> float:
 
 
 def _ball(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the distance to an ellipsoid in meters; scaled by its sizes it is a ball of radius 1."""
+    """Return the distance in meters to an ellipsoid, which is scaled to a ball of radius 1."""
     ox, oy, oz = (at / size for at, size in zip(origin, half, strict=True))
     dx, dy, dz = (towards / size for towards, size in zip(direction, half, strict=True))
     return _root(dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0)
 
 
 def _root(square: float, half_linear: float, constant: float) -> float:
-    """Return the first root of a ray's equation; infinite if it is behind or inside, or does not exist."""
+    """Return the first root of a ray's equation; infinite without a root ahead, or for a ray from inside."""
     under = half_linear * half_linear - square * constant
     if constant < 0.0 or under < 0.0 or square < _PARALLEL:
         return math.inf
@@ -234,7 +234,7 @@ def _root(square: float, half_linear: float, constant: float) -> float:
 
 
 def _cylinder(origin: Vector, direction: Vector, half: Vector) -> float:
-    """Return the distance to a cylinder around z in meters; its outline may be an ellipse."""
+    """Return the distance in meters to a cylinder around z, whose cross-section may be an ellipse."""
     ox, oy, dx, dy = origin[0] / half[0], origin[1] / half[1], direction[0] / half[0], direction[1] / half[1]
     apart = ox * ox + oy * oy - 1.0
     if apart < 0.0 and abs(origin[2]) < half[2]:
@@ -269,6 +269,6 @@ def _scaled(mesh: Mesh, scale: Vector) -> list[Vector]:
 
 
 def _of_mesh(points: Sequence[Vector], mesh: Mesh) -> Surface:
-    """Return the surface of triangles, of which the outer sides are seen."""
+    """Return the surface of triangles, which a ray meets only from outside."""
     scaled = Mesh(tuple(points), mesh.triangles)
     return lambda origin, direction: nearest_triangle(scaled, origin, direction, front=True)

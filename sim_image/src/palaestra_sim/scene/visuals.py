@@ -1,8 +1,9 @@
 """Convert the nodes of a world to visible shapes, each with a color and the frame that carries it.
 
-Lights and mesh files are not read, and no texture: a shape has one color. A stand-in has the shapes of its
-outline, in the color of its first appearance that is not of another part. What a scale distorts keeps its
-angles.
+This module reads no textures and no mesh files, so a shape has one color. A stand-in, the placeholder of a
+PROTO, has the shapes of its boundingObject in the color of its first appearance. Its floor does not use
+`wallAppearance`, and its walls do not use `floorAppearance`. A scale stretches a shape along the shape's own
+axes, so right angles stay right angles.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ _LOOKS: Final = frozenset(
         "TextureTransform",
     )
 )
-# The field that holds the size of a floor's texture, by the name of the PROTO.
+# For each PROTO with a floor, the field with the size of the floor's texture.
 _TILES: Final = {"Floor": "tileSize", "RectangleArena": "floorTileSize"}
 _TILE_M: Final = (0.5, 0.5)  # Source: Floor.proto of Webots
 _HOLDING: Final = ("children", "endPoint")
@@ -67,15 +68,15 @@ class Drawn:
 
     Attributes:
         kind: "ball" is an ellipsoid if its sizes differ.
-        size: x, y, z in meters; for round shapes 2 r, 2 r, height. A mesh is scaled by it.
+        size: x, y, z in meters; for round shapes 2 r, 2 r, height; for a mesh, its scale factors.
         color: the color of the whole shape.
-        local: its pose in the frame `place`, in meters of the world.
+        local: its pose in the frame `place`; the lengths are meters of the world, with all scales applied.
         place: the frame that carries it; None for the world.
         node: the Shape, or the stand-in.
-        mesh: for the kind "mesh".
+        mesh: the triangles of the kind "mesh".
         roughness: the roughness of a PBRAppearance, 0 to 1.
         geometry: the type of its geometry, such as "Plane".
-        look: its appearance; None if it has none, or if the place of its texture is not known.
+        look: its appearance; None without one, or if the texture's position on the shape is unknown.
         textured: whether its appearance has a texture.
         tiles: how often the texture repeats along x and y.
     """
@@ -105,8 +106,8 @@ class View:
     Attributes:
         root: the root of the world.
         textures: the images of its textures.
-        changes: how often something has come, gone, or got another look.
-        moves: how often something was put elsewhere; robots and joints that move by themselves do not count.
+        changes: how often a node was added or removed, or its look changed.
+        moves: how often a client or a reset moved a node; motion by motors and by the physics does not count.
     """
 
     def __init__(self, root: SceneNode) -> None:
@@ -158,16 +159,16 @@ class _Frame(NamedTuple):
     scale: Vector = (1.0, 1.0, 1.0)
 
     def at(self, position: Vector) -> Pose:
-        """Return the frame at a position in this one."""
+        """Return the pose of a frame at a position in this frame, with the same axes."""
         x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
         return self.pose.after(Pose((x, y, z)))
 
     def within(self, node: SceneNode) -> _Frame:
-        """Return the frame of a node in this one."""
+        """Return the frame of a node whose parent has this frame."""
         scale = (1.0, 1.0, 1.0) if node.stand_in else _numbers(node, "scale", (1.0, 1.0, 1.0))
         place = node.place
         if place is not None:
-            # If all factors are equal, the scale is already that of the frame.
+            # A scale with equal factors is already contained in `place.scale`.
             x, y, z = scale if len(set(scale)) > 1 else (1.0, 1.0, 1.0)
             return _Frame(place, Pose(), (place.scale * x, place.scale * y, place.scale * z))
         turned = _numbers(node, "rotation", (0.0, 0.0, 1.0, 0.0))
@@ -208,7 +209,7 @@ def _stand_in(node: SceneNode, frame: _Frame) -> Iterator[Drawn]:
 
 
 def _stand_in_look(node: SceneNode, but: str) -> _Look:
-    """Return the first look of a stand-in outside of one field; without one, a look without color."""
+    """Return the look of a stand-in's first appearance outside of `but`; else a look without color."""
     looks = (
         item
         for name, content in node.fields.items()
@@ -227,9 +228,9 @@ def _tile(node: SceneNode) -> tuple[float, float] | None:
 
 
 class _Look(NamedTuple):
-    """How a shape looks; `node` is None if the place of its texture is not known.
+    """The look of a shape; `node` is None if the position of the texture on the shape is unknown.
 
-    `tile` is the size of one texture in meters; None: it is as large as the shape.
+    `tile` is the size of one copy of the texture in meters, or None if one copy covers the whole shape.
     """
 
     color: Color | tuple[()]
@@ -240,7 +241,7 @@ class _Look(NamedTuple):
 
 
 def _geometry(node: SceneNode, frame: _Frame, look: _Look, owner: SceneNode) -> Iterator[Drawn]:
-    """Yield the shape of a geometry; nothing if its numbers are invalid or it is in another file."""
+    """Yield the shape of a geometry, or nothing if its numbers are invalid or another file contains it."""
     solid = _solid(node, frame.pose)
     if solid is None or not look.color or look.color[3] <= 0.0:
         return

@@ -1,19 +1,19 @@
-"""Find the wheels that drive a robot, and relate their speeds to its motion, from their positions.
+"""Relate the speeds of a robot's wheels to the robot's motion, from the positions of the wheels.
 
-The floor holds a wheel along one direction, its grip. A plain tire grips in the direction in which it rolls,
-a wheel with rollers along the axis of the roller that touches the floor. Each grip gives one linear equation
-between the robot's motion and the speed of the wheel; `find_drive` solves all of them, exactly or by least
-squares. So wheels need no names, and pairs, rows and rings of wheels need no special cases.
+The floor holds a wheel along one direction, its grip. A plain tire grips in the direction in which it rolls.
+A wheel with rollers grips along the axis of the roller that touches the floor. Each grip gives one linear
+equation between the robot's motion and the speed of the wheel. `find_drive` solves these equations, exactly
+or by least squares. So wheels need no names, and pairs and rows of wheels need no special cases.
 
-- Grips in different directions leave no freedom: the robot moves in any direction (omni, mecanum).
-- Parallel grips leave it free across them, where only plain tires resist. These slide least if the robot
-turns
-  about their middle, so this point has no speed across (differential, skid-steer).
+- If the grips have different directions, the wheels determine the motion in all directions (omni, mecanum).
+- If all grips are parallel, only plain tires resist a motion across the grips. The tires slide least if the
+  robot turns about their middle, so this point has no speed across the grips (differential, skid-steer).
 
-Two plain tires with different axles would block each other. Worlds contain them nevertheless: they model
-omnidirectional wheels, whose rollers are replaced by a low friction along the axle. So they slide here too.
+Two plain tires with different axles would block each other. Some worlds contain such tires nevertheless, as
+models of omnidirectional wheels: a low friction along the axle replaces the rollers. So the tires slide here
+too.
 
-A skid-steer robot turns according to its geometry. On a real floor its tires slip, and it turns more slowly.
+A skid-steer robot turns here as its geometry says. On a real floor its tires slip, and it turns more slowly.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Rows = tuple[Twist, Twist, Twist]
 
 _PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
 _LEAST_GAIN: Final = 0.05  # minimum speed along the grip, as a fraction of the wheel's rim speed
-_LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for three ideal equations, 0 for dependent ones
+_LEAST_VOLUME: Final = 1e-3  # normalized determinant: 1 for orthogonal equations, 0 for dependent equations
 _LEAST_ARM_M: Final = 1e-3  # if the longest arm is shorter than this, the wheels do not turn the robot
 _THREE: Final = 3
 _ROUNDED: Final = 1e-3  # tolerance in m and in rad, because files round the positions of wheels
@@ -46,7 +46,7 @@ class Wheel:
     Attributes:
         x_m, y_m: the position of its hub.
         axle: the axis about which a positive speed turns the wheel.
-        radius_m: from the hub to the floor.
+        radius_m: the distance from the hub to the floor.
         roller: the axis of the roller that touches the floor; None for a plain tire.
     """
 
@@ -102,7 +102,7 @@ class Drive:
         return vx, vy, omega
 
     def wheel_speeds(self, vx: float, vy: float, omega: float) -> tuple[float, ...]:
-        """Return the speeds in rad/s at which the wheels roll; motion that they cannot follow is ignored."""
+        """Return the speeds in rad/s at which the wheels roll; sideways sliding is ignored."""
         return tuple(x * vx + y * vy + turning * omega for x, y, turning in self.to_speeds)
 
 
@@ -110,8 +110,8 @@ class Drive:
 class Ring(Drive):
     """Three omnidirectional wheels around the middle, in closed form, which keeps zeros exact.
 
-    Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. There the first wheel is at
-    the rear; the direction `c`, `s` turns its frame into the robot's.
+    Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. In that file the first wheel
+    is at the rear. The rotation by `c`, `s` turns its frame into the robot's frame.
     """
 
     radius_m: float
@@ -134,8 +134,8 @@ STANDING: Final = Drive((), ())  # the drive of a robot without wheels
 def _ring(wheels: Sequence[Wheel]) -> Ring | None:
     """Return the drive of three wheels on radial axles, 120 degrees apart counterclockwise, else None.
 
-    The first wheel defines the ring: the others may differ by the rounding of a file. Otherwise a robot would
-    turn slightly as it drives straight on.
+    The first wheel defines the ring, and the rounded positions of the other wheels are corrected. With
+    rounded positions, a robot that drives straight on would turn slightly.
     """
     if len(wheels) != _THREE or any(wheel.roller for wheel in wheels):
         return None
@@ -193,7 +193,7 @@ def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
 
 
 class _Hold(NamedTuple):
-    """The point and direction in which the floor holds a wheel, and its distance in meters for 1 rad."""
+    """The point and direction in which the floor holds a wheel, and the meters that it rolls for 1 rad."""
 
     x: float
     y: float
@@ -235,7 +235,7 @@ def _two_directions(forward: Direction, arms: Sequence[float]) -> list[Twist]:
 
 
 def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]:
-    """Return the motion for 1 m/s of each hold; an empty list if the holds leave a freedom.
+    """Return the motion for 1 m/s of each hold; an empty list if they do not determine the motion.
 
     The rotation is scaled by the longest arm, so that all three unknowns are speeds of similar size.
     """

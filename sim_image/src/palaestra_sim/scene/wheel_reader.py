@@ -1,4 +1,4 @@
-"""Read the round ends of hinges, which may be wheels: driven ones, steered ones, and those that only roll."""
+"""Read the round end points of hinges as wheels, which a motor drives or steers, or which only roll."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _VERTICAL: Final = 0.999  # cosine of the largest slope, 2.6 degrees, of an axis
 def read_rolling(
     reading: NodeReader, joint: Joint, place: Frame, shapes: Sequence[Shape], end: SceneNode
 ) -> Rolling | None:
-    """Return the end of a joint as a wheel; None if it is not round, or if something else moves the joint.
+    """Return the end of a joint as a wheel; None if it is not round, or on a motor that does not steer it.
 
-    `place` is the frame around the joint, `shapes` are those of the end.
+    `place` is the frame that contains the joint, and `shapes` are the shapes of the end.
     """
     round_ones = [shape for shape in shapes if shape.kind not in _FLAT]
     around = [it for it in place.chain() if isinstance(it, JointFrame)]
@@ -36,7 +36,7 @@ def read_rolling(
     anchor = frame.carry(joint.anchor)
     shape = max(round_ones, key=lambda shape: shape.size[0])
     if joint.motor is None:
-        # A caster follows the robot; it does not guide it.
+        # A caster does not count as a wheel: it follows the robot's motion and does not restrict it.
         led = len(around) == len(with_motor) and joint.stops[0] == joint.stops[1]
         return Rolling(axle=axle, anchor=anchor, shape=shape, steer=steer) if led else None
     roller = _lowest_roller(reading, end, JointFrame(place, *_where(reading, end), joint))
@@ -44,7 +44,7 @@ def read_rolling(
 
 
 def _steer(place: JointFrame) -> Steer | None:
-    """Return a joint with a motor as one that steers what is on it; None if its axis is not vertical."""
+    """Return a joint with a motor as a steering joint; None if its axis is not vertical."""
     joint, parent = place.joint, place.parent
     motor = joint.motor
     if joint.slides or motor is None:

@@ -1,7 +1,8 @@
 """Find the parts that may drive a robot: hinges with motors and a round end, and the belts of tracks.
 
 A wheel is found by its geometry: a level axle, and a round end that has its center on the axle and reaches
-the floor. A belt counts as a wheel in the middle of the track, whose rim moves as many meters as its motor.
+the floor. A belt counts as a wheel in the middle of the track. The rim of this wheel moves as many meters as
+the motor of the track.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ class Rolling:
     """A hinge or a track, which may be a wheel, in the robot's frame.
 
     Attributes:
-        anchor: a point on the axle; of a track, its origin.
-        shape: the round end; of a track, the lowest of its shapes.
+        anchor: a point on the axle; for a track, the track's origin.
+        shape: the round end; for a track, its lowest shape.
         roller: the axis of the roller that touches the floor; None for a plain tire or a belt.
         belt: whether it is a track.
-        steer: steers it; None on a fixed axle.
+        steer: the joint that steers it; None on a fixed axle.
     """
 
     axle: Vector
@@ -97,12 +98,12 @@ _Wheel = TypeVar("_Wheel", bound=Rolling)
 
 
 def wheels_among(driven: Sequence[Driven]) -> list[Driven]:
-    """Return the parts that drive: they may drive, and they reach down to the floor."""
+    """Return the parts that can drive the robot and reach down to the floor."""
     return _lowest([found for found in driven if found.may_drive()])
 
 
 def tires_among(driven: Sequence[Driven], idle: Sequence[Rolling]) -> list[Rolling]:
-    """Return the plain wheels on the floor, also those without a motor."""
+    """Return the plain wheels on the floor, including those without a motor."""
     possible = [*(found for found in driven if found.may_drive()), *(it for it in idle if it.turns_level)]
     return [found for found in _lowest(possible) if found.roller is None and not found.belt]
 

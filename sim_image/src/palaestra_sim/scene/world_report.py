@@ -1,4 +1,4 @@
-"""A report on a world for its author: `palaestra-stub --check`, and the same for other simulators."""
+"""The report on a world for its author, which `palaestra-stub --check` and the other simulators print."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ class Described(Protocol):
 
     @property
     def left_out(self) -> Sequence[WorldError]:
-        """Nodes that were left out, each with its place."""
+        """The nodes that were left out, each with its position in the file."""
         ...
 
 
 def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all nodes that were left out.
 
-    All unsupported nodes are left out when the world is read, so that the others can be described; or only
-    those that the user has `chosen` to leave out.
+    By default, the world was read without any unsupported node, so that the report covers all other nodes. If
+    `chosen`, the world was read without the nodes that the user has chosen to leave out.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
@@ -63,7 +63,7 @@ def summary(simulation: Described, *, chosen: bool = False) -> Iterator[str]:
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
     if release := _old_release(simulation):
-        yield f"a world of {release}: its nodes are turned to the axes of today, as by Webots"
+        yield f"a world of {release}: its nodes are converted to the current axes, as in Webots"
     silent = silent_devices(simulation.robots)
     if silent:
         yield f"devices without readings, whose enable returns failure: {silent}"
@@ -90,7 +90,7 @@ def lacks(simulation: Described) -> list[WorldError]:
 
 
 def silent_devices(robots: Iterable[Robot]) -> str:
-    """Return the number of devices without readings here, by type; "" if all have readings."""
+    """Return the number of devices without readings in this simulator, by type; "" if all have readings."""
     return _counted(
         Counter(
             kind.node
@@ -113,11 +113,11 @@ def differences(simulation: Described) -> Iterator[str]:
     yield from _not_in_webots(devices)
     yield from _without_effect(simulation)
     if infrared := types[DistanceSensorType.INFRA_RED]:
-        yield f"{infrared} infra-red DistanceSensor: rays pass the robot itself"
+        yield f"{infrared} infra-red DistanceSensor: rays pass through the robot itself"
         if unread := simulation.unread_textures:
             yield f"{unread} Shape with a texture that infra-red DistanceSensors do not see"
     if lidars:
-        yield f"{lidars} Lidar: rays pass the robot itself"
+        yield f"{lidars} Lidar: rays pass through the robot itself"
     yield from _without_physics(it for it in robots if not _of_a_model(it.node))
     if meshes:
         yield f"{meshes} IndexedFaceSet as boundingObject: robots touch its convex hull"
@@ -133,12 +133,12 @@ def differences(simulation: Described) -> Iterator[str]:
 
 
 def _of_a_model(node: SceneNode) -> bool:
-    """Return whether a node is of a model of MuJoCo, in which each body has a mass."""
+    """Return whether a node comes from an MJCF model, in which each body has a mass."""
     return node.origin is not None and is_mjcf(node.origin.source.data)
 
 
 def _without_physics(robots: Iterable[RobotParts]) -> Iterator[str]:
-    """Yield a line for each type of sensor that measures nothing in Webots where no Solid has physics."""
+    """Yield a line for each type of sensor on Solids without physics, where it measures nothing in Webots."""
     lacking = Counter(
         node.type_name
         for robot in robots

@@ -1,23 +1,23 @@
 """Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
-Pure: bytes in, bytes out. No clock, no network, and no file except built-in ones and those that a world
+Pure: bytes in, bytes out. No clock, no network, and no files except built-in files and the files that a world
 names.
 
     parse(source)                              the tree of a `.wbt` world
     check(source)                              raises unless a world can be generated for every simulator
     generate(source, identity, clock=False)    the world of one simulator
     rename(source, "_2")                       the world of one more simulator on the same ROS master
-    robots(source)                             its robots whose controller is "ros"
-    own_controllers(source)                    its robots whose controllers are programs of their project
-    root_of(path, source)                      the folder around it that holds all files that it names
-    suffix(source)                             the end of its file name: ".wbt" or ".xml"
-    ros_name(identity, "robotino")             the generated name of such a robot
+    robots(source)                             the robots of a world whose controller is "ros"
+    own_controllers(source)                    the robots whose controllers are programs of their project
+    root_of(path, source)                      the folder that holds a world and all files that it names
+    suffix(source)                             the suffix of a world's file name: ".wbt" or ".xml"
+    ros_name(identity, "robotino")             the generated ROS name of a robot
     builtin("arena")                           a built-in world
     builtin_protos()                           built-in descriptions of robots
     parse_proto(data, "Stool.proto")           the declaration of a node type
     local_protos(path, world)                  the PROTOs whose files belong to a world
     shipped_stand_ins()                        shapes for PROTOs whose files are not read
-    expand(stand_in, values)                   the boxes, cylinders, spheres and planes of one of them
+    expand(stand_in, values)                   the boxes, cylinders, spheres and planes of a stand-in
 """
 
 from palaestra_sim.errors import StandInError, UnknownWorldError, WorldError

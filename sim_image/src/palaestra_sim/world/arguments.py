@@ -27,7 +27,7 @@ def asks_for_clock(robot: Node) -> bool:
 def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Patch, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
-    With `clock`, the first `--clock` stays and the others are removed; none is ever added.
+    If `clock`, the first `--clock` stays, and the others are removed. The edits never add a `--clock`.
     """
     value = robot.fields.get("controllerArgs")
     if value is None:
@@ -49,7 +49,7 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
 def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[bytes, ...]]:
     """Return, for each string of a list, the strings that replace it; one row for an empty list.
 
-    Missing options follow the name; if the name is missing too, all of them come first.
+    A missing name is inserted at the beginning, and a missing `--synchronize` after the name.
     """
     name, synchronize = quoted(NAME + ros_name), quoted(SYNCHRONIZE)
     rows: list[list[bytes]] = []
@@ -77,14 +77,14 @@ def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[byt
 
 
 def _options(text: str) -> list[str]:
-    """Return the options in one string: several only if each begins with `--`."""
+    """Return the options in a string; it is split only if each of its words begins with `--`."""
     words = text.split()
     several = len(words) > 1 and all(word.startswith("--") for word in words)
     return words if several else [text]
 
 
 def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Patch:
-    """Replace one string of a list; if it is removed, remove the blanks before it too."""
+    """Replace one string of a list; if the row is empty, remove the blanks before the string too."""
     start = token.start
     if not row:
         start -= len(_UP_TO_COMMENT.sub(b"", _gap_before(world, token)))
@@ -92,7 +92,7 @@ def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: byte
 
 
 def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Patch:
-    """Replace a bare string by a list; an empty string stands for no arguments."""
+    """Replace a bare string by a list; an empty string means that there are no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"

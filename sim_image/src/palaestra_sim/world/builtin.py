@@ -20,7 +20,7 @@ def builtin(name: str) -> bytes:
     path = builtin_path(name)
     if path is None:
         known = ", ".join(sorted(_shipped()))
-        raise UnknownWorldError(f'no world "{name}" ships; choose one of {known}')
+        raise UnknownWorldError(f'no built-in world is called "{name}"; choose one of {known}')
     return path.read_bytes()
 
 

@@ -1,7 +1,7 @@
 """Checks for worlds that can be parsed, but from which no simulator's world can be generated.
 
-Each check finds one kind of mistake, at all its places. One error lists all of them, in the order of the
-file. No check depends on the simulator: a world that passes once passes for all.
+Each check finds one kind of mistake, at every position in the file. One error lists all mistakes, in the
+order of the file. No check depends on the simulator, so a world that passes once passes for every simulator.
 """
 
 import re
@@ -56,13 +56,13 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` repeats a robot with the same ROS name.
 
-    All DEFs with that name are compared, although a `USE` refers only to the last one before it. A world with
-    two names is clearer anyway.
+    All DEFs with that name are compared, although a `USE` refers only to the last DEF before it. A world with
+    different DEF names is clearer anyway.
     """
     starts = [robot.span[0] for robot in candidate.robots]
     containers = {}
     for node in candidate.world.walk():
-        # Nodes nest, so a robot that begins inside a node is part of it. The last such robot gives the name.
+        # A robot that begins inside a node is part of that node. The last such robot gives the name.
         last = bisect_left(starts, node.span[1]) - 1
         if node.def_name is not None and last >= 0 and starts[last] >= node.span[0]:
             containers[node.def_name] = candidate.robots[last]
@@ -189,8 +189,8 @@ def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidat
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
-    names, so it may use relative addresses.
+    `name` is the name of the world in errors. `relative_addresses` is True if the world stays next to the
+    files that it names, so that it may use relative addresses.
 
     Raises:
         WorldError: the world cannot be read, or a check of this module fails.

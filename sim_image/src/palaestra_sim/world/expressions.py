@@ -33,7 +33,7 @@ class _Operation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A parsed formula; `names` are the fields in it, with `.x` or `sum()` if they are used so."""
+    """A parsed formula; `names` are the fields in it, with `.x` or `sum()` where the formula has these."""
 
     text: str
     tree: _Tree
@@ -52,7 +52,7 @@ def parse_formula(written: object) -> Expression:
     """Return the formula of a number or a text.
 
     Raises:
-        ValueError: it is neither, or the text is not a formula; the message has the fact and the remedy.
+        ValueError: `written` is not a number or a formula; the message has the fact and the remedy.
     """
     if isinstance(written, int | float) and not isinstance(written, bool):
         return Expression(str(written), float(written))

@@ -1,11 +1,12 @@
 """Find the PROTO files that belong to a world.
 
-A world names the file of each PROTO that it uses in an EXTERNPROTO line, and so does a PROTO file. An address
-with a scheme (https://, webots://) is a PROTO that Webots provides: its file is not read, and only its name
-is known. A relative address is relative to the folder of the file that names it.
+A world or a PROTO file has an EXTERNPROTO line with an address for each PROTO that it uses. An address with a
+scheme (https://, webots://) belongs to a PROTO that Webots provides. This module does not read the file of
+such a PROTO, and records only its name. A relative address is relative to the folder of the file with the
+line.
 
-Before R2022b there were no such lines: Webots found PROTOs by their names in the folder `protos/` of the
-world's project, and in its subfolders. Files of those releases are still handled so here.
+Files from before R2022b do not have such lines: Webots found PROTOs by their names in the folder `protos/` of
+the world's project, and in its subfolders. This module does the same for such files.
 
 A PROTO that cannot be used does not raise an error here, because the world may not need it: a stand-in may
 describe it, or its instances may be left out. Its error is in the result, for callers that need the PROTO.
@@ -33,7 +34,7 @@ List = Callable[[Path], Iterable[Path]]
 
 
 def _protos_below(folder: Path) -> list[Path]:
-    """Return the PROTO files in a folder and its subfolders, the least deep first."""
+    """Return the PROTO files in a folder and its subfolders, those with the shortest paths first."""
     return sorted(folder.rglob("*.proto"), key=lambda path: (len(path.parts), path))
 
 
@@ -41,9 +42,9 @@ def _protos_below(folder: Path) -> list[Path]:
 class Protos:
     """The PROTOs that a world and its PROTO files name, by type.
 
-    `local` were read from files. `remote` are the types whose addresses have a scheme. `refused` has the
-    errors of all other types: the file is missing, is not a PROTO, has a template, or names itself through
-    other files.
+    `local` has the PROTOs that were read from files. `remote` are the types whose addresses have a scheme.
+    `refused` has the errors of all other types: the file is missing, is not a PROTO, has a template, or names
+    itself through other files.
     """
 
     local: dict[str, Proto] = field(default_factory=dict)
@@ -76,7 +77,7 @@ def local_protos(
 
     `world_path` is the file of the world, None without a file; `name` is its name in errors. Types in
     `without` are ignored: their files are not read, and the result does not contain them. `read` returns the
-    bytes of a file or raises OSError, `files_below` the PROTO files in a folder and its subfolders.
+    bytes of a file or raises OSError. `files_below` returns the PROTO files in a folder and its subfolders.
     """
     source = Source(data=world.source, name=name)
     search = _Search(world_path, without, read, files_below)
@@ -99,7 +100,7 @@ class _Search:
         self._by_name: dict[str, Path] | None = None
 
     def follow(self, namer: _Namer) -> None:
-        """Add the PROTOs that a file names, and those that their files name."""
+        """Add the PROTOs that a file names, and all PROTOs that the files of these PROTOs name."""
         for token in namer.externs:
             address = unquoted(token)
             type_name = PurePosixPath(address).name.removesuffix(".proto")
@@ -129,7 +130,7 @@ class _Search:
         return self._by_name.get(type_name)
 
     def _try(self, namer: _Namer, place: int, address: str, path: Path | None, type_name: str) -> None:
-        """Add the PROTO of a file, or its error."""
+        """Add the PROTO of a file, or the error of the file."""
         try:
             self._add(namer, place, address, path, type_name)
         except WorldError as error:
@@ -169,7 +170,7 @@ class _Search:
         except (OSError, ValueError) as error:  # ValueError: a path with a NUL character
             reason = getattr(error, "strerror", None) or error
             fact = f"{path} cannot be read: {reason}"
-            remedy = "correct the address; it counts from the folder of this file"
+            remedy = "correct the address; it is relative to the folder of this file"
             raise namer.source.error(place, fact, remedy) from None
         proto = parse_proto(data, str(path))
         if proto.name != type_name:
@@ -194,7 +195,7 @@ def _endless(namer: _Namer, type_name: str) -> Iterator[tuple[str, str]]:
         yield fact, f"remove {type_name} from {namer.type_name}"
     if len(above) > MAX_FILES_DEEP:
         fact = f"PROTO files name each other more than {MAX_FILES_DEEP} deep"
-        yield fact, "declare fewer PROTOs by others"
+        yield fact, "nest fewer PROTO files"
 
 
 def _plain(path: Path) -> Path:

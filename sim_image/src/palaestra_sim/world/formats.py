@@ -1,7 +1,7 @@
 """The two formats of worlds: `.wbt`, and MJCF, which begins with `<`.
 
-A world may come without a file, so its first byte decides its format. The modules of this package handle
-`.wbt` worlds, `mjcf` handles the others.
+A world may come without a file name, so its first byte decides its format. The modules of this package handle
+`.wbt` worlds; the package `mjcf` handles MJCF worlds.
 """
 
 from palaestra_sim.world import mjcf
@@ -25,8 +25,8 @@ def suffix(source: bytes) -> str:
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
-    names, so it may use relative addresses.
+    `name` is the name of the world in errors. `relative_addresses` is True if the world stays next to the
+    files that it names, so that it may use relative addresses.
 
     Raises:
         WorldError: the world cannot be read, or a check fails.
@@ -45,8 +45,8 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock` if its world requests it; true for at most one simulator of a
-    ROS master. `name` and `relative_addresses` are as for `check`.
+    `clock` is True if this simulator may publish `/clock` when its world requests it. It must be True for at
+    most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
         WorldError: as for `check`.
@@ -58,8 +58,8 @@ def generate(
 def rename(source: bytes, ending: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
     """Return the world with `ending` appended to each of its ROS names, and without any `--clock`.
 
-    It is for a second simulator of the same world on one ROS master. `name` and `relative_addresses` are as
-    for `check`.
+    Use this world for a second simulator on the same ROS master. `name` and `relative_addresses` are as for
+    `check`.
 
     Raises:
         WorldError: as for `check`; or a robot has no ROS name, or its new name is too long.

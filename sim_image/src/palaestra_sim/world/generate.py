@@ -5,8 +5,8 @@ Only the `controllerArgs` of robots whose controller is "ros" change, and only t
     --name=          the robot's ROS name; added if it is missing, and never twice
     --synchronize    added, so that the simulation waits for its client to step it
     --clock          never added. With `clock`, the first one of the world stays and the others
-                     are removed; without it, all are removed. Two on one ROS master would
-                     publish two times on one topic.
+                     are removed; without `clock`, all are removed. Two simulators with --clock
+                     on one ROS master would publish two different times on one topic.
 
 All other bytes are unchanged. Generation from a generated world gives the same world again.
 """
@@ -31,8 +31,8 @@ def generate(
 ) -> bytes:
     """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock` if its world requests it; true for at most one simulator of a
-    ROS master. `name` and `relative_addresses` are as for `check`.
+    `clock` is True if this simulator may publish `/clock` when its world requests it. It must be True for at
+    most one simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
         WorldError: as for `check`.
@@ -45,8 +45,8 @@ def generate(
 def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
     """Return the world with `suffix` appended to each of its ROS names, and without any `--clock`.
 
-    It is for a second simulator of the same world on one ROS master. `name` and `relative_addresses` are as
-    for `check`.
+    Use this world for a second simulator on the same ROS master. `name` and `relative_addresses` are as for
+    `check`.
 
     Raises:
         WorldError: as for `check`; or a robot has no ROS name, or its new name is too long.
@@ -59,10 +59,10 @@ def _longer(found: Candidate, robot: Node, suffix: str) -> str:
     present = described(robot).ros_name
     if not present:
         fact = f'the robot "{robot_name(robot)}" has no ROS name'
-        raise found.source.error(robot.span[0], fact, 'add "--name=" with one to its controllerArgs')
+        raise found.source.error(robot.span[0], fact, 'add "--name=..." to its controllerArgs')
     if len((present + suffix).encode()) > MAX_NAME_BYTES:
         fact = f"the ROS name {present}{suffix} has more than {MAX_NAME_BYTES} bytes"
-        raise found.source.error(robot.span[0], fact, "shorten the one in controllerArgs")
+        raise found.source.error(robot.span[0], fact, "shorten the name in controllerArgs")
     return present + suffix
 
 

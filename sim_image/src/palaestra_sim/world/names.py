@@ -3,10 +3,10 @@
     <job>_r<replica>_<group>_<index><slot>_<robot>_<hash>
     move_to_target_r0_collect_1a_robotino_8c31f2
 
-The readable part is for people; it may be cut, and characters may be replaced. The hash covers the original
-values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter first, then
-`[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of 64 bytes
-without a check.
+The readable part is for people. It may be cut, and some characters may be replaced. The hash covers the
+original values, so two names with the same readable part still differ. A name is valid in ROS 1 (a letter
+first, then `[A-Za-z0-9_]`). It has at most 63 bytes, because the `ros` controller copies it into a buffer of
+64 bytes without a check.
 """
 
 import hashlib
@@ -24,9 +24,9 @@ _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunIdentity:
-    """The simulator of a world: one of a group, of a replica, of a job.
+    """The identity of one simulator: its job, its replica, its group, and its index in the group.
 
-    `uid` is the job's UID, "" outside a cluster. `slot` is "a", or "b" for the standby.
+    `uid` is the job's UID, or "" outside a cluster. `slot` is "a", or "b" for the standby.
     """
 
     job: str
@@ -41,8 +41,8 @@ class RunIdentity:
 def name_prefix(identity: RunIdentity) -> str:
     """Return the readable part before the robot, such as `move_to_target_r0_collect_1a`.
 
-    All robots of a simulator share it. It has at most 40 bytes; a long job name is cut first. It is not
-    unique by itself.
+    All robots of a simulator share this prefix. It has at most 40 bytes; a long job name is cut first. The
+    prefix is not unique by itself.
     """
     group = _legal(identity.group)[:_MAX_GROUP]
     place = _legal(f"_r{identity.replica}_{group}_{identity.index}{identity.slot}")

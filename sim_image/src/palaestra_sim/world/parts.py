@@ -1,7 +1,7 @@
 """The simple shapes that replace an object: boxes, cylinders, spheres and planes in the object's frame.
 
-A Form describes one shape by formulas, as a file of stand-ins contains it. The fields of an object turn it
-into ShapeParts, which have numbers. A wall along a path, or in a ring, becomes a box for each straight piece.
+A Form describes one shape of a stand-in by formulas. With the fields of an object, the Form becomes
+ShapeParts, whose sizes are numbers. A wall along a path, or in a ring, becomes a box for each straight piece.
 """
 
 import math
@@ -41,8 +41,8 @@ class Form:
 
     The lengths of box, cylinder, sphere and plane are those of a ShapePart. A ring has (inner radius,
     thickness, height), a wall (thickness, height). A wall follows the points of the field `path`, and returns
-    to the first one if `closed`. `at` is the center; with `on_base`, and always for ring and wall, it is the
-    center of the lower side. The object has the form only if `when` is not 0 and `unless` is 0.
+    to the first point if `closed`. `at` is the center of the form, or the center of its lower side if
+    `on_base` and for every ring and wall. The object has the form only if `when` is not 0 and `unless` is 0.
     """
 
     kind: FormKind
@@ -60,7 +60,7 @@ class Form:
     ) -> Iterator[ShapePart]:
         """Yield the parts of an object; a form with a length that is not positive has no parts.
 
-        `numbers` returns the numbers of a field, `points` the vectors of a field that is a list.
+        `numbers` returns the numbers of a field, and `points` returns the vectors of a field that is a list.
         """
         if self.when is not None and not self.when.value(numbers):
             return

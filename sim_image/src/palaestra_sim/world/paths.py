@@ -1,4 +1,4 @@
-"""Paths that a world names: they are relative to its folder, and may lead above it."""
+"""Paths that a world names, which are relative to the world's folder and may lead above this folder."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The files that the nodes of a world name, such as the images of textures, inside the project of the world.
 
-The sidecar puts a generated world into a folder of links to the files next to the source world; such a link
-is followed to the source project. No other link leads out of the project, which is never the whole file
-system.
+The sidecar puts a generated world into a folder of links to the files next to the source world. This module
+follows such a link to the source project, but refuses every other link that leads out of the project. The
+project is never the whole file system.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class ProjectFiles:
         return read_bounded(self._inside(Path(posixpath.normpath(namer_path.parent / address))))
 
     def _inside(self, path: Path) -> Path:
-        """Return the file that a path leads to, without links."""
+        """Return the path of a file after all links are followed."""
         if self._root is None:
             found = root_of(self._world, self._source)
             self._root = found if found != found.parent else self._world.parent

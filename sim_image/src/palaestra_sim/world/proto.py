@@ -9,9 +9,9 @@
       Solid { translation IS translation }
     }
 
-Nothing is expanded here. An instance of the type is a copy of `body` in which every `IS` is replaced by the
-instance's value of the field, or else by the default. For any bytes the result is a Proto or a WorldError. A
-template, from which Webots generates the file with Lua or JavaScript, is refused.
+This module does not expand instances. An instance of the type is a copy of `body` in which every `IS` is
+replaced by the instance's value of the field, or else by the default. For any bytes the result is a Proto or
+a WorldError. A template, from which Webots generates the file with Lua or JavaScript, is refused.
 """
 
 import re
@@ -48,7 +48,7 @@ class ProtoField:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proto:
-    """A parsed PROTO file: its type, the fields in source order, and the node that it stands for.
+    """A parsed PROTO file: its type, its fields in source order, and its node.
 
     `externs` are the string tokens of its EXTERNPROTO lines. Every span refers to `source`.
     """
@@ -64,8 +64,8 @@ def parse_proto(data: bytes, name: str) -> Proto:
     """Return the PROTO that `data` declares; `name` is the name of its file in errors.
 
     Raises:
-        WorldError: the bytes are not a PROTO file, or they have a template; the message has the place, the
-            fact and the remedy.
+        WorldError: the bytes are not a PROTO file, or they have a template; the message has the position,
+            the fact and the remedy.
     """
     source = Source(data=data, name=name, kind="PROTO")
     source.header()
@@ -82,16 +82,16 @@ def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
     """Return the fields that `text` declares as a PROTO does; the word before a type may be missing.
 
     Raises:
-        WorldError: the text has anything else; its lines count from 1.
+        WorldError: the text is not a list of declarations; the error counts its lines from 1.
     """
     source = Source(data=text.encode(), name=name, kind="PROTO")
     return _ProtoReader(source, tokenize(source)).fields(name)
 
 
 def _templates(data: bytes) -> Iterator[int]:
-    """Yield the place of each opening of a template, and of each comment that names its language.
+    """Yield the offset of each opening of a template, and of each comment that names its language.
 
-    Only the first place is reliable: after it, the code of the template has other comments and strings.
+    Only the first offset is reliable, because the code of the template has other comments and strings.
     """
     for match in _NOT_CODE.finditer(data):
         comment = match.group("comment")
@@ -127,7 +127,7 @@ class _ProtoReader(Reader):
         fields = self._declarations(name)
         self._expect(b"{", "the body of a PROTO is written { Type { … } }")
         self._is_refused = None
-        self._last_counts = True  # published PROTOs repeat fields
+        self._last_counts = True  # some published PROTOs repeat fields
         body = self._body(name)
         self._expect(b"}", "a PROTO has one node")
         self._end()
@@ -206,7 +206,7 @@ class _ProtoReader(Reader):
         return default
 
     def _body(self, proto: str) -> Node:
-        """Read the node that the PROTO stands for."""
+        """Read the node of the PROTO."""
         first = self._peek()
         body = self._node(1)
         if body.uses is not None:
@@ -221,7 +221,7 @@ class _ProtoReader(Reader):
             raise self._error(token, fact, "remove it, or move it to a file of its own")
 
     def _expect(self, text: bytes, remedy: str) -> None:
-        """Move past the next token, which must be this word or mark."""
+        """Move past the next token, whose text must be `text`."""
         token = self._peek()
         if not self._skip(text):
             fact = f"{shown(token)} where {text.decode()} should be"

@@ -1,8 +1,8 @@
 """Parse the tokens of a world file into its tree.
 
-Recursive descent with one function for each rule of the grammar. A constant limits the depth, so Python's
-stack does not. For any bytes the result is a World or a WorldError. The rules for nodes apply to PROTO files
-too; the module `proto` has the others.
+The parser is a recursive descent with one function for each rule of the grammar. `MAX_DEPTH` limits the
+nesting, so that Python's stack cannot overflow. For any bytes the result is a World or a WorldError. The
+rules for nodes apply to PROTO files too; the module `proto` has the other rules for PROTO files.
 """
 
 import re
@@ -13,7 +13,8 @@ from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token, Tokens, glance, tokenize, unquoted
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
-# Each level takes four Python calls, so 400 of the 1000 that Python allows. An arm nests two nodes per joint.
+# Each level takes four Python calls, so all levels take 400 of the 1000 calls that Python allows. An arm
+# nests two nodes per joint.
 MAX_DEPTH = 100
 
 _RESERVED = frozenset(
@@ -27,7 +28,7 @@ def parse(source: bytes, name: str = "world") -> World:
     """Return the world that `source` describes; `name` is its name in errors.
 
     Raises:
-        WorldError: the bytes are not a world file; the message has the place, the fact and the remedy.
+        WorldError: the bytes are not a world file; the message has the position, the fact and the remedy.
     """
     text = Source(data=source, name=name)
     header = text.header()
@@ -38,7 +39,7 @@ def parse_nodes(text: str, name: str) -> World:
     """Return the nodes of a text without a header, as a client sends them; `name` is its name in errors.
 
     Raises:
-        WorldError: the text does not describe nodes; the message has the place, the fact and the remedy.
+        WorldError: the text does not describe nodes; the message has the position, the fact and the remedy.
     """
     source = Source(data=text.encode(), name=name, headless=True)
     return Reader(source, tokenize(source)).world("")
@@ -182,7 +183,7 @@ class Reader:
         return token
 
     def _skip(self, text: bytes) -> bool:
-        """Move past the next token if it is this word or mark; return whether it was."""
+        """Move past the next token if its text is `text`; return whether the text was equal."""
         if self._next.text != text:
             return False
         self._take()

@@ -1,8 +1,8 @@
 """Find the robots of a world whose controller is "ros".
 
-They may have any type: a plain Robot or a PROTO, at the top or nested in another node's children, endPoint or
-slots. A PROTO whose default controller is "ros" is not found; its instance in the world must have
-`controller "ros"`.
+Such a robot may be a plain Robot or an instance of a PROTO. It may be at the top of the world, or nested in
+another node's children, endPoint or slots. A PROTO whose default controller is "ros" is not found; its
+instance in the world must have `controller "ros"`.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,9 @@ _PART_OF_WEBOTS = ("ros", "void")
 class WorldRobot:
     """A robot whose controller is "ros".
 
-    `robot` is its Robot.name; `ros_name` is from its `--name=`, None without. `supervisor`: it may read and
-    change the whole scene. `synchronize`: it waits for a client's step. `definition` is its DEF name.
+    `robot` is its Robot.name. `ros_name` is the value of its `--name=`, or None without this argument. A
+    `supervisor` may read and change the whole scene. If `synchronize`, the simulation waits until a client
+    steps the robot. `definition` is its DEF name.
     """
 
     robot: str
@@ -43,7 +44,7 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
 def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
     """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
 
-    "ros" and "void" are parts of Webots, and "<none>", "<generic>" and "<extern>" are not programs.
+    "ros" and "void" are programs of Webots, and "<none>", "<generic>" and "<extern>" are not programs.
 
     Raises:
         WorldError: the bytes are not a world file.
@@ -77,7 +78,7 @@ def described(node: Node) -> WorldRobot:
     names = [argument.removeprefix(NAME) for argument in arguments if argument.startswith(NAME)]
     return WorldRobot(
         robot=robot_name(node),
-        ros_name=names[-1] if names else None,  # the controller uses the last one
+        ros_name=names[-1] if names else None,  # the controller uses the last `--name=`
         supervisor=node.flag("supervisor", default=False),
         synchronize=SYNCHRONIZE in arguments,
         definition=node.def_name or "",

@@ -14,9 +14,10 @@ def placed(world: Path) -> Path:
 
 
 def root_of(world: Path, source: bytes, given: Path | None = None) -> Path:
-    """Return the folder around a world that holds all files that it names: `given`, or the nearest one.
+    """Return `given`, or the nearest folder around a world that holds all files that the world names.
 
-    The nearest one is the Webots project of the world, or a folder above it. `world` is a path from `placed`.
+    The nearest folder is the Webots project of the world, or a folder above that project. `world` is a path
+    from `placed`.
 
     Raises:
         RootError: `given` is not above the world, or does not hold all files that the world names.

@@ -1,7 +1,7 @@
-"""The bytes of one world or PROTO file, and errors at places in it.
+"""The bytes of one world or PROTO file, and errors at positions in the file.
 
 This package works with byte offsets, but people read lines and columns. Only this module converts an offset
-to line and column, so that every error of a world has its place.
+to a line and a column, so every error of a world has both.
 """
 
 import re
@@ -70,10 +70,10 @@ class Source:
 
 
 class _Mark(NamedTuple):
-    """A place in a file: its offset, the lines before it, and the characters before it in its own line.
+    """A position in a file: its offset, the lines before it, and the characters before it in its own line.
 
-    A file has a mark for each block, so the search for the place of an error does not scan the whole file or
-    a long line.
+    A file has a mark for each block, so the conversion of an offset does not scan the whole file or a long
+    line.
     """
 
     at: int
@@ -90,7 +90,7 @@ def _marked(data: bytes) -> list[_Mark]:
 
 
 def _after(mark: _Mark, data: bytes, offset: int) -> tuple[int, int]:
-    """Return line and column, from 0, of a byte after a mark and before the next one."""
+    """Return line and column, from 0, of a byte between a mark and the next mark."""
     line = mark.line + data.count(b"\n", mark.at, offset)
     line_start = data.rfind(b"\n", mark.at, offset) + 1
     begins, before = (line_start, 0) if line_start else (mark.at, mark.column)

@@ -1,6 +1,6 @@
 """Stand-ins: descriptions of PROTOs whose files are not read, by their fields and a few simple shapes.
 
-A file of stand-ins is TOML, one table for each type:
+A file of stand-ins is a TOML file with one table for each type:
 
     [WoodenBox]
     fields = '''
@@ -10,10 +10,10 @@ A file of stand-ins is TOML, one table for each type:
     box = "size"
 
 `fields` declares the fields and their defaults as a PROTO does, and as Webots' manual prints them. Every
-object also has `translation`, `rotation` and `name`. The shape is `box`, `cylinder`, `sphere`, `plane`,
-`ring` or `wall`, or several of them in `parts`; lengths are numbers or formulas (`expressions.py`). The lists
-`flat` and `drawn` at the top of the file name types without obstacles: `flat` objects lie on the ground, and
-`drawn` objects are only visible.
+object also has `translation`, `rotation` and `name`. An entry has one shape (`box`, `cylinder`, `sphere`,
+`plane`, `ring` or `wall`), or a list of shapes in `parts`. Lengths are numbers or formulas
+(`expressions.py`). The lists `flat` and `drawn` at the top of the file name types without obstacles: `flat`
+objects lie on the ground, and `drawn` objects are only visible.
 """
 
 import re
@@ -42,15 +42,15 @@ _FIELDS_OF_FORM: dict[FormKind, tuple[str, ...]] = {
 }
 
 Values: TypeAlias = Mapping[str, Sequence[Item]]
-"""The items of an object's fields; a missing field, or one without fitting items, has its default."""
+"""The items of an object's fields; a field that is missing or has items of a wrong type has its default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StandIn:
     """The description of a type: its fields, and the shapes that replace it.
 
-    `kind` is "solid", "flat" for an object that lies on the ground, or "drawn" for one that is only visible.
-    The latter two have no forms.
+    `kind` is "solid", "flat" for an object that lies on the ground, or "drawn" for an object that is only
+    visible. Flat and drawn objects have no forms.
     """
 
     name: str
@@ -108,14 +108,14 @@ def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
 
 
 def _listed(names: object, place: str) -> Iterator[str]:
-    """Yield the types in one of the lists."""
+    """Yield the types in the list `flat` or `drawn`."""
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise StandInError(f'{place}: this is not a list of types; write ["Carpet"], before the first table')
     yield from names
 
 
 class _Entry:
-    """One table of a file of stand-ins; `place` is its place in errors."""
+    """One table of a file of stand-ins; errors begin with `place`, its position in the file."""
 
     def __init__(self, place: str, type_name: str, table: dict[str, Any]) -> None:
         self._place = place
@@ -136,7 +136,7 @@ class _Entry:
         return StandIn(name=self._type, fields=self._fields, forms=forms)
 
     def _declared(self, text: object) -> dict[str, ProtoField]:
-        """Return the declared fields, after those that every object has."""
+        """Return the fields that every object has, followed by the declared fields."""
         if not isinstance(text, str):
             self._refuse("fields", "this is not text", "declare fields as SFVec3f size 1 1 1, one a line")
         try:
@@ -154,7 +154,7 @@ class _Entry:
         return tuple(self._form(part, f"parts[{number}].") for number, part in enumerate(parts))
 
     def _form(self, table: dict[str, Any], prefix: str) -> Form:
-        """Return the form of a table with one shape; `prefix` is its place in the entry."""
+        """Return the form of a table with one shape; `prefix` is its position in the entry, for errors."""
         shapes: list[FormKind] = [kind for kind in LENGTHS if table.get(kind) is not None]
         unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
         if unknown:
@@ -229,7 +229,7 @@ class _Entry:
         return self._formula(table[key], prefix + key) if key in table else None
 
     def _formula(self, written: object, place: str) -> Expression:
-        """Return a formula, after a check that its fields are declared and have the numbers that it uses."""
+        """Return a formula; refuse it if a field in it is not declared, or lacks a number that it uses."""
         try:
             formula = parse_formula(written)
         except ValueError as error:

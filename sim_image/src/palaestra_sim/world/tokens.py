@@ -1,8 +1,8 @@
 r"""Split a world file into tokens, each with its offset in the bytes.
 
-The gaps between tokens (blanks, line ends, commas and comments) belong to no token; the editor of a world
-copies them from the bytes. Only this module reads and writes strings. They have the escapes `\"` and `\\`;
-every other backslash stands for itself.
+The gaps between tokens (blanks, line ends, commas and comments) are not tokens; `patches` copies them
+unchanged. Only this module reads and writes strings. A string has the escapes `\"` and `\\`; every other
+backslash is an ordinary character.
 """
 
 import re
@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 )
 # Possessive quantifiers, because otherwise a long number before a letter would take quadratic time.
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
-GLANCE = 40  # maximum number of characters that an error shows of a text
+GLANCE = 40  # maximum length of a text of the file in an error message
 _ESCAPE = re.compile(r'\\(["\\])')
 
 
@@ -46,9 +46,9 @@ _PLACE_OF: Final[dict[str, int]] = {kind: place for place, kind in enumerate(_KI
 
 
 class Tokens(Sequence[Token]):
-    """The tokens of a file, of which only the places are stored: nine bytes for each.
+    """The tokens of a file, stored as kinds and offsets: nine bytes for each token.
 
-    A `Token` is created on access. All of them at once would take 150 MB for a file of 1 MB.
+    A `Token` is created on access. All tokens at once would take 150 MB for a file of 1 MB.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -64,11 +64,11 @@ class Tokens(Sequence[Token]):
         self._ends.append(end)
 
     def index_at(self, offset: int, first: int = 0) -> int:
-        """Return the index of the token at byte `offset`, or of the next one; it is `first` or larger."""
+        """Return the index, at least `first`, of the token at byte `offset` or of the next token."""
         return bisect_left(self._starts, offset, lo=first)
 
     def __len__(self) -> int:
-        """Return the number of tokens, including the one of kind `end`."""
+        """Return the number of tokens, including the token of kind `end`."""
         return len(self._kinds)
 
     @overload
@@ -78,7 +78,7 @@ class Tokens(Sequence[Token]):
     def __getitem__(self, index: slice) -> tuple[Token, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Token | tuple[Token, ...]:
-        """Return a token, or several as a tuple."""
+        """Return a token, or a tuple of tokens for a slice."""
         if isinstance(index, slice):
             return tuple(map(self._token, self._kinds[index], self._starts[index], self._ends[index]))
         return self._token(self._kinds[index], self._starts[index], self._ends[index])
@@ -92,7 +92,7 @@ class Tokens(Sequence[Token]):
 
 
 def tokenize(source: Source) -> Tokens:
-    """Return the tokens of a world in order, followed by an empty one of kind `end`.
+    """Return the tokens of a world in order, followed by an empty token of kind `end`.
 
     Raises:
         WorldError: a string is never closed, a number is malformed, or a character is not allowed.

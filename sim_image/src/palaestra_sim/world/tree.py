@@ -1,8 +1,8 @@
 """A world or PROTO file as nodes, fields and values.
 
-The readers know the grammars of `.wbt` and `.proto`, but no node type: other modules know the fields of a
-Robot or a PROTO, and find the `DEF` of a `USE`. Nothing is resolved here, and every node and value has the
-span of its bytes.
+The modules `reader` and `proto` parse the grammars of `.wbt` and `.proto`, without knowledge of node types.
+Other modules define the fields of a Robot or a PROTO, and find the `DEF` of a `USE`. Every node and value has
+the span of its bytes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -81,7 +81,7 @@ class Node:
 class World:
     """A parsed world file: its bytes, its first line, and its nodes in source order.
 
-    `externs` are the string tokens of its EXTERNPROTO lines; `tokens` end with one of kind `end`.
+    `externs` are the string tokens of its EXTERNPROTO lines; the last of `tokens` is of kind `end`.
     """
 
     source: bytes
@@ -101,7 +101,7 @@ class World:
         return map(self.tokens.__getitem__, range(first, self.tokens.index_at(end, first)))
 
     def index(self, offset: int) -> int:
-        """Return the index of the token at byte `offset`, or of the first one after it."""
+        """Return the index of the token at byte `offset`, or of the next token."""
         return self.tokens.index_at(offset)
 
 

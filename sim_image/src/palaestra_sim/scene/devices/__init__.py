@@ -1,26 +1,26 @@
 """The devices of robots: one table, with a row for each type of node.
 
-A row (`DeviceType`) holds everything about one type: how it is read from the world, how its value is sampled,
-its services, its topics with their messages, and the rule of its `enable`. The effect of the fault
-`wrong_value` follows from the topic. A new device is one file in this package and one line in `DEVICES`;
-CONTRIBUTING.md has the steps.
+A row (`DeviceType`) defines one type of device. The row has the functions that read a device from the world
+and sample its value, the services, the topics with their messages, and the rule of `enable`. The fault
+`wrong_value` needs no entry in the row, because it changes messages of any type. A new device is one
+file in this package and one line in `DEVICES`; CONTRIBUTING.md has the steps.
 
 - `device_type`: the definition of a row
 - `distance_sensor`, `touch_sensor`: rows of sensors for obstacles
 - `motors`, `brake`, `position_sensor`: rows of devices on joints
-- `lidar`: the row of a sensor with many rays, and `lidar_rays`: their directions
+- `lidar`, `lidar_rays`: the row of a sensor with many rays, and the directions of these rays
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: rows of sensors for position and motion
 - `altimeter`, `light_sensor`: rows of sensors for height and light
 - `emitter`, `receiver`: rows of radio devices
-- `connector`: the row of a device that detects another of its kind
+- `connector`: the row of a device that detects another connector
 - `led`, `speaker`, `pen`, `display`: rows of devices that only store the values that a program sets
 - `camera`, `range_finder`: rows of devices with images
-- `camera_common`, `recognition`: the lens that both share, and the objects that a camera recognizes
-- `radar`: the row of a sensor for the distances of targets
+- `camera_common`, `recognition`: the lens of both devices, and the objects that a camera recognizes
+- `radar`: the row of a sensor that measures the distances and speeds of targets
 - `vacuum_gripper`: the row of a gripper, which never holds an object here
 - `skin`: the row of animated meshes, which are not loaded here
 - `sensor_response`: lookup tables, resolution and axes, which several sensors share
-- `step_timer`: the time between two samples, for what turns or drifts
+- `step_timer`: the time between two samples, for a head that turns or noise that drifts
 - `imu_topic`: the topic of sensors that send a sensor_msgs/Imu
 """
 

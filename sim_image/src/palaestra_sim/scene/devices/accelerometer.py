@@ -1,7 +1,7 @@
-"""Accelerometer: the change of its velocity over the last basic step, and the reaction to gravity.
+"""Accelerometer: the acceleration of the sensor over the last basic step, plus the reaction to gravity.
 
-At rest it shows WorldInfo.gravity upward. Webots uses the change over the sensor's period, which is the same
-for a period of one basic step. Source: WbAccelerometer.cpp of Webots.
+At rest it reports WorldInfo.gravity upward. Webots computes the acceleration over the sensor's sampling
+period, which gives the same value for a period of one basic step. Source: WbAccelerometer.cpp of Webots.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Altimeter: its height in the world plus that of WorldInfo.gpsReference.
+"""Altimeter: the height of the sensor in the world, plus the height in WorldInfo.gpsReference.
 
 Source: WbAltimeter.cpp of Webots.
 """

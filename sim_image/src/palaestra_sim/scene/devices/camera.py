@@ -1,7 +1,7 @@
-"""Camera: its settings, and its images if the simulator renders.
+"""Camera: the settings of a camera, and its images if the simulator renders.
 
-If it does not, `enable` and the services that save images return failure. Distortion, focus, exposure, motion
-blur and noise have no effect.
+Without rendering, `enable` and the services that save images return failure. Distortion, focus, exposure,
+motion blur and noise have no effect.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ class Camera:
 
     Attributes:
         place: its frame.
-        lens: its field of view is that of the world, or the one that a client set.
-        spherical: whether its image would be spherical.
-        exposure: that of the world, or the one that a client set.
-        focus: focal length, distance, and its highest and lowest value, in meters; None without a Focus node.
+        lens: its lens, whose field of view a client may change.
+        spherical: whether the world asks for a spherical image, which is not rendered.
+        exposure: the exposure in the world, or the exposure that a client set.
+        focus: focal length, focal distance, and its highest and lowest value, in meters; None without a Focus
+            node.
         zoom: minimum and maximum field of view in rad; None without a Zoom node.
-        recognition: None without a Recognition node.
+        recognition: its Recognition node; None without such a node.
         eye: the camera interface; None if the simulator does not render.
     """
 
@@ -51,7 +52,7 @@ class Camera:
 
     @property
     def value(self) -> bytes | memoryview:
-        """The image of this moment: blue, green, red and alpha of each pixel."""
+        """The current image: blue, green, red and alpha of each pixel."""
         return b"" if self.eye is None else self.eye.colors()
 
     def attach(self, robot: Carrier) -> None:
@@ -150,7 +151,7 @@ def _zoom_info(camera: Camera) -> Fields:
 
 def _fov_setter(camera: Camera) -> Handler:
     def set_fov(request: Any) -> Fields:
-        """Set the field of view, within the limits of the Zoom node; otherwise ignore it, as in Webots."""
+        """Set the field of view; ignore a value outside the limits of the Zoom node, as in Webots."""
         if camera.zoom is not None and camera.zoom[0] <= request.value <= camera.zoom[1]:
             camera.lens.field_of_view_rad = request.value
         return {"success": True}
@@ -160,7 +161,7 @@ def _fov_setter(camera: Camera) -> Handler:
 
 def _focus_setter(camera: Camera) -> Handler:
     def set_focal_distance(request: Any) -> Fields:
-        """Set the focal distance, within the limits of the Focus node; otherwise ignore it, as in Webots."""
+        """Set the focal distance; ignore a value outside the limits of the Focus node, as in Webots."""
         if camera.focus is not None:
             length, _, highest, lowest = camera.focus
             if lowest <= request.value <= highest:

@@ -1,7 +1,7 @@
-"""Connector: whether another one is near enough to connect. If so, `lock` fails, because nothing is joined.
+"""Connector: detects whether another connector is near enough to connect.
 
-Two connectors that fit face each other; their x axes point outward.
-Source: WbConnector.cpp of Webots.
+If so, `lock` fails, because joining is not simulated. Connectors fit if they face each other; the x axis of
+each points outward. Source: WbConnector.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Connector:
 
     Attributes:
         kind: "symmetric", "active" or "passive".
-        reach_m: maximum distance to another one.
+        reach_m: maximum distance to another connector.
         tilt_rad: maximum angle between the axes.
         turns: number of rotations about the axis in which it fits; 0 means any rotation.
         twist_rad: maximum deviation from one of these rotations.
@@ -47,16 +47,16 @@ class Connector:
 
     @property
     def value(self) -> int:
-        """1 if another connector is in reach, 0 if not, -1 for a passive one."""
+        """1 if another connector is in reach, 0 if not, -1 for a passive connector."""
         if self.kind == "passive":
             return _PASSIVE
         return int(any(self._fits(other) for other in self.others if other is not self))
 
     def lock(self, *, locked: bool) -> None:
-        """Lock or unlock it.
+        """Lock or unlock the connector.
 
         Raises:
-            UnsimulatedError: it would join another one.
+            UnsimulatedError: the lock would join it to another connector.
         """
         if locked and self.value > 0:
             raise UnsimulatedError(
@@ -94,7 +94,7 @@ def _angle(a: Vector, b: Vector) -> float:
 def _read(part: DevicePart) -> Connector:
     kind = part.text("type", "symmetric")
     if kind not in _MATCHING:
-        part.refuse(f"no connector is of type {kind!r}", f"use {', '.join(_MATCHING)}")
+        part.refuse(f"{kind!r} is not a type of connector", f"use {', '.join(_MATCHING)}")
         kind = "symmetric"
     return Connector(
         name=part.name,

@@ -1,7 +1,7 @@
 """The definition of a row in the table of devices, and of a device of that type.
 
-Nothing here depends on a wire protocol: services are data (`ros_interfaces`), and a message is its type and
-its fields.
+This module does not depend on a wire protocol: services are data (`ros_interfaces`), and a message consists
+of its type and its fields.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Device(Protocol):
 DeviceT = TypeVar("DeviceT", bound=Device)
 
 
-ROLES: Final = ("motor", "brake", "position_sensor")  # what the devices of a joint can be
+ROLES: Final = ("motor", "brake", "position_sensor")  # the roles of the devices of a joint
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -52,8 +52,8 @@ class Shaft:
 
     Attributes:
         joint: the joint itself; None for a device that is not on a joint.
-        motor: the first motor on it.
-        names: the names of the first device of each role.
+        motor: the first motor on the joint; None if it has no motor.
+        names: for each role, the name of the first device.
     """
 
     joint: Joint | None = None
@@ -67,7 +67,7 @@ class Shaft:
 
     @property
     def position(self) -> float:
-        """Its position, in rad or m."""
+        """The position of the joint, in rad or m."""
         if self.motor is not None:
             return self.motor.angle_rad
         return 0.0 if self.joint is None else self.joint.now
@@ -75,17 +75,17 @@ class Shaft:
 
 @dataclass(slots=True, kw_only=True)
 class DevicePart:
-    """The node of a device, while its robot is read.
+    """The node of a device, as the reader of its robot passes it to `DeviceType.read`.
 
     Attributes:
-        reading: the reading of the world.
+        reading: the reader of the world's nodes.
         lacks: records that a node of the robot cannot be simulated.
         node: the node of the device.
-        name: as in the world file, else the default of its type.
-        place: its frame in the robot's; of a device on a joint, the frame of the joint.
-        shaft: the joint to which it belongs.
+        name: its name in the world file, else the default name of its type.
+        place: its frame, in the robot's frame; for a device on a joint, the frame of the joint.
+        shaft: the joint to which it belongs; None if it is not on a joint.
         outline: the shapes with which the robot collides.
-        measured: the parts of the robot whose force on it is measured.
+        measured: the links whose force on the robot is measured.
         forces: whether the physics has forces.
     """
 
@@ -140,17 +140,17 @@ class DevicePart:
         return shapes
 
     def measure(self) -> Link:
-        """Return this device's link, after adding it to the parts whose force on the robot is measured."""
+        """Return this device's link, after adding it to the links whose force on the robot is measured."""
         link = Link(node=self.node, place=self.place, joint=None)
         self.measured.append(link)
         return link
 
 
 class Carrier(Protocol):
-    """The robot that carries a device, for sampling.
+    """The interface of the robot that carries a device.
 
     Attributes:
-        body: None if nothing can collide with the robot.
+        body: its body in the physics; None if it cannot drive and is not a free-standing obstacle.
         time_s: the time of the world since its start or its last reset.
     """
 
@@ -162,19 +162,19 @@ class Carrier(Protocol):
         ...
 
     def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return a function for the distance that each beam travels now, in meters."""
+        """Return a function that returns how far each beam travels, in meters."""
         ...
 
     def see(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
-        """Return the same function for beams that meet visible objects and pass through the robot itself."""
+        """Return such a function for beams that stop at visible objects, but not at the robot itself."""
         ...
 
     def reflect(self, beams: Sequence[Beam]) -> Callable[[], Sequence[Glance]]:
-        """Return a function for the object that each infra-red beam meets now."""
+        """Return a function that returns the surface that each infra-red beam meets."""
         ...
 
     def lights(self) -> Sequence[SceneNode]:
-        """Return the lights of the world now."""
+        """Return the current lights of the world."""
         ...
 
     def eye(self, place: Frame, lens: Lens) -> CameraInterface | None:
@@ -190,12 +190,12 @@ class Carrier(Protocol):
         ...
 
     def follow(self, place: Frame) -> Callable[[], Vector]:
-        """Return a function for the acceleration of a frame, in world axes, in m/s2."""
+        """Return a function that returns the acceleration of a frame, in world axes, in m/s2."""
         ...
 
 
 class ValueSource(Protocol):
-    """Holds a value that a topic publishes: a sensor, or a part of one."""
+    """A sensor, or a part of a sensor, with a value that a topic publishes."""
 
     @property
     def value(self) -> Any:
@@ -210,9 +210,10 @@ class DeviceTopic:
     Attributes:
         name: relative to the device's name.
         type_name: the type of its messages.
-        source: the source of the reading; None if it never has one.
-        constants: the other fields.
-        reading: the field of the value; "" is the last one, which must consist of numbers and is the fastest.
+        source: the source of the reading; None if the topic never has a reading.
+        constants: the values of the other fields.
+        reading: the field of the value. "" means the last field, which must consist of numbers; this is the
+            fastest choice.
         many: whether `value` is a sequence, with a message for each of its items.
         whole: whether the value is a mapping of all fields except the header.
         stamped: whether the messages begin with a header; without a header, `reading` must name the field.
@@ -230,13 +231,13 @@ class DeviceTopic:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stream:
-    """Topics of a device with their own `enable`, in addition to the device's.
+    """Topics of a device with their own `enable`, in addition to the `enable` of the device.
 
     Attributes:
         prefix: the prefix of `enable` and `get_sampling_period`, relative to the name of the device.
-        topics: the topics that it starts.
-        silent: returns whether all periods are refused.
-        enabled: called after a change with the sampling period in ms; 0 means off.
+        topics: the topics that this `enable` starts.
+        silent: whether all periods are refused.
+        enabled: called with the new sampling period in ms after a change; 0 means off.
     """
 
     prefix: str
@@ -266,22 +267,23 @@ class DeviceType(Generic[DeviceT]):
     Attributes:
         node: the type of its node.
         name: the name of a device whose node has no name.
-        fields: the fields of the node, in the syntax of `field_types`, without `name` and, if it is a Solid,
-            those of a Solid.
-        without_effect: those fields that have an effect in Webots but in no simulator here, separated by
-            spaces.
+        fields: the fields of the node, in the syntax of `field_types`, except `name` and, if the node is a
+            Solid, except the fields that every Solid has.
+        without_effect: the names of the fields that have an effect in Webots but in no simulator here,
+            separated by spaces.
         solid: whether a node that is not on a joint is a Solid.
-        role: one of `ROLES` for a device of a joint; "" for one with its own frame on the robot.
+        role: one of `ROLES` for a device of a joint; "" for a device with its own frame on the robot.
         read: returns the device of a node.
         sampler: returns a function that sets the values of one robot's devices; None if they have no values.
-        services: returns the services other than these: `get_model`, `get_name`, `get_node_type`; on joints,
-            the names of the joint's other devices; and, with topics, `enable` and `get_sampling_period`.
+        services: returns the services that only this type has. Every device also has `get_model`, `get_name`
+            and `get_node_type`. A device of a joint also has services for the names of the joint's other
+            devices. A device with topics also has `enable` and `get_sampling_period`.
         topics: returns the topics that `enable` starts.
         streams: returns the other topics, each with its own `enable`.
         attach: connects a device to the robot that carries it.
-        enable: returns whether a period is accepted; 0, which stops publishing, always is.
+        enable: returns whether a period is accepted; 0, which stops publishing, is always accepted.
         silent: returns whether an attached device has no readings, so that all periods are refused.
-        enabled: called after a change with a device and its sampling period in ms; 0 means off.
+        enabled: called with a device and its new sampling period in ms after a change; 0 means off.
         sensor: the path of `enable` relative to the name of the device, "" for the name itself.
     """
 
@@ -313,7 +315,7 @@ class DeviceType(Generic[DeviceT]):
 
     @property
     def body(self) -> bool:
-        """Whether its node is a Solid, with which others may collide."""
+        """Whether its node is a Solid, with which other objects may collide."""
         return self.solid and not self.on_joint
 
 
@@ -322,9 +324,9 @@ class Devices:
     """All devices of a robot by name, in the order of the world file.
 
     Attributes:
-        rows: each with its row of the table.
-        nodes: their nodes.
-        shafts: the shafts of those on joints.
+        rows: for each name, the row of the table, and the device.
+        nodes: the nodes of the devices, by name.
+        shafts: the joints of the devices on joints, by name.
     """
 
     rows: dict[str, tuple[DeviceType[Any], Any]] = field(default_factory=dict)
@@ -333,13 +335,13 @@ class Devices:
     _by_topic: dict[str, str] = field(default_factory=dict)
 
     def add(self, name: str, kind: DeviceType[Any], device: Any) -> None:
-        """Add a device, or replace the one of the same name."""
+        """Add a device, or replace the device of the same name."""
         self.rows[name] = kind, device
         self._by_topic[topic_name(name)] = name
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the devices."""
         return tuple(self.rows)
 
     @property
@@ -353,11 +355,11 @@ class Devices:
         return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
 
     def trouble_with(self, name: str) -> str | None:
-        """Return the reason to refuse another device of that name; None to accept it."""
+        """Return the reason to refuse another device of that name; None to accept the device."""
         if name in self.rows:
             return f"a second device {name!r}"
         if not is_ros_name(name):
-            return f"a device {name!r}, a name that ROS does not take"
+            return f"a device {name!r}, a name that ROS does not accept"
         path = topic_name(name)
         same = self._by_topic.get(path)
         return None if same is None else f"devices {same!r} and {name!r}, whose topics are both {path!r}"

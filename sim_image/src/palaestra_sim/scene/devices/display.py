@@ -38,8 +38,8 @@ class Display:
     Attributes:
         picture: the pixels that were drawn.
         color: blue, green, red and alpha for the next drawing.
-        opacity: for the next drawing, from 0 to 255.
-        font: for text.
+        opacity: the opacity of the next drawing, from 0 to 255.
+        font: the font of the next text.
         images: stored images of clients, by their handles.
         camera: the camera whose image is the background; None without a background.
     """
@@ -67,7 +67,7 @@ class Display:
     def attach(self, name: str) -> bool:
         """Show the image of one of the robot's cameras as background; return whether that device exists.
 
-        Where nothing was drawn, the display becomes transparent. A second camera changes nothing.
+        Black pixels, such as those without a drawing, become transparent. A second camera has no effect.
 
         Raises:
             UnsimulatedError: the simulator does not render, or the camera has another size.
@@ -82,7 +82,7 @@ class Display:
         size = self.picture.width, self.picture.height
         if camera.lens.size != size:
             raise UnsimulatedError(
-                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both one size"
+                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both the same size"
             )
         camera.eye.open()
         self.camera = camera
@@ -147,7 +147,7 @@ def _ink(display: Display) -> tuple[Row, ...]:
         return {"success": True}
 
     def set_font(request: Any) -> Fields:
-        """Set the size of the font; ignore one that is not positive, for which Webots prints an error."""
+        """Set the size of the font; ignore a size that is not positive, for which Webots prints an error."""
         if request.size > 0:
             display.font = Font(min(request.size, _LARGEST), bool(request.antiAliasing))
         return {"success": 1}
@@ -210,7 +210,7 @@ def _require_small(request: Any) -> None:
     for name, value in request._asdict().items():
         numbers = value if isinstance(value, list | tuple) else [value]
         if any(isinstance(number, int) and abs(number) > _LARGEST for number in numbers):
-            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; no display is as large")
+            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; use a smaller number")
 
 
 def _images(display: Display) -> tuple[Row, ...]:
@@ -258,9 +258,9 @@ def _images(display: Display) -> tuple[Row, ...]:
 
 
 def _image_of(request: Any) -> ImageBuffer | None:
-    """Return the image for a request to create one; None if Webots does not create one either.
+    """Return the image that a request creates; None if Webots does not create an image either.
 
-    Missing bytes are 0. Webots would read the memory after the others.
+    Missing bytes are 0. Webots would read the memory after the last byte.
     """
     width, height, places = request.width, request.height, _FORMATS.get(request.format)
     if places is None or width < 1 or height < 1:

@@ -1,12 +1,12 @@
-"""DistanceSensor: its rays, and the lookup table that converts their length.
+"""DistanceSensor: its rays, and the lookup table that converts their lengths to a value.
 
-Several rays form a cone around the first axis. A sonar measures the nearest hit. The others measure the
-average, in which a ray counts less the farther it is off the axis. Infra-red rays meet visible shapes, the
-others boundingObjects; a darker shape appears farther away. Source: reference/distancesensor.md
-and WbDistanceSensor.cpp of Webots.
+Several rays form a cone around the x axis. A sonar measures the distance of the nearest hit. The other types
+measure the average distance, in which rays near the axis have larger weights. Infra-red rays meet visible
+shapes, and a darker shape appears farther away. The rays of other types meet boundingObjects. Source:
+reference/distancesensor.md and WbDistanceSensor.cpp of Webots.
 
-A ray of a sonar returns only from a surface that it meets within 22.5 degrees of its normal. Four additional
-rays next to it measure that angle, so a physics does not have to provide normals.
+A sonar detects a surface only if its ray meets the surface within 22.5 degrees of the normal. Four additional
+rays next to each ray measure this angle, so a physics does not have to provide normals.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from palaestra_sim.scene.lookup_table import Row as TableRow
 from palaestra_sim.scene.sensor_rays import Beam, beam_along
 from palaestra_sim.scene.visual_rays import Glance
 
-_MOST_RAYS: Final = 10_000  # the limit, because each ray is cast at every step
+_MOST_RAYS: Final = 10_000  # limit for the rays of a sensor, because each ray is cast at every step
 _BESIDE_M: Final = 1e-4  # distance of the additional rays from the ray of a sonar
-_BEAMS_OF_SONAR: Final = 5  # so many beams for each ray of a sonar
+_BEAMS_OF_SONAR: Final = 5  # number of beams for each ray of a sonar
 _STEEPEST: Final = math.tan(math.pi / 8.0)  # slope of the steepest surface that returns a sonar's ray
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-_EMPTY: Final = ((0.0, 0.0, 0.0),)  # stands for a table without rows: the sensor measures 0
-# For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
-# aperture.
+_EMPTY: Final = ((0.0, 0.0, 0.0),)  # replaces a table without rows, with which the sensor measures 0
+# For 1 to 10 rays, the rings of the cone. Each ring has a number of rays, a rotation as a share of the
+# spacing between them, and an opening angle as a share of the aperture.
 _RINGS: Final = (
     ((1, 0.0, 0.0),),
     ((2, 0.5, 1.0),),
@@ -58,7 +58,7 @@ class DistanceSensorType(IntEnum):
     LASER = 3
 
 
-# In lower case, because the case of letters does not matter.
+# The names are in lower case, because the case of letters in a world does not matter.
 _TYPES: Final = {
     "generic": DistanceSensorType.GENERIC,
     "infra-red": DistanceSensorType.INFRA_RED,
@@ -70,14 +70,14 @@ _TYPES: Final = {
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class DistanceSensor:
-    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino.
+    """Rays with their weights, and a lookup table; `value` is in the table's unit, such as volts.
 
-    A sonar has five beams for each ray: the ray itself, and two pairs beside it.
+    A sonar has five beams for each ray: the ray itself, and two pairs of beams next to it.
 
     Attributes:
         rows: the rows of its lookup table, as the world has them.
-        sensitivity: how much the color counts for an infra-red sensor; 0: not at all.
-        resolution: the resolution of the value; -1: as fine as can be.
+        sensitivity: the effect of the color on an infra-red sensor; 0 for no effect.
+        resolution: the resolution of the value; -1 for exact values.
     """
 
     name: str
@@ -96,11 +96,12 @@ class DistanceSensor:
 def _read(part: DevicePart) -> DistanceSensor:
     type_name = part.text("type", "generic").lower()
     if type_name not in _TYPES:
-        part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
+        part.refuse(f"{type_name!r} is not a type of distance sensor", f"use {', '.join(_TYPES)}")
     rows = tuple(table_rows(part, _TABLE, "distances"))
     table = lookup_table(*(rows or _EMPTY))
     aperture_rad = part.number("aperture", 1.5708)
-    rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))  # as in Webots, which warns
+    # Webots also gives a laser one ray, and prints a warning.
+    rays = 1 if type_name == "laser" else int(part.number("numberOfRays", 1.0))
     if rays > _MOST_RAYS:
         part.refuse(f"a distance sensor with {rays} rays", f"use 1 to {_MOST_RAYS}")
         rays = 1
@@ -120,7 +121,7 @@ def _read(part: DevicePart) -> DistanceSensor:
 
 
 def _beams(pose: Pose, cone: Sequence[Vector], reach_m: float, *, sonar: bool) -> Iterator[Beam]:
-    """Yield the beams of a sensor's rays; `pose` is the sensor's frame in the robot's."""
+    """Yield the beams of a sensor's rays; `pose` is the pose of the sensor in the robot's frame."""
     for direction in cone:
         yield beam_along(pose, direction, reach_m)
         if sonar:
@@ -180,7 +181,7 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
 
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
-    """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
+    """Return a function that casts all rays of the robot together; noise is drawn at every sample."""
     sample = _fine(sensors, robot)
     coarse = [sensor for sensor in sensors if sensor.resolution > 0.0]
     if not coarse:
@@ -195,7 +196,7 @@ def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
 
 
 def _fine(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
-    """Return the sample of sensors without their resolutions."""
+    """Return the sample function of sensors, before their resolutions are applied."""
     if any(sensor.type is DistanceSensorType.INFRA_RED for sensor in sensors):
         return _with_infrared(sensors, robot)
     cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
@@ -248,9 +249,10 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 
 
 def _returned(distances_m: Sequence[float]) -> Iterator[float]:
-    """Yield the distances of a sonar's rays that meet a surface at a small enough angle to return.
+    """Yield the distances of those rays of a sonar that meet a surface within 22.5 degrees of its normal.
 
-    At an edge, the two rays of a pair may differ; the one with the smaller difference decides.
+    At an edge, the two beams of a pair may have different lengths. The beam whose length is closer to that of
+    the ray decides.
     """
     for first in range(0, len(distances_m), _BEAMS_OF_SONAR):
         distance, left, right, below, above = distances_m[first : first + _BEAMS_OF_SONAR]
@@ -261,7 +263,7 @@ def _returned(distances_m: Sequence[float]) -> Iterator[float]:
 
 
 def _reflected(sensor: DistanceSensor, glances: Sequence[Glance]) -> float:
-    """Return the average distance, and how much farther it seems by the share of light that returns."""
+    """Return the average distance, increased if less than the full light returns."""
     light = sum(it.reflection * weight for it, weight in zip(glances, sensor.weights, strict=True))
     distance_m = _measured(sensor, [it.distance_m for it in glances])
     return distance_m + (distance_m / light - distance_m) * sensor.sensitivity

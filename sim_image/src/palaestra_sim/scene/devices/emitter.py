@@ -1,4 +1,4 @@
-"""Emitter: sends packets by radio; receivers on its channel get them after the next basic step."""
+"""Emitter: sends packets by radio; receivers on its channel get a packet after the next basic step."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Emitter:
             self.outbox.append((text, self.channel, self.range_m))
 
     def set_range(self, range_m: float) -> None:
-        """Set the range, up to the limit; a negative one is ignored, except -1, which means the limit."""
+        """Set the range, at most the limit; -1 means the limit, and other negative values are ignored."""
         if range_m == EVERYWHERE:
             self.range_m = self.max_range_m
         elif range_m >= 0.0:
@@ -49,13 +49,13 @@ class Emitter:
             self.range_m = min(range_m, limit)
 
     def set_channel(self, channel: int) -> None:
-        """Set the channel; one below -1 is not valid."""
+        """Set the channel; a channel below -1 is ignored."""
         if channel >= EVERYWHERE:
             self.channel = channel
 
 
 def require_radio(part: DevicePart) -> None:
-    """Record that the simulator supports only radio as a medium."""
+    """Record a device that is not of the type "radio" as unsupported."""
     medium = part.text("type", "radio")
     if medium != "radio":
         part.lack(f"the type {medium!r} of {part.node.type_name}")

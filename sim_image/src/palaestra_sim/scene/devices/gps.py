@@ -1,8 +1,8 @@
-"""GPS: its position in meters or in degrees, and its speed.
+"""GPS: the position of the sensor in meters or in degrees, and its speed.
 
-Its coordinates are those of the world plus WorldInfo.gpsReference (the system "local"). In the system
-"WGS84", the reference is latitude and longitude in degrees and altitude in meters, and so is the position;
-noise and resolution are in meters. Source: WbGps.cpp of Webots.
+In the coordinate system "local", the position is that in the world plus WorldInfo.gpsReference. In the system
+"WGS84", the reference and the position are latitude and longitude in degrees and altitude in meters. Noise
+and resolution are in meters in both systems. Source: WbGps.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from palaestra_sim.scene.utm import UtmZone
 
 _LOCAL, _WGS84 = 0, 1  # the values that `get_coordinate_system` returns
 _NOWHERE: Final = (math.nan, math.nan, math.nan)
-_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end there
+_MOST_LATITUDE, _MOST_LONGITUDE = 84.0, 180.0  # in degrees; the zones of UTM end at these values
 
 
 @dataclass(slots=True)
 class _Speed:
-    """The speed in m/s; `value` is one number, or the three of its vector."""
+    """The speed in m/s; `value` is a number, or a vector of three numbers."""
 
     value: float | Vector
 
@@ -55,16 +55,16 @@ class _Globe:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Gps:
-    """A receiver; `value` is x, y, z in meters, or latitude, longitude and altitude.
+    """A GPS receiver; `value` is x, y, z in meters, or latitude, longitude and altitude.
 
     Attributes:
         reference: the offset from the position in the world, in meters.
-        globe: how meters become degrees; None in the system "local".
+        globe: the conversion between meters and degrees; None in the system "local".
         accuracy: standard deviation of the position's noise, in meters.
         correlation: the share of the noise that is left after a second.
         speed_noise: standard deviation of the speed's noise, as a fraction of the speed.
-        speed: in m/s.
-        speed_vector: in m/s, in world axes, without noise.
+        speed: the speed in m/s.
+        speed_vector: the velocity in m/s, in world axes, without noise.
     """
 
     name: str
@@ -124,7 +124,7 @@ def _sampler(receivers: Sequence[Gps], robot: Carrier) -> Sample:
 
 def _receiver(gps: Gps, robot: Carrier) -> Sample:
     timer, gauss = StepTimer(robot), robot.gauss
-    noise = [0.0, 0.0, 0.0]  # of each axis, in standard deviations
+    noise = [0.0, 0.0, 0.0]  # the noise of each axis, in standard deviations
 
     def sample() -> None:
         elapsed_s, reset = timer.elapsed()
@@ -167,7 +167,7 @@ def _services(gps: Gps) -> tuple[Row, ...]:
 
 
 def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
-    """Round each part toward zero, as Webots does, so that all parts of a negative angle are negative."""
+    """Return degrees, minutes and seconds, rounded toward zero as in Webots; all have the angle's sign."""
     angle = request.decimalDegrees
     if not math.isfinite(angle):
         angle = 0.0

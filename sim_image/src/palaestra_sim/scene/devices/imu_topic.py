@@ -1,4 +1,4 @@
-"""The topic of a sensor that fills one part of a sensor_msgs/Imu: gyro, accelerometer, inertial unit."""
+"""The topic of a gyro, accelerometer or inertial unit, which fills one part of a sensor_msgs/Imu."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _NOT_MEASURED: Final = (-1.0, *(0.0,) * 8)  # a covariance that begins with -1 m
 
 
 def imu_topic(name: str, source: ValueSource, part: str) -> DeviceTopic:
-    """Return a topic whose messages have the value of `source` in that part, and no data in the others."""
+    """Return a topic whose messages have the value of `source` in `part`, and no data in other parts."""
     return DeviceTopic(
         name=name,
         type_name="sensor_msgs/Imu",

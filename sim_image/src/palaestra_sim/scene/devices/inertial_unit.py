@@ -1,4 +1,4 @@
-"""InertialUnit: its rotation in the world, as a quaternion. Source: WbInertialUnit.cpp of Webots."""
+"""InertialUnit: the rotation of the sensor in the world. Source: WbInertialUnit.cpp of Webots."""
 
 from __future__ import annotations
 

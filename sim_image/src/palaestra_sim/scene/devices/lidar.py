@@ -1,13 +1,12 @@
-"""Lidar: layers of rays, as a range image, laser scans and a point cloud.
+"""Lidar: layers of rays, which it publishes as a range image, laser scans and a point cloud.
 
-A layer is a row of the image, from the top down; in a row, the rays go from left to right. All rays are cast
-at each step while the lidar is enabled, and none otherwise, because they cost time. The distance of an object
+Each layer is a row of the image, from the top down. In a row, the rays go from left to right. The rays are
+cast at each step, but only while the lidar is enabled, because they cost time. The distance of an object
 nearer than `minRange` or beyond `maxRange` is infinite.
 
-A lidar that rotates casts at each step the rays over which its head has turned since the step before. Its
-first ray looks ahead, and the others go to the right, through a full turn. A distance is 0 until the head has
-passed it.
-Source: WbLidar.cpp and RosLidar.cpp of Webots.
+At each step, a rotating lidar casts the rays over which its head has turned since the step before. Its first
+ray points ahead, and the following rays go to the right, through a full turn. The distance of a ray is 0
+until the head has passed this ray. Source: WbLidar.cpp and RosLidar.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from palaestra_sim.scene.old_axes import looking
 
 _FLOAT_BYTES: Final = 4
 _MOST_RAYS: Final = 1_000_000
-_ROUNDING: Final = 1e-6  # added so that a turn by exactly one ray's share includes that ray
+_ROUNDING: Final = 1e-6  # tolerance, so that a turn by exactly the angle of one ray includes that ray
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
 _FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
 _POINT_FIELDS: Final = [
@@ -51,7 +50,7 @@ class Lidar:
     Attributes:
         info: the response of `get_info`.
         frequency: the response of `get_frequency_info`.
-        noise: standard deviation as a fraction of the maximum range.
+        noise: standard deviation of a distance, as a fraction of the maximum range.
         resolution: the resolution of a distance; -1 for exact values.
         rays: its rays.
         period_ms: its sampling period; 0 while it is not enabled.
@@ -84,7 +83,7 @@ class Lidar:
         self.timing.update(scan_time=scan_s, time_increment=scan_s / self.info["horizontalResolution"])
 
     def points(self, layer: int) -> Iterator[Vector]:
-        """Yield the points of a layer in the frame of the sensor; infinite where a ray met nothing."""
+        """Yield the points of a layer in the frame of the sensor; infinite where a ray met no object."""
         for distance_m, (x, y, z) in zip(self.layers[layer], self.rays.layer(layer), strict=True):
             if math.isinf(distance_m):
                 yield math.inf, math.inf, math.inf
@@ -106,7 +105,7 @@ class _Scan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cloud:
-    """The point cloud, as a list with one item; empty while it is not enabled."""
+    """The point cloud, as a list with one item; the list is empty while the cloud is not enabled."""
 
     lidar: Lidar
 
@@ -185,7 +184,7 @@ def _fixed(lidar: Lidar, robot: Carrier) -> Sample:
     def sample() -> None:
         if not lidar.period_ms:
             return
-        if not casts:  # many rays take memory, so only a lidar that is used has them
+        if not casts:  # many rays take memory, so they are created at the first use of the lidar
             columns = range(lidar.rays.columns)
             casts.extend(robot.see(lidar.rays.beams(layer, columns)) for layer in range(lidar.rays.layers))
         for layer, cast in enumerate(casts):
@@ -211,7 +210,7 @@ def _rotating(lidar: Lidar, robot: Carrier) -> Sample:
 
 
 def _sweep(lidar: Lidar, robot: Carrier, before: float, turns: float) -> None:
-    """Cast the rays that the head passes on its way from one place to another, in turns."""
+    """Cast the rays that the head passes from the angle `before` to the angle `turns`, both in turns."""
     rays = lidar.rays
     first, end = (math.floor(it * rays.columns + _ROUNDING) for it in (before, turns))
     columns = [column % rays.columns for column in range(max(first, end - rays.columns), end)]

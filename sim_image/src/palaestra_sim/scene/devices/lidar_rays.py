@@ -19,13 +19,13 @@ class LidarRays:
 
     Attributes:
         frame: the frame of the sensor in that of the robot; the sensor looks along x, with z up.
-        layers: how many layers, from the top down.
-        columns: how many rays each layer has.
+        layers: the number of layers, from the top down.
+        columns: the number of rays in each layer.
         wide_rad: the angle over which a fixed lidar spreads the rays of a layer.
         high_rad: the angle from the first layer to the last.
-        tilt_rad: by how much its middle looks up.
-        reach_m: how far its rays reach.
-        rotates: whether a rotating head has the rays, which then spread over a full turn.
+        tilt_rad: the angle by which the lidar is tilted upward.
+        reach_m: the length of its rays.
+        rotates: whether the rays are on a rotating head, and spread over a full turn.
     """
 
     frame: Pose

@@ -1,8 +1,7 @@
 """LightSensor: the irradiance of all lights of the world, through a color filter and a lookup table.
 
-Nothing casts a shadow: a sensor with `occlusion` is refused in a world with lights. So is every sensor in a
-world with lamps whose lights are not known.
-Source: WbLightSensor.cpp of Webots.
+Shadows are not simulated, so a sensor with `occlusion` is refused in a world with lights. In a world with
+lamps whose lights are not simulated, every light sensor is refused. Source: WbLightSensor.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -26,13 +25,13 @@ _TABLE: Final = ((0.0, 0.0, 0.0), (1.0, 1000.0, 0.0))  # the default of LightSen
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class LightSensor:
-    """A light sensor; `value` is in the unit of its lookup table, which is None if the world has no rows.
+    """A light sensor; `value` is in the unit of its lookup table, or in W/m2 if `table` is None.
 
     Attributes:
         place: its frame; it looks along x.
         axes: the axes of the world that point east, north and up.
         filter: the shares of red, green and blue light that it measures.
-        period_ms: its sampling period; 0 while it is not enabled, when it measures darkness.
+        period_ms: its sampling period; 0 while it is not enabled, so that it measures darkness.
     """
 
     name: str
@@ -60,7 +59,7 @@ class LightSensor:
 def _read(part: DevicePart) -> LightSensor:
     *_, root = part.node.ancestors()
     if lamp := unknown_light(root):
-        part.lack(f"a light sensor in a world with {lamp}, whose light is not known")
+        part.lack(f"a light sensor in a world with {lamp}, whose light is not simulated")
     if any(lights_in(root)) and part.node.flag("occlusion", False):
         part.lack("a light sensor that sees shadows (occlusion)")
     rows = table_rows(part, _TABLE)

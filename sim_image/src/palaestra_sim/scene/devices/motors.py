@@ -1,6 +1,6 @@
 """RotationalMotor and LinearMotor: every setter returns success, even if the motor ignores the value.
 
-Torques and forces require a motor that the physics moves by forces; for others the services fail.
+The services that set torques and forces fail, unless the physics moves the motor by forces.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _FIELDS: Final = """
 
 
 def _reader(limit: str) -> Callable[[DevicePart], Motor]:
-    """Return the function that reads a motor whose torque or force the field `limit` limits."""
+    """Return the function that reads a motor; the field `limit` has the motor's largest torque or force."""
 
     def read(part: DevicePart) -> Motor:
         number = part.number
@@ -99,7 +99,7 @@ class Feedback:
 
     @property
     def value(self) -> float:
-        """In N m or N, positive if it turns the motor forward."""
+        """The torque in N m, or the force in N; positive if it moves the motor forward."""
         return self.motor.feedback_nm
 
 
@@ -157,7 +157,7 @@ def _has_effort(motor: Motor) -> bool:
 
 
 def _switch(motor: Motor, effort: str) -> Handler:
-    """Return the service of a motor that moves with its whole torque or with none."""
+    """Return the service of a motor that moves with its full torque, or not at all."""
     done = {"success": True}
     most = motor.spec.max_torque_nm
 
@@ -174,7 +174,7 @@ def _switch(motor: Motor, effort: str) -> Handler:
 def _unable(motor: Motor, effort: str) -> Handler:
     fact = f"{effort}s are not simulated"
     if motor.spec.forces:
-        fact = f"a driving wheel, or a part without physics, is not moved by a {effort}"
+        fact = f"a {effort} does not move a driving wheel or a part without physics"
 
     def fail(_request: Any) -> dict[str, Any]:
         raise UnsimulatedError(f"{fact}; set a position or velocity")

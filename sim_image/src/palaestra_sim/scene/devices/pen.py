@@ -1,4 +1,4 @@
-"""Pen: whether it writes, and its ink. It draws on textures, which only people and cameras see."""
+"""Pen: the state and the ink of a pen. No lines are drawn, because only people and cameras see them."""
 
 from __future__ import annotations
 

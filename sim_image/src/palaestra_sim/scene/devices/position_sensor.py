@@ -21,7 +21,7 @@ from palaestra_sim.scene.devices.sensor_response import discrete
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PositionSensor:
-    """The position of a hinge in rad, of a slider in m; a joint without a motor stays where it is set."""
+    """The position of a hinge in rad, or of a slider in m."""
 
     name: str
     shaft: Shaft

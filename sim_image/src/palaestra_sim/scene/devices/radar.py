@@ -1,8 +1,8 @@
 """Radar: distances and speeds of the Solids with a `radarCrossSection` in its field of view.
 
-A speed is the change of position since the previous sample, so it is 0 in the first sample.
-With the default limits, Webots detects only targets that move away at 1 to 2 m/s; limits of 0 mean no limits.
-Source: WbRadar.cpp of Webots.
+A speed is the change of position since the previous sample, so it is 0 in the first sample. With the default
+limits, Webots detects only targets that move away at 1 to 2 m/s. If both limits are 0, a target may have any
+speed. Source: WbRadar.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class RadarLimits:
     noise: tuple[float, float, float]
 
     def accept(self, speed: float) -> bool:
-        """Return whether a target that moves away at a speed is detected."""
+        """Return whether the radar detects a target that moves away at a speed in m/s."""
         if self.radial_m_s is not None and not self.radial_m_s[0] <= speed <= self.radial_m_s[1]:
             return False
         return abs(speed) >= self.absolute_m_s
@@ -57,7 +57,7 @@ class RadarLimits:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """One target as a radar detects it: meters, watts, m/s and rad; an azimuth to the right is positive."""
+    """One detected target, in meters, watts, m/s and rad; an azimuth to the right is positive."""
 
     distance: float
     power_w: float
@@ -65,7 +65,7 @@ class Echo:
     azimuth: float
 
     def message(self) -> Fields:
-        """Return it as a message, with the power in dBm."""
+        """Return the target as a message, with the power in dBm."""
         power_dbm = 10.0 * math.log10(self.power_w / _MILLIWATT)
         return {
             "distance": self.distance,
@@ -121,7 +121,7 @@ class Radar:
         self.seen = []
 
     def sample(self, gauss: _Gauss) -> None:
-        """Detect the current targets, while it is enabled; `gauss` returns noise from mean and deviation."""
+        """Detect the current targets if the radar is enabled; `gauss` draws the noise."""
         if not self._enabled:
             return
         targets = [it for it in self._echoes.targets if it.place is not self.place]
@@ -152,7 +152,7 @@ class Radar:
         return Echo(distance, power_w, speed, azimuth)
 
     def _hidden(self, target: RadarTarget, eye: Vector, bounds: Bounds) -> bool:
-        """Return whether a shape hides the target, more than half the target's depth in front of it."""
+        """Return whether a shape is in front of the target by more than half of the target's depth."""
         if not self.occlusion:
             return False
         free = self._echoes.free_path(target, eye, self._robot)
@@ -168,7 +168,7 @@ class Radar:
         return None if distance < low - slack else max(low, min(high, distance))
 
     def _speed(self, place: Frame, passed_s: float) -> float:
-        """Return the speed at which a target moves away; 0 if it has no previous sample."""
+        """Return the speed at which a target moves away; 0 if the target has no previous sample."""
         if passed_s <= 0.0 or place not in self._before or self.place not in self._before:
             return 0.0
         now = place.ground_pose.position, self.place.ground_pose.position
@@ -179,7 +179,7 @@ class Radar:
 
 
 def merged(echoes: Sequence[Echo], cell: tuple[float, float]) -> list[Echo]:
-    """Return targets after merging those in one cell, with means weighted by their powers."""
+    """Return the targets; those in one cell are merged into their mean, weighted by their powers."""
     rest = list(echoes)
     at = 0
     while cell[0] > 0.0 and at < len(rest):

@@ -1,6 +1,6 @@
-"""RangeFinder: its settings, and its distances if the simulator renders.
+"""RangeFinder: the settings of a depth camera, and its distances if the simulator renders.
 
-If it does not, `enable` and `save_image` return failure. Distortion, motion blur and noise have no effect.
+Without rendering, `enable` and `save_image` return failure. Distortion, motion blur and noise have no effect.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class RangeFinder:
 
     Attributes:
         place: its frame.
-        lens: its far end is the maximum range.
+        lens: its lens; `lens.far_m` is the maximum range.
         least_m: the minimum range.
         resolution_m: the resolution of a distance; -1 for exact values.
-        spherical: whether its image would be spherical.
+        spherical: whether the world asks for a spherical image, which is not rendered.
         eye: the camera interface; None if the simulator does not render.
     """
 
@@ -43,7 +43,7 @@ class RangeFinder:
 
     @property
     def value(self) -> bytes | memoryview:
-        """The distances of this moment, a float32 each; infinite outside the range."""
+        """The current distances, a float32 for each pixel; infinite outside the range."""
         return b"" if self.eye is None else self.eye.depths(self.least_m, self.resolution_m)
 
     @property

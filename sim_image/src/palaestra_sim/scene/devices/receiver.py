@@ -1,4 +1,4 @@
-"""Receiver: a queue of the packets that emitters on the same channel have sent while it was enabled."""
+"""Receiver: the queue of the packets that emitters on its channel have sent while it was enabled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from palaestra_sim.scene.old_axes import pointing
 
 
 class Packet(NamedTuple):
-    """A text; 1 / distance squared; and the unit vector to the emitter, in the receiver's frame."""
+    """A text, its strength (1 / distance squared), and the unit vector to the emitter.
+
+    The vector is in the frame of the receiver.
+    """
 
     text: str
     strength: float
@@ -28,7 +31,7 @@ class Receiver:
 
     Attributes:
         listening: whether it is enabled; otherwise it receives nothing.
-        channel: on which it listens; -1 means all channels.
+        channel: the channel on which it listens; -1 means all channels.
         queue: the packets that arrived, the oldest first.
     """
 
@@ -52,7 +55,7 @@ class Receiver:
             self.queue.append(packet)
 
     def listen(self, period_ms: int) -> None:
-        """Listen from now on; with 0, stop and drop the queue."""
+        """Start to listen; if the period is 0, stop and drop the queue."""
         self.listening = period_ms > 0
         if not self.listening:
             self.queue.clear()

@@ -46,7 +46,7 @@ class Recognition:
 
     @property
     def value(self) -> list[Fields]:
-        """The objects of this moment, as messages."""
+        """The objects that are visible now, as messages."""
         if self.eye is None:
             return []
         camera = self.place.world_pose.inverse
@@ -59,7 +59,7 @@ class Recognition:
 
     @property
     def picture(self) -> bytes | memoryview:
-        """The segmentation image of this moment: blue, green, red and alpha of each pixel."""
+        """The current segmentation image: blue, green, red and alpha of each pixel."""
         return b"" if self.eye is None else self.eye.painted(_paint)
 
     def silent(self) -> bool:
@@ -74,7 +74,7 @@ class Recognition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Segments:
-    """The segmentation image, as a list with one item; empty while it is not enabled."""
+    """The segmentation image, as a list with one item; the list is empty while the image is not enabled."""
 
     recognition: Recognition
 
@@ -98,7 +98,7 @@ def read_recognition(part: DevicePart, place: Frame, lens: Lens) -> Recognition 
 
 
 def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
-    """Return the services of a camera that recognizes objects, besides those of its stream."""
+    """Return the services of a camera that recognizes objects, except the services of its stream."""
     save = saver(recognition.lens, recognition.silent, lambda: recognition.picture)
     return (
         ("recognition_enable_segmentation", "get_bool", lambda _: {"value": recognition.segment(on=True)}),

@@ -31,11 +31,11 @@ def table_rows(part: DevicePart, default: Sequence[TableRow] = (), first: str = 
         return list(default)
     numbers = part.node.numbers("lookupTable")
     if numbers is None or len(numbers) % 3:
-        part.refuse("lookupTable is not rows of three numbers", f"write {first[:-1]}, value, noise")
+        part.refuse("lookupTable does not have rows of three numbers", f"write {first[:-1]}, value, noise")
         return []
     rows = list(zip(numbers[0::3], numbers[1::3], numbers[2::3], strict=True))
     if any(after[0] <= before[0] for before, after in pairwise(rows)):
-        part.refuse(f"the {first} of lookupTable do not grow", "sort its rows")
+        part.refuse(f"the {first} of lookupTable do not increase", "sort its rows")
         return []
     return rows
 
@@ -45,7 +45,7 @@ class Axes:
     """The response of a sensor with three axes.
 
     Attributes:
-        table: applied to each axis; None leaves the values unchanged.
+        table: the lookup table for each axis; None leaves the values unchanged.
         on: whether x, y and z are measured; if not, the value is NaN.
         resolution: the resolution of each value; -1 for exact values.
     """

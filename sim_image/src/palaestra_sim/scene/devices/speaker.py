@@ -1,4 +1,4 @@
-"""Speaker: its sounds and speech. It makes no sound; only a looping sound lasts longer than its call."""
+"""Speaker: its sounds and its speech, which nobody hears. A sound ends at once, unless it loops."""
 
 from __future__ import annotations
 

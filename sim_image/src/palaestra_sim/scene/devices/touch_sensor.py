@@ -1,7 +1,8 @@
-"""TouchSensor: a bumper, or a part whose force on the robot is measured.
+"""TouchSensor: a bumper, or a sensor of the force that it exerts on the robot.
 
-A sensor of type `force` measures the pressure along its x axis, one of type `force-3d` the force in its own
-axes. Both need a Physics node, and a physics with forces. Source: WbTouchSensor.cpp of Webots.
+A sensor of type `force` measures the pressure along its x axis. A sensor of type `force-3d` measures the
+force along each of its axes. Both types need a Physics node, and a physics with forces. Source:
+WbTouchSensor.cpp of Webots.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ class TouchSensor:
     Attributes:
         outline: its shapes.
         type: the number of one of `_TYPES`.
-        link: the part whose force is measured; None for a bumper.
-        table: applied to each force; None for the force itself.
+        link: the link whose force is measured; None for a bumper.
+        table: the lookup table of a force; None if the value is the force itself.
         resolution: the resolution of a force; -1 for exact values.
-        value: of a bumper, whether it was touched since the sensor was last sampled; of the others the force,
-            as one or three numbers.
+        value: for a bumper, whether it was touched since the last sample; for other types, the force as one
+            number or three.
     """
 
     name: str
@@ -49,7 +50,7 @@ class TouchSensor:
     of_old_axes: bool = False
 
     def feel(self, gauss: Gauss) -> None:
-        """Set the value to the force of this moment."""
+        """Set the value to the current force."""
         x, y, z = _NOTHING if self.link is None else self.link.force
         if self.of_old_axes:
             x, y, z = z, x, y
@@ -99,9 +100,9 @@ def _read(part: DevicePart) -> TouchSensor:
 
 
 def _sampler(sensors: Sequence[TouchSensor], robot: Carrier) -> Sample:
-    """Sample the bumpers that are part of the body's outline; others are never touched.
+    """Return the sample function; only bumpers in the outline of the body can be touched.
 
-    All of them are read before the contacts are cleared, so that each gets its own contacts.
+    The function reads all bumpers before it clears the contacts, so that each bumper gets its own contacts.
     """
     body, gauss = robot.body, robot.gauss
     forces = [sensor for sensor in sensors if sensor.link is not None]

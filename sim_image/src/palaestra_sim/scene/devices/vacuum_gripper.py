@@ -1,6 +1,7 @@
 """VacuumGripper: holding is not simulated, so a gripper that could hold an object cannot be switched on.
 
-A gripper holds an object that touches its boundingObject; without one it holds nothing in Webots either.
+In Webots a gripper holds an object that touches its boundingObject. A gripper without a boundingObject never
+holds an object, so it can be switched on here too.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ class VacuumGripper:
     value: bool = False
 
     def turn(self, *, on: bool) -> None:
-        """Switch it on or off.
+        """Switch the gripper on or off.
 
         Raises:
-            UnsimulatedError: it could hold an object.
+            UnsimulatedError: the gripper could hold an object.
         """
         if on and self.touches:
             raise UnsimulatedError(

@@ -1,7 +1,8 @@
-"""Create the tree of a world: from the nodes in files to nodes of the scene.
+"""Create the scene nodes of a world from the nodes that its files contain.
 
-Each `USE` of a node becomes a node of its own, as in Webots. An instance of a PROTO becomes the PROTO's node,
-with the values of the instance. It keeps the DEF name and the place in the file of the instance.
+Each `USE` of a node becomes a node of its own, as in Webots. An instance of a PROTO becomes the node in the
+PROTO's body, with the field values of the instance. This node has the DEF name of the instance, and errors
+refer to the instance's position in the file.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _SHAPES: Final = {
     "plane": ("Plane", ("size",)),
 }
 MAX_DEPTH: Final = 20  # levels of PROTOs inside PROTOs; Webots' own robots need three
-# Limit for nodes: if each PROTO contains two of the next, 20 levels make a million.
+# Limits the number of nodes: 20 levels of PROTOs that each contain the next PROTO twice make a million nodes.
 MAX_NODES: Final = 250_000
 
 
@@ -38,7 +39,7 @@ class Descriptions:
 
     Attributes:
         protos: PROTOs without templates, by name.
-        stand_ins: simple solids in place of other PROTOs, by name; these are preferred.
+        stand_ins: simple solids that replace PROTOs, by name; a stand-in overrides a PROTO of its name.
         unusable: the errors of local PROTOs that cannot be expanded, by name.
     """
 
@@ -52,9 +53,8 @@ class Instantiator:
 
     Attributes:
         nodes: all nodes, by number.
-        refused: mistakes that were found.
-        ignored: fields that have no effect, such as those that a PROTO no longer has; Webots ignores them
-            too.
+        refused: the mistakes in the files, because of which nodes are missing.
+        ignored: the fields that a PROTO does not have; Webots ignores such fields too.
     """
 
     def __init__(self, descriptions: Descriptions) -> None:
@@ -73,14 +73,14 @@ class Instantiator:
         return root
 
     def grow(self, written: Iterable[Node], scope: Scope, parent: SceneNode) -> list[Content]:
-        """Return the nodes for `written`, inside `parent`; one with a mistake is recorded and left out."""
+        """Return the scene nodes of `written` inside `parent`; record nodes with mistakes and skip them."""
         grown = (self._grow(node, scope, parent) for node in written)
         return [node for node in grown if node is not None]
 
     def _grow(self, written: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
-        if len(self.nodes) > MAX_NODES:  # stop at the first error, because 2 to the 60th may follow
+        if len(self.nodes) > MAX_NODES:  # raise at once, because 2 to the 60th nodes may follow
             fact = f"the world has more than {MAX_NODES} nodes"
-            raise scope.error(written, fact, "break a circle of PROTOs or of USE, or use fewer")
+            raise scope.error(written, fact, "remove a cycle of PROTOs or of USE, or use fewer nodes")
         try:
             source = scope.resolve(written)
         except WorldError as error:
@@ -125,7 +125,7 @@ class Instantiator:
     def _instance(self, proto: Proto, source: Node, scope: Scope, parent: SceneNode) -> SceneNode | None:
         if scope.depth >= MAX_DEPTH:
             fact = f"PROTOs are nested more than {MAX_DEPTH} deep"
-            self.refused.append(scope.error(source, fact, "break the circle"))
+            self.refused.append(scope.error(source, fact, "remove the cycle"))
             return None
         unknown = [name for name in source.fields if name not in proto.fields and " " not in name]
         for name in unknown:
@@ -146,7 +146,7 @@ class Instantiator:
         return node
 
     def _extruded(self, node: SceneNode) -> SceneNode:
-        """Make an Extrusion the IndexedFaceSet that it becomes in Webots; a curved one stays as it is."""
+        """Convert an Extrusion to an IndexedFaceSet, as Webots does; a curved Extrusion stays unchanged."""
         found = faces(
             {name: node.numbers(name) or () for name in node.fields},
             begin_cap=node.flag("beginCap", True),
@@ -168,7 +168,7 @@ class Instantiator:
         return node
 
     def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:
-        """Return a Solid with the size of an instance, and with the fields of its PROTO."""
+        """Return a Solid with the size of a PROTO's instance, and with the fields of the PROTO."""
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name
@@ -218,7 +218,7 @@ class Instantiator:
 
 
 def _bindings(proto: Proto, instance: Node, scope: Scope) -> dict[str, tuple[Value, Scope]]:
-    """Return the value of each of a PROTO's fields: the instance's, else the default."""
+    """Return the value of each field of a PROTO: the value in the instance, else the default."""
     defaults = [item for it in proto.fields.values() for item in it.default.items if isinstance(item, Node)]
     own = Scope(source=proto.source, defs=definitions(defaults), depth=scope.depth + 1)
     return {

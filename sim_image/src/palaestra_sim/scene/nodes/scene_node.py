@@ -1,7 +1,7 @@
 """One node of a loaded world: its type, its current fields, its frame, the nodes inside it.
 
-Each node has its own identity, `number`. It does not depend on the bytes of a file, so a node inside a PROTO,
-a node of a `USE`, and a node that a client imports each have a number.
+Each node has a unique `number`, which does not depend on the bytes of a file. So a node inside a PROTO, a
+node of a `USE`, and a node that a client imports have numbers too.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class FieldContent:
     """The values of a field: numbers, booleans, strings, nodes, None for NULL.
 
     Attributes:
-        items: in order; a vector has as many items as numbers.
-        bracketed: whether the file has them in brackets.
+        items: in order; each number of a vector is one item.
+        bracketed: whether the file has the values in brackets.
     """
 
     items: list[Content]
@@ -33,13 +33,13 @@ class FieldContent:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The place where a node was written: its node in the tree of a file, and the bytes of that file."""
+    """The position of a node in a file: its node in the tree of the file, and the bytes of the file."""
 
     node: Node
     source: Source
 
     def error(self, fact: str, remedy: str) -> WorldError:
-        """Return an error at this place."""
+        """Return an error at this position."""
         return self.source.error(self.node.span[0], fact, remedy)
 
 
@@ -48,18 +48,18 @@ class SceneNode:
 
     Attributes:
         number: the response of `get_id`; 0 is the root.
-        origin: where it was written; None for the root.
+        origin: the position at which it was written; None for the root.
         type_name: the type of the node, such as "Solid".
         proto_name: the PROTO of which it is an instance; "" if it is not an instance.
         def_name: its DEF name; "" without one.
-        parent: None for the root.
-        fields: those that were written or set, by name.
-        twins: this node and those that are the same node in the file, by `DEF` and `USE`: a write changes
-            all.
+        parent: the node that contains it; None for the root.
+        fields: the fields that the file or a client has set, by name.
+        twins: this node and all nodes that are the same node in the file by `DEF` and `USE`; a write changes
+            all of them.
         place: its frame; None for a node without a frame, such as an appearance.
         outline: whether it, or a twin, is part of a boundingObject.
         shipped: whether it is an instance of a Webots PROTO whose built-in file has the current axes.
-        stand_in: whether it is a simple solid in place of a PROTO.
+        stand_in: whether it is a simple solid that replaces a PROTO.
         unusable: the reason why its PROTO cannot be expanded; "" without a reason.
         left_out: whether it is not simulated, because the user left it out.
     """
@@ -116,7 +116,7 @@ class SceneNode:
             yield from node.descendants()
 
     def ancestors(self) -> Iterator[SceneNode]:
-        """Yield the nodes around it, from the inside out; the root is the last."""
+        """Yield its outer nodes, from the parent to the root."""
         node = self.parent
         while node is not None:
             yield node

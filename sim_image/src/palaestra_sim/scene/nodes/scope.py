@@ -1,7 +1,7 @@
-"""The file in which a node is written: its `DEF`s, and the fields of the PROTO that it defines.
+"""The scope of a node: the file in which it is written, the `DEF`s of that file, and the values of `IS`.
 
 `USE name` refers to the last `DEF` of that name before it, in the same file. In a PROTO, `IS name` refers to
-a value of the instance, which was written in another file. So a value is looked up together with its scope.
+a value of the instance, which was written in another file. So a lookup returns a value with its scope.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Scope:
 
     Attributes:
         source: the bytes of the file.
-        defs: its nodes with a DEF name, by that name, in the order of the file.
-        bindings: of a PROTO: the value of each field, with the scope in which it is written.
-        depth: the number of PROTO instances around it.
+        defs: the nodes of the file that have a DEF name, by this name, in the order of the file.
+        bindings: for a PROTO, the value of each field, with the scope in which the value is written.
+        depth: the number of PROTO instances that contain this scope.
     """
 
     source: Source
@@ -38,11 +38,11 @@ class Scope:
         return cls(source=source, defs=definitions(nodes))
 
     def error(self, node: Node, fact: str, remedy: str) -> WorldError:
-        """Return an error at the place of a node, for the caller to raise."""
+        """Return an error at the position of a node, for the caller to raise."""
         return self.source.error(node.span[0], fact, remedy)
 
     def resolve(self, node: Node) -> Node:
-        """Return the node itself, or the one that it `USE`s.
+        """Return the node itself, or the node to which its `USE` refers.
 
         Raises:
             WorldError: no node with that DEF name precedes it.
@@ -64,7 +64,7 @@ class Scope:
 
 
 def definitions(nodes: Iterable[Node]) -> dict[str, list[Node]]:
-    """Return the nodes with a DEF name by that name, including nested nodes."""
+    """Return the nodes that have a DEF name, including nested nodes, by this name."""
     found: dict[str, list[Node]] = {}
     for node in walk(tuple(nodes)):
         if node.def_name is not None:

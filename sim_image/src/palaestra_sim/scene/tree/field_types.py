@@ -1,8 +1,8 @@
 """Node types as a supervisor sees them: their fields, and the type of each field.
 
-Fields and defaults are those of resources/nodes/*.wrl, R2023b. Only the types in the stub's worlds are
-listed, those of devices in `devices`. A field that is not listed exists if a world sets it; its type follows
-from its value.
+Fields and defaults are those of resources/nodes/*.wrl, R2023b. This module lists only the types in the stub's
+worlds; `devices` lists the types of devices. A field that is not listed exists if the world file sets it, and
+its type is derived from its value.
 """
 
 from __future__ import annotations
@@ -147,11 +147,11 @@ _WITHOUT_EFFECT: Final = {
 }
 
 
-_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of such fields for which the simulators agree with Webots
+_AS_SIMULATED: Final = {"bounce": [0.0]}  # values of these fields with the same effect here as in Webots
 
 
 def without_effect(node: SceneNode) -> list[str]:
-    """Return the fields of a node that have an effect in Webots but not here, unless they have defaults."""
+    """Return the fields with values other than the default that have an effect in Webots but not here."""
     kind = DEVICES.get(node.type_name)
     names = (kind.without_effect if kind else _WITHOUT_EFFECT.get(node.type_name, "")).split()
     kinds = _kinds(node.type_name)
@@ -214,5 +214,5 @@ def _guessed(content: FieldContent) -> FieldKind:
     if bracketed:
         return FieldKind(FieldType.FLOAT, True)
     by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
-    # A rotation is the widest single value, so more numbers are several values.
+    # No single value has more numbers than a rotation, so a field with more numbers has several values.
     return FieldKind(by_width.get(len(items), FieldType.FLOAT), len(items) > max(by_width))

@@ -1,9 +1,10 @@
 """Fields of nodes: typed values that a supervisor reads and writes.
 
-A read after a write returns the written value at once; the simulation applies it at the beginning of the next
-basic step. `translation` and `rotation` move objects, `customData` reaches the robot, and a field that is
-only visible has no effect on the simulation in Webots either. Every other write is refused: a client would
-read the value back, but it would change nothing (`write_rules`).
+A read returns the written value at once, but the simulation applies the value at the beginning of the next
+basic step. A write of `translation` or `rotation` moves an object, and `customData` reaches the robot. A
+write that only changes the look of an object is accepted too, because Webots does not simulate its effect
+either. `write_rules` refuses a write without the effect that it has in Webots: the client would read the
+value back although nothing had changed.
 
 As in Webots, a value that is invalid for the field is ignored without an error.
 """
@@ -42,7 +43,7 @@ class NodeField:
 
     Attributes:
         node: its node.
-        name: as in the world file.
+        name: its name in the world file.
         kind: its declaration.
     """
 
@@ -62,7 +63,7 @@ class NodeField:
     def get(self, type_: FieldType, index: int = 0) -> Any:
         """Return the value at `index`, which is ignored for a field with exactly one value.
 
-        It is a bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
+        The value is a bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
 
         Raises:
             NoValueError: the field has another type, or no value at that index.
@@ -74,10 +75,10 @@ class NodeField:
         return values[at]
 
     def set(self, type_: FieldType, index: int, value: Any) -> None:
-        """Write a value: it is readable at once, and takes effect at the next basic step.
+        """Write a value, which takes effect at the next basic step; a read returns it at once.
 
         Raises:
-            UnsimulatedError: it would have no effect.
+            UnsimulatedError: the write would have no effect.
         """
         at = index if self.kind.multiple else 0
         if type_ is not self.kind.type or not _acceptable(type_, value):
@@ -106,7 +107,7 @@ class NodeField:
         """Insert a value before `index`, -1 for the end; return False if that is impossible.
 
         Raises:
-            UnsimulatedError: it would have no effect.
+            UnsimulatedError: the inserted value would have no effect.
         """
         size = len(self._values)
         fits = self.kind.multiple and type_ is self.kind.type and -size - 1 <= index <= size
@@ -120,7 +121,7 @@ class NodeField:
         """Remove the value at `index`; return False if it does not exist, or if it cannot be removed.
 
         Raises:
-            UnsimulatedError: it would have no effect.
+            UnsimulatedError: the removal would have no effect.
         """
         size = len(self._values)
         removable = self.kind.multiple and self.kind.type is not FieldType.NODE
@@ -134,7 +135,7 @@ class NodeField:
         require_effect(self.node, self.name)
 
     def _current(self) -> list[Any]:
-        """Return the values: the pending ones, else those of the simulation."""
+        """Return the values of the pending writes; without pending writes, those of the simulation."""
         if self.kind.type is FieldType.NODE:
             return _initial(self.node, self.name, self.kind)
         if self._writes == 0:
@@ -159,10 +160,11 @@ class NodeField:
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
-    """Return the axis and angle that the controller computes from a quaternion, with its RosMathUtils bug.
+    """Return the axis and angle that the Webots controller computes from a quaternion, including its bug.
 
-    An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
-    so a client cannot write back a zero rotation that it has read. If |w| > 1, the angle is NaN.
+    Its RosMathUtils set an angle below 1e-4 to 0, but still compute the axis as xyz / |xyz|. For the exact
+    identity this axis is NaN, so a client cannot write back a zero rotation that it has read. If |w| > 1, the
+    angle is NaN.
     """
     angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
     if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils
@@ -174,7 +176,7 @@ def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngl
 
 
 def _acceptable(type_: FieldType, value: Any) -> bool:
-    """Return whether libController accepts a value: no NaN, no infinity, no axis without direction."""
+    """Return whether libController accepts a value: finite numbers, and a rotation axis that is not 0."""
     if type_ is FieldType.ROTATION and not any(value[:3]):
         return False
     if isinstance(value, tuple):
@@ -183,7 +185,7 @@ def _acceptable(type_: FieldType, value: Any) -> bool:
 
 
 def _positive(value: Any) -> bool:
-    """Return whether all numbers of a size are positive; Webots refuses others."""
+    """Return whether all numbers of a size are positive, as Webots requires."""
     numbers: tuple[float, ...] = value if isinstance(value, tuple) else (value,)
     return min(numbers) > 0.0
 

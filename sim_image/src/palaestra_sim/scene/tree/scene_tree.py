@@ -14,11 +14,11 @@ from palaestra_sim.scene.tree.fields import Changes, NodeField
 from palaestra_sim.world import World, parse_nodes
 from palaestra_sim.world.source import Source
 
-_TEXT: Final = "node"  # name of an imported text in errors
+_TEXT: Final = "node"  # the name by which errors refer to an imported text
 
 
 class SceneTree:
-    """All nodes of one load of a world.
+    """All nodes of a loaded world.
 
     Args:
         world: the parsed world.
@@ -29,8 +29,8 @@ class SceneTree:
         source: the bytes of the world.
         nodes: by number.
         root: a Group that has the nodes of the file as its children.
-        refused: mistakes in the file that prevent a node, such as `USE` of a missing name.
-        ignored: fields that a PROTO does not have, each with its place.
+        refused: mistakes in the file because of which a node is missing, such as `USE` of an unknown name.
+        ignored: fields that a PROTO does not have, each with its position in the file.
     """
 
     def __init__(self, world: World, name: str = "world", descriptions: Descriptions | None = None) -> None:
@@ -44,7 +44,7 @@ class SceneTree:
         _mark_outlines(self.nodes.values())
 
     def grow(self, text: str, parent: SceneNode) -> list[SceneNode]:
-        """Return the nodes that `text` describes; they refer to `parent`, but are not yet in its fields.
+        """Return the nodes that `text` describes; `parent` is their parent, but does not contain them yet.
 
         Raises:
             WorldError: the text is wrong; the error lists all mistakes.

@@ -1,7 +1,7 @@
 """Refuse writes of fields that have an effect in Webots but not here.
 
-Otherwise a client that randomizes a world would read back its writes, but train in a world that does not
-change.
+Without these checks, a client that randomizes a world would read its values back, but train in a world that
+never changes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 
-# Nodes that affect the physics. All others are only visible, unless they are part of a boundingObject.
+# Nodes that affect the physics. Other nodes are only visible, unless they are part of a boundingObject.
 _ACTING: Final = DEVICES.keys() | frozenset(
     (
         "ContactProperties",
@@ -30,10 +30,10 @@ _ACTING: Final = DEVICES.keys() | frozenset(
         "WorldInfo",
     )
 )
-# A running controller has already read the names of its devices.
+# Fields that only people read. A running controller has already read the `name` of each device.
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "write it into the world file, or use driver webots"
-_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # they have an effect only by their contents
+_HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # only the nodes inside these have an effect
 _PLACING: Final = frozenset(("translation", "rotation"))
 _SIZES: Final = {
     "Box": ("size",),
@@ -48,7 +48,7 @@ def require_effect(node: SceneNode, field: str) -> None:
     """Check that a write of the node's field `field` has the same effect as in Webots.
 
     Raises:
-        UnsimulatedError: it would have no effect.
+        UnsimulatedError: the write would have no effect.
     """
     if node.outline:
         takes_effect = resizes(node, field)
@@ -65,7 +65,7 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
     """Check that nodes, added to the node's field `field`, have the same effect as in Webots.
 
     Raises:
-        UnsimulatedError: they do not.
+        UnsimulatedError: the effect would differ.
     """
     where = f"{node.type_name}.{field}"
     if node.outline or len(node.twins) > 1:
@@ -84,7 +84,7 @@ def require_removable(node: SceneNode) -> None:
     """Check that a removal of the node has the same effect as in Webots.
 
     Raises:
-        UnsimulatedError: it does not.
+        UnsimulatedError: the effect would differ.
     """
     if node.parent is None or node.type_name in {"WorldInfo", "Viewpoint"}:
         raise UnsimulatedError(f"the {node.type_name} of a world cannot be removed; keep it")
@@ -109,7 +109,7 @@ def _acts(node: SceneNode) -> bool:
 
 
 def resizes(node: SceneNode, field: str) -> bool:
-    """Return whether a write changes the size of a fixed obstacle, and of nothing on a robot."""
+    """Return whether a write changes the size of an obstacle that is not part of a robot."""
     return field in _SIZES.get(node.type_name, ()) and not any(_on_robot(twin) for twin in node.twins)
 
 

@@ -1,15 +1,15 @@
 """Worlds in MJCF, the XML of MuJoCo: the description of the robot, checks, and names.
 
-MuJoCo itself is not needed to check or to name such a world. All modules except `project` only handle text.
+This package checks and names such a world without MuJoCo. All modules except `project` handle only text.
 
-- `elements`: the elements of an XML file with their places
+- `elements`: the elements of an XML file with their positions
 - `description`: robot, arguments, basic step and devices, from the element `custom`
 - `files`: the files that a model names
-- `part_files`: how often each of those files is part of the model
+- `part_files`: the number of times that each of these files is part of the model
 - `project`: these files on disk, and the folder that holds them
 - `size_checks`: checks for elements that would need too much memory
 - `checks`: the mistakes that make a world unusable
-- `naming`: the world of one simulator
+- `naming`: generates the world of one simulator
 """
 
 from palaestra_sim.world.mjcf.checks import check

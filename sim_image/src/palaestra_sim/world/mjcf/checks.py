@@ -1,6 +1,6 @@
 """Checks for MJCF worlds that are valid XML, but from which no simulator's world can be generated.
 
-Each check finds one kind of mistake, at all its places, as those of `.wbt` worlds do.
+Each check finds one kind of mistake, at every position in the file, like the checks of `.wbt` worlds.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ Check = Callable[[Description], Iterator[WorldError]]
 
 
 def no_actuator(found: Description) -> Iterator[WorldError]:
-    """The model has no actuator; an included file may have one, which this check does not see."""
+    """The model has no actuator, and includes no other file that might have one."""
     if not any(it.children for it in found.root.named("actuator")) and not parts(found.root):
         fact = "the model has no actuator, so a trainer cannot move anything"
         yield found.source.error(found.root.start, fact, "add <actuator> with a motor, position or velocity")
 
 
 def repeated(found: Description) -> Iterator[WorldError]:
-    """Two texts or numbers have the same name, so MuJoCo uses neither of them."""
+    """Two texts or numbers have the same name, so MuJoCo refuses the model."""
     for tag in ("text", "numeric"):
         seen = set()
         for name, element in custom(found.root, tag):
@@ -67,9 +67,10 @@ def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
 
 
 def unfit_step(found: Description) -> Iterator[WorldError]:
-    """The basic step is not a whole number of milliseconds and of MuJoCo's steps.
+    """The basic step is not a whole number of milliseconds, or not a whole number of MuJoCo's steps.
 
-    Another file of the model may set the timestep; then the loader checks it in MuJoCo's compiled model.
+    If the model includes other files, they may set the timestep. Then this check finds nothing, and the
+    loader checks the model that MuJoCo has compiled.
     """
     if parts(found.root):
         return
@@ -102,7 +103,7 @@ def unknown_devices(found: Description) -> Iterator[WorldError]:
 
 
 def too_large(found: Description) -> Iterator[WorldError]:
-    """An element would need more memory than there is when MuJoCo reads it."""
+    """MuJoCo would need too much memory to read an element."""
     yield from growing(found.source, found.root)
 
 
@@ -151,8 +152,8 @@ def checked(source: bytes, name: str = "world", *, relative_addresses: bool) -> 
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
     """Check that a world can be generated from the MJCF world `source` for every simulator.
 
-    `name` is the name of the world in errors. `relative_addresses`: the world stays next to the files that it
-    names.
+    `name` is the name of the world in errors. `relative_addresses` is True if the world stays next to the
+    files that it names.
 
     Raises:
         WorldError: the world cannot be read, or a check of this module fails.

@@ -8,7 +8,7 @@
       <text name="device:sensor/debug" data="-"/>
     </custom>
 
-All of them are optional. MuJoCo itself ignores them.
+All these elements are optional. MuJoCo itself ignores them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DEVICE: Final = "device:"
 LEFT_OUT: Final = "-"  # name for a device that the user leaves out
 DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
 _TIMESTEP_S: Final = 0.002  # MuJoCo's default
-_LONGEST_MS: Final = 100  # limit for a default basic step; robots step several times as often
+_LONGEST_MS: Final = 100  # largest default basic step; robots need shorter steps
 _MOST_STEPS: Final = 10_000  # steps of MuJoCo in a basic step; more would take seconds
 _SHORTEST_PART: Final = 99  # the shortest timestep that a message recommends is 1 / (99 + 1) ms
 _NEAR: Final = 1e-4  # relative tolerance: 0.0041666 s counts as 1/240 s
@@ -45,15 +45,15 @@ class Description:
     Attributes:
         source: its bytes.
         root: its elements.
-        texts: the named elements `text` of `custom`, by name; the first one with each name.
-        numbers: the elements `numeric`, in the same way.
+        texts: the elements `text` of `custom` by name; if several have the same name, the first.
+        numbers: the elements `numeric` of `custom`, in the same way.
     """
 
     source: Source
     root: Element
     texts: Mapping[str, Element]
     numbers: Mapping[str, Element]
-    # Where the elements of a section begin, by name; each section is searched once.
+    # For each section, the byte at which each named element begins; a section is searched at its first use.
     _places: dict[str, dict[str, int]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -78,13 +78,13 @@ class Description:
 
     @property
     def timestep_s(self) -> float:
-        """The length of one MuJoCo step in seconds; the default if this file does not set it."""
+        """The length of one MuJoCo step in seconds; MuJoCo's default if this file does not set it."""
         given = [it.attributes["timestep"] for it in self.root.named("option") if "timestep" in it.attributes]
         return _number(given[-1]) if given else _TIMESTEP_S
 
     @property
     def basic_step_ms(self) -> float | None:
-        """The basic step that the world sets, in ms; None if it sets none."""
+        """The basic step that the world sets, in ms; None if the world does not set it."""
         element = self.numbers.get(BASIC_STEP)
         return None if element is None else _number(element.attributes.get("data", ""))
 
@@ -111,7 +111,7 @@ def describe(source: bytes, name: str = "world") -> Description:
     """Return the description of an MJCF world.
 
     Raises:
-        WorldError: the bytes are not such a file.
+        WorldError: the bytes are not an MJCF file.
     """
     origin = Source(data=source, name=name, kind="world")
     root = read(origin)
@@ -134,7 +134,7 @@ def custom(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
 
 
 def whole_step_ms(timestep_s: float) -> int | None:
-    """Return the shortest time of whole milliseconds and whole MuJoCo steps; None if it is too long."""
+    """Return the shortest time in ms that is a whole number of MuJoCo steps; None if it is too long."""
     return next((step_ms for step_ms in range(1, _LONGEST_MS + 1) if fits(step_ms, timestep_s)), None)
 
 
@@ -156,9 +156,9 @@ def fitting_timesteps_s(timestep_s: float) -> tuple[float, float]:
 
 
 def with_parts(description: Description, parts: Iterable[Element]) -> Description:
-    """Return the description of a model with several files; the `custom` of each counts.
+    """Return the description of a model with several files, including the `custom` of each file.
 
-    In errors, an element of another file has the place of this file's root.
+    In errors, an element of another file has the position of this file's root.
     """
     texts, numbers = dict(description.texts), dict(description.numbers)
     for root in parts:

@@ -1,7 +1,7 @@
 """The elements of an XML file, each with its bytes.
 
-The author of the file is not trusted. A document type is refused, so that no entity can name a file or expand
-without end.
+The author of the file is not trusted. So a document type is refused, because its entities could name a file
+or expand without end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Element:
 
     Attributes:
         tag: its name.
-        attributes: their values, unescaped.
+        attributes: the unescaped values of its attributes, by name.
         start: the byte at which its start tag begins.
         children: the elements in it, in the order of the file.
     """

@@ -1,7 +1,7 @@
 """The files that a model names: meshes, textures, parts of the model.
 
 MuJoCo opens every file that an attribute of a model names. A name is relative to the folder of the world, or
-to a folder that the model names. `project` has the folder that none of them may leave.
+to a folder that the model names. `project` refuses files outside of the model's project.
 """
 
 from __future__ import annotations
@@ -52,5 +52,5 @@ def absolutes(source: Source, root: Element) -> Iterator[WorldError]:
     """Yield an error for each name in a file that is not relative to the folder of the world."""
     for element, path in (*named_folders(root), *named_files(root)):
         if not is_relative(path):
-            fact = f"{path!r} does not count from the folder of the world"
+            fact = f"{path!r} is not relative to the folder of the world"
             yield source.error(element.start, fact, _RELATIVE)

@@ -51,7 +51,7 @@ def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresse
         raise found.source.error(at, fact, remedy)
     if len((present + suffix).encode()) > MAX_NAME_BYTES:
         fact = f"the ROS name {present}{suffix} has more than {MAX_NAME_BYTES} bytes"
-        raise found.source.error(at, fact, f"shorten the one in {ARGUMENTS}")
+        raise found.source.error(at, fact, f"shorten the name in {ARGUMENTS}")
     return _named(found, present + suffix, clock=False)
 
 

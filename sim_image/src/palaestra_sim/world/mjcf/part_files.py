@@ -1,7 +1,7 @@
-"""How often the files of a model are part of it.
+"""Count how often each file of a model is part of the model.
 
-MuJoCo attaches a model without end if it attaches itself, and a few files that attach each other twice make
-more bodies than memory holds.
+If a model attaches itself, MuJoCo attaches it without end. Even a few files, of which each attaches the next
+file twice, make more bodies than fit into memory.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ _MOST: Final = 1_000_000  # elements of a model with all its copies
 
 
 class PartFiles:
-    """The files of a model, and which file names which.
+    """The files of a model, and the files that each of them names.
 
     Args:
         main: path of the world.
-        root: its elements.
+        root: the elements of the world.
     """
 
     def __init__(self, main: str, root: Element) -> None:
@@ -36,11 +36,11 @@ class PartFiles:
         self._attaches[path] = max(1, tags.count("attach"))
 
     def add(self, path: str, part: str) -> None:
-        """Record that a file names another one as a part."""
+        """Record that the file `path` names the file `part` as a part of the model."""
         self._named_by.setdefault(part, set()).add(path)
 
     def trouble(self) -> str | None:
-        """Return why the model would have no end, or too many elements; None if neither."""
+        """Return the problem of a model that contains itself or has too many elements; else None."""
         try:
             order = list(TopologicalSorter(self._named_by).static_order())
         except CycleError as error:
@@ -51,4 +51,4 @@ class PartFiles:
             for above in self._named_by.get(path, ()):
                 copies[path] = copies.get(path, 0) + copies.get(above, 0) * self._attaches.get(above, 1)
         total = sum(copies.get(path, 0) * size for path, size in self._sizes.items())
-        return f"the attached models have {total} elements; {_MOST} are the most" if total > _MOST else None
+        return f"the attached models have {total} elements; the limit is {_MOST}" if total > _MOST else None

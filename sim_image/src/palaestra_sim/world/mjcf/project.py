@@ -1,8 +1,9 @@
 """The files of a model on disk, and its project: the folder that holds them all.
 
-Models of a package share meshes, so a model may name files some folders above its own. The project is the
-nearest folder that holds all files that the model names, unless the user names a folder. It is never the
-whole file system, and no link may lead out of it: an untrusted model must not read files of the pod.
+Models of a package share meshes, so a model may name files in folders above its own. The project is the
+nearest folder that holds all files that the model names, unless the user names a folder. The project is never
+the whole file system, and no link may lead out of the project: an untrusted model must not read files of the
+pod.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _SMALLER: Final = "attach fewer models"
 
 
 class _Named(NamedTuple):
-    """An existing file, with the place that names it; `path` is relative to the folder of the world."""
+    """An existing file, and the element that names it; `path` is relative to the folder of the world."""
 
     source: Source
     element: Element
@@ -48,8 +49,8 @@ class Project:
 
     Args:
         world: path of the world.
-        description: its main file.
-        root: the folder that the user names; None for the nearest one that holds all files.
+        description: the description of its main file.
+        root: the folder that the user names; None for the nearest folder that holds all files.
 
     Attributes:
         roots: the elements of the included files that were read.
@@ -64,7 +65,7 @@ class Project:
         self._named: list[_Named] = []
 
     def open(self) -> None:
-        """Read all included files, and check the places of all files.
+        """Read all included files, and check that all files are inside the project.
 
         Raises:
             WorldError: an included file is wrong, or a file is outside of the project.
@@ -86,7 +87,7 @@ class Project:
             for element, part in parts(root):
                 found = next(self._there(part, [*self._folders(description.root), folder_of_file]), None)
                 if found is None:
-                    fact = f"the file {part!r}, of which the model consists too, is missing"
+                    fact = f"the file {part!r}, which is part of the model, is missing"
                     yield source.error(element.start, fact, _NEXT_TO_IT)
                     continue
                 self._named.append(named := _Named(source, element, found))
@@ -125,7 +126,7 @@ class Project:
         return max(1, len(self._folder.parents))
 
     def _is_outside(self, named: _Named, root: Path | None) -> bool:
-        """Return whether a file is outside `root`; if it is None, only a path to the top is outside."""
+        """Return whether a file is outside `root`; if that is None, only a path to the top is outside."""
         if root is None:
             return climb(named.path) >= self._top
         return not self._real(named).is_relative_to(root.resolve())
@@ -134,7 +135,7 @@ class Project:
         return (self._folder / named.path).resolve()
 
     def _note_assets(self, source: Source, root: Element, folder_of_file: str) -> None:
-        """Record the existing meshes, textures and other assets that a file in that folder names.
+        """Record the existing meshes, textures and other assets that a file in `folder_of_file` names.
 
         The assets of an attached model are next to that model.
         """

@@ -1,6 +1,7 @@
 """Checks for elements that grow when MuJoCo reads them: copies, grids of points, and images.
 
-MuJoCo allocates any size that they request, so one line of text can take all memory or minutes.
+MuJoCo allocates any size that such an element requests. So one line of text can use all memory, or take
+minutes.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def growing(source: Source, root: Element) -> Iterator[WorldError]:
         if element.tag == "replicate":
             size = copies = copies * size
         if element.tag in _MOST and size > _MOST[element.tag]:
-            fact = f"<{element.tag}> makes {size:.3g} of what is in it; {_MOST[element.tag]} are the most"
+            fact = f"<{element.tag}> has the size {size:.3g}; the limit is {_MOST[element.tag]}"
             yield source.error(element.start, fact, _REMEDY)
         waiting += [(child, copies) for child in element.children]
 
@@ -55,6 +56,6 @@ def _size(element: Element) -> float:
     """Return the product of an element's size numbers; 1 without such numbers."""
     texts = [element.attributes.get(name, "") for name in _SIZES.get(element.tag, ())]
     numbers = [float(word) for text in texts for word in text.split() if word.isdigit()]
-    if element.tag == "mesh":  # a built-in one has up to the square of its resolution as points
+    if element.tag == "mesh":  # a built-in mesh has up to as many points as the square of its resolution
         return max(numbers, default=1.0) ** 2
     return math.prod(numbers)
