@@ -31,7 +31,7 @@ def load(physics):
 
 @pytest.fixture
 def drive():
-    """`drive(simulation, vx, vy, omega, steps)` commands the first robot, and steps."""
+    """`drive(simulation, vx, vy, omega, steps)` drives the first robot and returns its body."""
 
     def drive(simulation, vx, vy, omega, steps=1):
         robot = simulation.robots[0]

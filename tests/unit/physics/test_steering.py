@@ -51,7 +51,7 @@ DEF CAR Robot {{ translation 0 0 0 children [ {" ".join(parts)} ]
 
 @pytest.fixture
 def drive(physics):
-    """`drive(world, angles, speed)` returns the body after the wheels are turned, and after 2 s more."""
+    """`drive(world, angles, speed)` returns the poses before and after a drive of 2 s with steered wheels."""
 
     def driven(world, angles, speed=8.0):
         simulation = Simulation.load(world.encode(), physics(), "car", Mode.FAST)
