@@ -38,7 +38,10 @@ def eyes():
 
 @pytest.fixture
 def see(ros, tmp_path, world, simple_robot, eyes):
-    """`see(width, height)` starts a simulator with such a camera; return its robot and a viewer's request."""
+    """`see(width, height)` starts a simulator with such a camera.
+
+    It returns the robot's node and a function that requests an image, as a viewer does.
+    """
 
     class Seeing(StubPhysics):
         def eye(self, place, lens):

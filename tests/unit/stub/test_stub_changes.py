@@ -239,7 +239,7 @@ def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, r
 
 
 def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
-    """It has the number of the Solid that touches: of the robot, or of the wall."""
+    """Robot and wall have the same contact points, each with the number of its own Solid."""
     simulation = start().simulation
     (robot,) = simulation.robots
     node = ros.node("robotino")

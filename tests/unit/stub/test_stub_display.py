@@ -107,7 +107,10 @@ def test_an_image_comes_in_any_format(painter, format_, pixel):
 
 
 def test_bytes_that_an_image_lacks_are_black(painter):
-    """The complete client of webots_ros sends 5 bytes for 50 pixels, and Webots reads beyond them."""
+    """The complete client of webots_ros sends 5 bytes for 50 pixels.
+
+    Webots reads beyond the end of the data.
+    """
     robot, picture = painter
     image = robot.get("screen/image_new", width=2, height=1, data=[255, 128], format=3)
     robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
@@ -153,7 +156,10 @@ def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
 
 
 def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
-    """The picture is mixed by its alpha; otherwise it replaces the pixels, alpha included."""
+    """With blending, alpha mixes the pasted pixels with the old ones.
+
+    Without blending, the pasted pixels replace them.
+    """
     robot, picture = painter
     robot.call("screen/fill_rectangle", x=0, y=0, width=8, height=6)
     image = robot.get("screen/image_new", width=1, height=1, data=[0, 0, 0, 51], format=6)

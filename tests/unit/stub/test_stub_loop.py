@@ -79,7 +79,7 @@ def test_what_arrives_is_answered_meanwhile(loop, chatter):
 
 
 def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
-    """A wake-up would take longer than the wait."""
+    """After several short waits, the next request is near, and waking up takes longer than polling."""
 
     def talk():  # if another process took the processor, that wait was long; try again
         if looks:

@@ -290,7 +290,7 @@ def test_a_table_whose_inputs_do_not_grow_is_refused(load):
         load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
 
 
-STANDING = "rotation 1 0 0 -1.5707963267948966"  # the robot's z points up, in a world whose y axis points up
+STANDING = "rotation 1 0 0 -1.5707963267948966"  # the robot's z points up where the world's y does
 
 
 @pytest.mark.parametrize(
@@ -512,7 +512,7 @@ def test_an_altimeter_adds_noise_and_then_rounds(load):
     ],
 )
 def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, expected):
-    """It reads its table's value for no irradiance, which for an E-puck is the largest value."""
+    """The sensor returns the table's value for an irradiance of 0. On an E-puck this is the largest value."""
     simulation = load(f"LightSensor {{ {fields} }}")
 
     simulation.step(STEP_MS)

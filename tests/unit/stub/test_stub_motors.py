@@ -173,7 +173,10 @@ def positions(motor, steps, step_s=0.008):
 
 
 def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
-    """With a proportional gain of 1 it covers 63 % in a second; with the default of 10 it arrives."""
+    """With a proportional gain of 1 the shaft covers 63 % in a second.
+
+    With the default of 10 it reaches the target.
+    """
     motor.set_control_pid(1.0, 0.0, 0.0)
     motor.set_position(1.0)
 
@@ -181,7 +184,7 @@ def test_the_gains_of_the_controller_decide_how_a_target_is_reached(motor):
 
 
 def test_the_controller_integrates_and_differentiates_the_error(motor):
-    """As in Webots, the sums of a gain begin when the gain is set, and change in each basic step."""
+    """As in Webots, integral and derivative change at each basic step after the gains were set."""
     motor.set_control_pid(1.0, 2.0, 0.001)
     motor.set_position(0.5)
 
