@@ -1,4 +1,4 @@
-"""Dynamic solids under MuJoCo: Solids with physics, and placeholder shapes that have a mass."""
+"""Dynamic solids under MuJoCo: Solids with physics, and stand-ins that have a mass."""
 
 import math
 

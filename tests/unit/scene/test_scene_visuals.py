@@ -115,7 +115,7 @@ def test_a_scale_makes_a_shape_larger_and_moves_it_away(things):
 
 
 def test_a_stand_in_has_the_shapes_of_its_outline(things):
-    """A placeholder has a default color unless the world sets its appearance.
+    """A stand-in has a default color unless the world sets its appearance.
 
     The floor of an arena is darker than its walls.
     """

@@ -25,7 +25,7 @@ TWINS = {
 
 
 def load(text, header="R2023b", leave_out=None):
-    """Return the simulation of a world that may use the bundled PROTOs and placeholder shapes."""
+    """Return the simulation of a world that may use the bundled PROTOs and stand-ins."""
     world = parse(f"#VRML_SIM {header} utf8\n{text}".encode(), "my.wbt")
     descriptions = Descriptions(protos=builtin_protos(), stand_ins=shipped())
     return Simulation.of(world, StubPhysics(), "my.wbt", descriptions=descriptions, leave_out=leave_out)

@@ -55,7 +55,7 @@ def test_a_node_tells_what_it_is(robot, find):
 def among_protos(ros, start, world):
     """Return a supervisor that is a PROTO E-puck, and a function that finds nodes by DEF.
 
-    The world also has a placeholder, a WoodenBox.
+    The world also has a stand-in, a WoodenBox.
     """
     arguments = 'controllerArgs [ "--name=puck" "--synchronize" ]'
     robot = f'DEF PUCK E-puck {{ controller "ros" {arguments} supervisor TRUE }}'
@@ -68,7 +68,7 @@ def among_protos(ros, start, world):
     ("name", "proto", "base", "number"), [("PUCK", "E-puck", "Robot", 34), ("BOX", "WoodenBox", "Solid", 80)]
 )
 def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, proto, base, number):
-    """The base type is that of the node inside the PROTO, even if a placeholder replaces the PROTO."""
+    """The base type is that of the node inside the PROTO, even if a stand-in replaces the PROTO."""
     puck, find = among_protos
     node = find(name)
 

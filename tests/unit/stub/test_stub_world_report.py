@@ -46,7 +46,7 @@ def test_an_old_world_is_turned_and_the_check_says_so(check):
 
 
 def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
-    """Placeholders and controllers that do not run differ from Webots, so the report names both."""
+    """Stand-ins and controllers that do not run differ from Webots, so the report names both."""
     code, lines = check('E-puck { name "a" controller "patrol" } WoodenBox { } WoodenBox { } Floor { }')
 
     assert code == 0

@@ -1,4 +1,4 @@
-"""Users' worlds: PROTOs, placeholder shapes, robots whose drive follows from geometry, and left-out nodes."""
+"""Users' worlds: PROTOs, stand-ins, robots whose drive follows from geometry, and left-out nodes."""
 
 import math
 
@@ -184,7 +184,7 @@ def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
 
 
 def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
-    """In saved worlds, crates often lean by a few degrees, and a placeholder is a simplified shape anyway."""
+    """In saved worlds, crates often lean by a few degrees, and a stand-in is a simplified shape anyway."""
     (shape,) = load_world("CardboardBox { size 0.6 0.4 0.5 rotation 1 0 0 0.1 }").scene.solids
     outline = obstacle(shape)
 
@@ -256,7 +256,7 @@ def test_a_conveyor_belt_is_refused():
 
 
 def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
-    """As in Webots, cylinders of an old file are turned. Boxes and placeholders have no such axis."""
+    """As in Webots, cylinders of an old file are turned. Boxes and stand-ins have no such axis."""
     post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"
     old = parse_proto(f"#VRML_SIM R2021b utf8\n{post}".encode(), "Post.proto")
     simulation = Simulation.of(
