@@ -309,7 +309,7 @@ def test_own_callbacks_and_policies_are_classes_of_the_job(converted):
     ],
 )
 def test_words_mean_what_they_mean_in_zoo(converted, words, hyperparameters):
-    """Noise of 0 means no noise, a schedule with any name falls linearly, and null counts as absent."""
+    """In Zoo, noise of 0 means no noise, each schedule name a linear decrease, and null an absent key."""
     trainer, _ = converted(*words)
 
     assert trainer.algorithm.hyperparameters == hyperparameters
