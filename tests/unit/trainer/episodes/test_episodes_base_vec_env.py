@@ -164,7 +164,10 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(restarters
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     restarters, monkeypatch
 ):
-    """The restarter's own thread uses the simulator meanwhile."""
+    """During a restart, only the restarter's thread may use the environment.
+
+    So the attribute is set later.
+    """
     [restarter, *_] = restarters()
     env = SimulatorsVecEnv([restarter], 1)
     env.reset()

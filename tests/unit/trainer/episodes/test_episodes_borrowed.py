@@ -174,7 +174,10 @@ def plain(value):
 @pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
 @pytest.mark.parametrize("hostile", [Hostile, Frozen])
 def test_what_an_environment_does_with_its_objects_changes_nothing(restarter, played, hostile):
-    """Else a last observation is the next episode's first, and an exact resume repeats other actions."""
+    """Otherwise the last observation would be the next episode's first.
+
+    A resume would repeat other actions.
+    """
     assert plain(played(restarter(hostile))) == plain(played(restarter(Honest)))
 
 
@@ -238,7 +241,7 @@ def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(res
 
 
 class WithWords(Honest):
-    """An environment whose infos have keys with another meaning here and in Stable-Baselines3."""
+    """An environment with keys in its infos that have another meaning here and in Stable-Baselines3."""
 
     def step(self, action):
         """Take a step, and return these keys."""
@@ -248,7 +251,10 @@ class WithWords(Honest):
 
 
 def test_words_of_an_environment_are_not_taken_for_ours(restarter):
-    """Words that only Stable-Baselines3 may use are moved, and the log says so; all others stay."""
+    """Keys that Stable-Baselines3 uses itself are moved to `hidden`, and a log line reports this.
+
+    All others stay.
+    """
     env = SimulatorsVecEnv([restarter(WithWords)], 1)
     env.reset()
     with structlog.testing.capture_logs() as logged:

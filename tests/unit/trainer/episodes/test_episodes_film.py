@@ -20,7 +20,10 @@ FLOOR = FloorLayout(
 
 
 class Walked:
-    """A member whose robot is `at` meters from its start; the target moves at `moves` meters."""
+    """A simulator whose robot is `at` meters from its start.
+
+    The target jumps when the robot has driven `moves` meters.
+    """
 
     def __init__(self, moves: int = 10**9) -> None:
         self.moves = moves

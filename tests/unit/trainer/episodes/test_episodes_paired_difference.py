@@ -95,7 +95,10 @@ def test_episodes_with_equal_results_are_no_evidence_of_a_difference(pairs):
 
 @pytest.mark.parametrize("chances", [(0.9, 0.08, 0.0, 0.02), (0.5, 0.2, 0.1, 0.2), (0.05, 0.5, 0.4, 0.05)])
 def test_whoever_looks_after_each_batch_sees_the_true_difference_inside(chances):
-    """The interval is valid at any number of episodes: of 100 comparisons, at most 5 % may ever miss."""
+    """A person may look after each batch.
+
+    In at most 5 % of comparisons may the true difference ever be outside.
+    """
     random = np.random.default_rng(1)
     missed = 0
     for _ in range(100):

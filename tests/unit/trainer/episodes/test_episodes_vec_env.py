@@ -71,7 +71,7 @@ def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
 
 
 def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
-    """Stable-Baselines3 expects the next episode's first observation, and the last one in the info."""
+    """Stable-Baselines3 expects the next episode's first observation. The info has the last one."""
     env = make_env(make_member())
     env.reset()
 
@@ -177,7 +177,10 @@ def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_
 
 
 def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member):
-    """The policy did not cause it, so it gets no reward, no penalty and nothing to learn."""
+    """The policy did not cause the fault.
+
+    So it gets no reward and no penalty, and does not learn from the row.
+    """
     env = make_env(make_member(steps=[2]))
     env.reset()
 

@@ -197,7 +197,10 @@ class Blind(BaseFeaturesExtractor):
 
 
 def test_an_input_that_the_network_does_not_use_is_not_in_the_file():
-    """PyTorch leaves it out, and onnxruntime refuses additional inputs; the metadata names it."""
+    """PyTorch leaves the input out, and onnxruntime rejects unknown inputs.
+
+    The metadata lists it as unused.
+    """
     seen = spaces.Dict({"ignored": NUMBERS, "seen": NUMBERS})
     policy = policy_of(sb3.PPO, seen, policy_kwargs={"net_arch": [8], "features_extractor_class": Blind})
     acting = PolicyModule(policy)

@@ -22,7 +22,10 @@ RIGHT, LEFT = 1, 0
 
 @pytest.fixture
 def make_env(make_players, make_member):
-    """Make an environment whose member breaks as the keywords say, and return both."""
+    """Return a function that makes an environment and its simulator.
+
+    The keywords set the simulator's faults.
+    """
 
     def make(*, restarts=10, deadline_s=20.0, mend_at_once=False, **faults):
         member = make_member(**faults)
@@ -102,7 +105,10 @@ def test_a_fault_in_a_reset_begins_the_same_episode_again(make_env):
 
 
 def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
-    """Gymnasium does the same; a standby's environment has its own random generator."""
+    """As in gymnasium, later episodes follow from the last seed.
+
+    A standby's environment has another generator.
+    """
     env, member = make_env()
     for seed in (3, None, None, 3, None, None):
         env.reset(seed=seed)

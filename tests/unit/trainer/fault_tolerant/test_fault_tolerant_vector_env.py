@@ -185,7 +185,10 @@ def test_stable_baselines3_gets_the_row_that_it_expects(make_env):
 
 
 def test_stable_baselines3_counts_no_episode_that_a_fault_cut(make_env):
-    """Its return says nothing about the policy; the value of the rest is bootstrapped."""
+    """The return of a cut episode does not measure the policy.
+
+    The value of its last observation is bootstrapped.
+    """
     env, *_ = make_env({"steps": [2]}, {}, kind=FaultTolerantVecEnv)
     env.reset()
 
