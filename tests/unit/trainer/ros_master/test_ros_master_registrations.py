@@ -13,7 +13,7 @@ REGISTERED = st.lists(
 
 @given(REGISTERED)
 def test_a_node_is_known_exactly_while_it_has_a_registration(registered):
-    """A name that a killed simulator leaves behind must not keep its successor from starting."""
+    """If a killed simulator's node remained known, the next simulator could not start."""
     nodes = Registrations()
     for kind, name, node in registered:
         nodes.register(kind, name, node, f"http://h{node}")

@@ -273,7 +273,7 @@ def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
 
 
 def in_order(folder):
-    """Return TensorBoard's points of a folder, even if all of its files were written in the same second."""
+    """Return TensorBoard's points of a folder in order, even if its files are of the same second."""
     files = sorted(folder.iterdir(), key=lambda it: (int(it.name.split(".")[3]), int(it.suffix[1:])))
     whole = folder.with_name("events.out.tfevents")
     whole.write_bytes(b"".join(file.read_bytes() for file in files))

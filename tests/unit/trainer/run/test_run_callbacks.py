@@ -81,7 +81,10 @@ def seen(module):
 
 @pytest.fixture
 def with_callbacks(job, module):
-    """Make the configuration of a short run whose callbacks have these options."""
+    """Return a function that makes the configuration of a short run.
+
+    Each set of options is for one callback.
+    """
 
     def make(*options, name="DQN", **changes):
         configuration = job(name, **changes)
@@ -98,7 +101,10 @@ def events(seen, word, event):
 
 
 def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, seen):
-    """They run at the start of an attempt, at each step, and after the last evaluation and checkpoint."""
+    """They are called at the start of an attempt and at each step.
+
+    Their end comes after the last evaluation and the last checkpoint.
+    """
     code, _ = play(with_callbacks({"word": "first"}, {"word": "second"}))
 
     assert code == 0

@@ -41,7 +41,10 @@ def address():
 
 @pytest.fixture
 def program(tmp_path, address):
-    """Start a program with a target of 1000 steps; each call returns when it has reported."""
+    """Yield a function that lets a program report and waits for the report.
+
+    The program has a target of 1000 steps.
+    """
     job = {
         "job": "own",
         "environment": {"id": "Task-v0"},

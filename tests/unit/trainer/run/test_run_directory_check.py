@@ -131,7 +131,7 @@ def content_of(folder: Path):
 def test_a_damage_ends_the_attempt_before_anything_starts_or_is_deleted(
     begun, play, job, last_word, name, damage
 ):
-    """Before, there was a traceback, a new run over the old files, or an end hours later."""
+    """Before, there was a traceback, a new run over the old files, or a failure hours later."""
     damage(begun)
     before = content_of(begun.path)
 

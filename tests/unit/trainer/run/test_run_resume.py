@@ -63,7 +63,10 @@ def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, j
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
-    """It ends at the same total, repeats the incomplete rollout, and keeps the earlier counts."""
+    """The run ends at the same total and keeps its earlier counts.
+
+    It repeats at most the incomplete rollout.
+    """
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
     saved = checkpoint.newest(directory.checkpoints).manifest
