@@ -46,7 +46,7 @@ def angle(simulation, name="DOOR"):
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """Before the push the door stays shut in its frame; the knob on the door moves with it."""
+    """Without a push the door stays shut in its frame. Its knob moves together with it."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)
@@ -60,7 +60,7 @@ def test_a_robot_pushes_a_door_open(load, drive):
 
 
 def test_rays_meet_a_door_where_it_is(load):
-    """A supervisor opens a door that has been at rest for long, and it stays open."""
+    """A supervisor opens a door that has long been at rest, and the door stays open."""
     simulation = load()
     simulation.step(1920)
     ahead = simulation.robots[0].sensors["ir1"]

@@ -201,7 +201,7 @@ def test_robots_run_into_each_other(load, drive):
 
 
 def test_a_robot_inside_a_pose_stands_where_the_pose_puts_it(load, drive):
-    """Such a robot has no body of its own, so it is an obstacle."""
+    """A robot inside a Pose has no body of its own, so it is a fixed obstacle."""
     simulation = load(builtin("arena") + b"Pose { translation 0.5 0 0 children [" + OTHER + b"] }")
     standing = simulation.scene.solids[-1].pose.position
 

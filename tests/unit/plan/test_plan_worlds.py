@@ -101,7 +101,7 @@ def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(valid_job):
 
 
 def test_a_world_that_ships_is_not_parsed(valid_job):
-    """This project's own tests check the built-in worlds.
+    """Tests of this project check the built-in worlds, so the plan need not parse them.
 
     Parsing takes most of the time of planning a small job.
     """

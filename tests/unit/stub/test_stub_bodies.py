@@ -172,7 +172,7 @@ def test_rays_meet_every_disc_of_a_robot():
     heading=st.floats(-3, 3),
 )
 def test_a_long_robot_never_ends_inside_anything(commands, heading):
-    """This must hold also for a robot that turns in a corner."""
+    """No part of the robot enters a wall, even when the robot turns in a corner."""
     walls = [Block(s * 1.05, 0.0, 0.0, (0.1, 2.2)) for s in (-1, 1)]
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     motors = [Motor(MotorSpec(name=name, max_velocity_rad_s=100.0)) for name in ("left", "right")]

@@ -184,7 +184,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
 
 
 def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
-    """As in Webots, the call succeeds although the value is not stored."""
+    """The call succeeds, but the value is not stored."""
     handle = field("ROBOTINO", "controllerArgs")
 
     assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1

@@ -85,7 +85,7 @@ def test_an_axis_without_direction_turns_nothing():
 
 @given(angle=st.floats(-3.1, 3.1))
 def test_the_heading_is_the_angle_about_z(angle):
-    """This is true for every upright body."""
+    """Every body that is turned only about z is upright."""
     pose = Pose(rotation=from_axis_angle((0.0, 0.0, 1.0, angle)))
 
     assert pose.heading_rad == close(angle)

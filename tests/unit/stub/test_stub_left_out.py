@@ -20,7 +20,7 @@ def test_nodes_of_a_kind_have_one_line_with_their_places() -> None:
 
 
 def test_many_places_are_counted() -> None:
-    """A line of a status must be short, so only the first eight lines of the file are listed."""
+    """A line of a status must be short, so it has at most eight line numbers."""
     [line] = left_out_lines([error(number) for number in range(1, 21)])
 
     assert line.endswith(": 20 nodes left out (my.wbt, lines 1, 2, 3, 4, 5, 6, 7, 8 and 12 more)")

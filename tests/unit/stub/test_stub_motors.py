@@ -57,7 +57,7 @@ def test_nan_is_refused_and_answers_success(robot, service):
 
 
 def test_a_negative_velocity_needs_an_infinite_target(robot):
-    """Before `set_position(inf)`, the robot turns only one way, which is a common mistake."""
+    """A client that forgets `set_position(inf)` sees its robot turn only one way. The mistake is common."""
     robot.call("wheel0_joint/set_velocity", value=-3.0)
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 

@@ -1,7 +1,4 @@
-"""Discs, blocks and hulls push robots out and stop rays.
-
-The tests compare them with a search in small steps.
-"""
+"""Discs, blocks and hulls push robots out and stop rays; the tests check both by the gap to the obstacle."""
 
 import math
 

@@ -20,7 +20,7 @@ def test_a_controller_starts_for_each_ros_robot(ros, start):
 
 
 def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_robot):
-    """Such robots do not move, and no step waits for them."""
+    """Robots with other controllers do not move, and no step waits for them."""
     start(world('Robot { name "statue" controller "<none>" }', robot=simple_robot))
 
     assert [node.name for node in ros.nodes] == ["robotino"]

@@ -219,7 +219,7 @@ class OtherSimulation:
 
 
 def test_any_simulation_can_be_stepped():
-    """Controllers of other simulators use the same class: they advance, then sample once per step."""
+    """Each simulator has the same controllers. A step advances the simulation, and then samples once."""
     simulation, answers = OtherSimulation(), []
     stepping = Stepping(simulation)
 

@@ -235,7 +235,7 @@ def test_axles_that_are_parallel_but_for_rounding_are_parallel():
 
 
 def test_no_wheels_do_not_move():
-    """This drive belongs to a robot that does not move."""
+    """A robot without wheels has this drive, which never moves it."""
     assert STANDING.twist(()) == (0.0, 0.0, 0.0)
     assert STANDING.wheel_speeds(1.0, 1.0, 1.0) == ()
 

@@ -82,7 +82,7 @@ def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
 
 
 def test_a_node_that_uses_itself_ends_in_one_sentence(check):
-    """Such a world caused a RecursionError before."""
+    """Before, a node that uses itself caused a RecursionError."""
     code, lines = check("DEF A Group { children [ USE A ] }")
 
     assert (code, len(lines)) == (2, 1)

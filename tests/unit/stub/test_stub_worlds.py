@@ -160,7 +160,7 @@ def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
 
 @pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Colosseum"}))])
 def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
-    """The log has one line for each type of left-out node, with the positions."""
+    """The log has a line for each left-out node, with the position of the node."""
     simulation = load_world("Colosseum { } WoodenBox { }", leave_out=leave_out)
 
     assert len(simulation.scene.solids) == 1
@@ -239,7 +239,7 @@ DOOR = """Pose { translation 1 0 0 children [ HingeJoint { endPoint Solid { tran
 
 
 def test_a_door_on_a_hinge_without_physics_stands_where_it_is():
-    """Such a door does not move in Webots either."""
+    """A door without physics does not move in Webots either."""
     assert obstacles(load_world(DOOR % "")) == [("box", 1.0, 2.0, (1.0, 0.1, 2.0))]
 
 

@@ -17,7 +17,7 @@ from palaestra_sim.world import (
     robots,
 )
 
-# All node types in the built-in worlds. They belong to Webots itself, so it downloads no file.
+# All node types in the built-in worlds. They belong to Webots itself, so no file is downloaded.
 PLAIN = {
     "Background", "Box", "Camera", "ContactProperties", "Cylinder", "DirectionalLight", "DistanceSensor",
     "HingeJoint", "HingeJointParameters", "PBRAppearance", "Physics", "Pose", "PositionSensor",

@@ -113,7 +113,7 @@ def test_protos_that_are_made_of_each_other_are_refused_with_both_names() -> Non
 
 
 def test_a_proto_that_is_made_of_itself_is_refused() -> None:
-    """This is the shortest cycle of PROTOs."""
+    """A PROTO that contains itself is the shortest possible cycle."""
     result = found('EXTERNPROTO "A.proto"', {"/project/worlds/A.proto": proto("A", "A.proto")})
 
     assert refusals(result)["A"].endswith("A contains itself; remove A from A")

@@ -252,7 +252,7 @@ def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdenti
     ],
 )
 def test_other_controllers_are_left_alone(generated: Callable[..., str], text: str) -> None:
-    """Such a controller does not use ROS, and its arguments belong to its own program."""
+    """A robot with another controller does not use ROS, and its arguments belong to its own program."""
     assert generated(text + COMPLETE, clock=False) == text + COMPLETE
 
 
@@ -403,7 +403,7 @@ def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> Non
 def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
     generated: Callable[..., str], text: str
 ) -> None:
-    """Such an address, or a text that only looks like an address, is valid in every folder."""
+    """An absolute address, or a text that only looks like an address, is valid in every folder."""
     assert generated(text + COMPLETE) == text + COMPLETE
 
 

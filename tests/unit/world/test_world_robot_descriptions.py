@@ -345,7 +345,7 @@ def test_wheels_are_where_webots_has_them_and_as_large(name: str) -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_wheels_stand_on_the_floor(name: str) -> None:
-    """This is true at the default translation.
+    """The height is that of the default translation.
 
     As in Webots, the wheels of the Robotino 3 are 4 mm below the floor.
     """

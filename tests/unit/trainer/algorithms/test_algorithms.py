@@ -1,4 +1,4 @@
-"""The algorithms as the training loop uses them."""
+"""The algorithms as the training loop uses them: hyperparameters, invalid rows, saving and loading."""
 
 from __future__ import annotations
 
@@ -483,7 +483,7 @@ def test_each_argument_that_a_run_gives_itself_has_its_place():
 
 
 def test_no_word_with_a_place_elsewhere_is_a_hyperparameter():
-    """Such a name would be rejected with a hint to another field, although the algorithm accepts it."""
+    """A hyperparameter with such a name would be rejected, with a hint to another field of the job."""
     known = {name for entry in ALGORITHMS.values() for name in entry.known}
 
     assert known.isdisjoint(ELSEWHERE)

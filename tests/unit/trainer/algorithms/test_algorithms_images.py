@@ -137,7 +137,7 @@ def test_images_get_the_policy_for_images(make_seeing, name, shape):
     ("shape", "layers"), [((ROWS, COLUMNS, 3), 3), ((20, 48, 9), 9)], ids=["1", "3 frames"]
 )
 def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, shape, layers):
-    """Each algorithm can use it, with one image or with three.
+    """Each algorithm can use the small network, with one image or with three.
 
     The images may be too small for the large network.
     """

@@ -182,7 +182,7 @@ def test_a_replay_buffer_of_ones_own_stores_valid_rows_one_by_one(lab, make):
 
 
 def test_an_algorithm_of_ones_own_may_bring_its_buffer(lab, make):
-    """Such a buffer stores only valid rows too."""
+    """The buffer of a user's algorithm stores only valid rows too."""
     model, _ = make(Algorithm(name="buffer_lab:PrioritizedDQN", hyperparameters=OFF_POLICY), faults=(3,))
 
     model.learn(30)

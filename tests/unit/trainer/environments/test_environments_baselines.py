@@ -38,7 +38,7 @@ def test_baselines_play_whatever_can_be_configured(make_env, policy, actions):
 
 @pytest.mark.parametrize("policy", BASELINES.values(), ids=BASELINES)
 def test_a_baseline_is_measured_the_same_twice(make_env, policy):
-    """Its result is printed next to that of a trained policy, and must be reproducible."""
+    """The result is printed next to that of a trained policy, and must be reproducible."""
     rates = [success_rate(make_env(), policy, range(20)) for _ in range(2)]
 
     assert rates[0] == rates[1]

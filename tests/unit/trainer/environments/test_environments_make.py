@@ -107,7 +107,7 @@ def test_an_environment_with_any_keyword_gets_all(made):
 
 
 def test_an_environment_that_accepts_neither_robot_nor_scene_is_refused(made):
-    """Such an environment would not use the simulators at all."""
+    """Without a robot and a scene, the environment would not use the simulators at all."""
 
     class Alone(Hall):
         def __init__(self, size=1.0):

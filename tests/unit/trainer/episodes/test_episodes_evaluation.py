@@ -1,4 +1,4 @@
-"""The evaluation of a policy."""
+"""The evaluation of a policy: its episodes, faults of simulators, and its end."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def test_an_evaluation_records_its_episodes_from_the_reset_to_the_end(make_membe
 
 
 def test_the_best_a_median_and_a_failed_episode_are_kept(make_member, tmp_path):
-    """They show what the policy can do, what it usually does, and what it still does wrong."""
+    """These films show what the policy can do, what it usually does, and what it still does wrong."""
     member = make_member()
     member.sight = Walked().sight
     evaluation = evaluate(RightWalker(), member, [10, 12, 21])

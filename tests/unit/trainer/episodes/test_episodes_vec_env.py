@@ -57,7 +57,7 @@ def end_of_mending(name):
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
-    """This holds for any number of simulators."""
+    """One simulator and several simulators give rows of the same form."""
     env = make_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()

@@ -119,7 +119,7 @@ def test_without_a_seed_the_episodes_are_those_of_the_last_seed(make_env):
 
 
 def test_a_step_without_an_episode_is_a_mistake(make_env):
-    """This is also true after the end of an episode, and after one that a fault ended."""
+    """A step after the end of an episode is a mistake too, even if a fault ended it."""
     env, _ = make_env(steps=[1])
     with pytest.raises(ResetNeeded, match="call reset"):
         env.step(RIGHT)
@@ -197,7 +197,7 @@ def test_a_simulator_is_recycled_in_a_reset(make_env):
 
 
 def test_an_environment_is_closed_once(make_players, make_member):
-    """Both `close` and the end of the process may close it."""
+    """`close` and the end of the process may each try to close the environment."""
     players = make_players(make_member())
     env = FaultTolerantEnv(players)
 

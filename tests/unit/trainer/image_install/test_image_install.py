@@ -200,7 +200,7 @@ def test_a_folder_without_a_module_is_refused(tmp_path, target, capfd):
 
 
 def test_a_folder_that_is_itself_a_package_is_refused(folder, target, capfd):
-    """Its modules would be imported by other names than their own imports use."""
+    """The modules of the package would be imported by other names than their own imports use."""
     (folder / "__init__.py").touch()
 
     assert f"{folder}: is itself a package; name the folder that holds your modules" in refusal(capfd, folder)

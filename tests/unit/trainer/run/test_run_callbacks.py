@@ -101,7 +101,7 @@ def events(seen, word, event):
 
 
 def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, seen):
-    """They are called at the start of an attempt and at each step.
+    """Callbacks are called at the start of an attempt and at each step.
 
     Their end comes after the last evaluation and the last checkpoint.
     """

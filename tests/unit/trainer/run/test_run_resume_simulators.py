@@ -106,7 +106,7 @@ def test_a_run_may_go_on_with_another_number_of_simulators(make_env, saved, memb
 @pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
 @pytest.mark.parametrize("collectors", [(1, 3), (3, 1)])
 def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name, collectors):
-    """This must also work with a replay buffer, which keeps a row for each simulator."""
+    """A run with a replay buffer is tested too, because its buffer keeps a row for each simulator."""
     before, after = collectors
     play(job(name, collectors=before))
 

@@ -48,7 +48,7 @@ def few(monkeypatch):
 
 
 def test_an_evaluation_gives_an_endless_episode_up(restarter):
-    """Its steps count as progress, so neither the watchdog nor the operator would end the run."""
+    """Steps of an endless episode count as progress, so no watchdog would end the run."""
     with pytest.raises(ConfigurationError, match="not ended after 50 steps, and an evaluation waits"):
         evaluate(First(), restarter, [1])
 

@@ -116,7 +116,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind):
-    """Such a message is of another type than its topic."""
+    """A message with more bytes than its type needs was sent to the wrong topic."""
     read, make_message, _ = kind
     sound = make_message()
 

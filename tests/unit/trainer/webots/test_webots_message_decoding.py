@@ -67,7 +67,7 @@ def test_a_message_cut_short_anywhere_is_refused(kind, read, known):
 
 
 def test_a_message_that_is_too_long_is_refused(kind, read):
-    """Such a message is of another type than its topic."""
+    """A message with more bytes than its type needs was sent to the wrong topic."""
     sound = message(kind, KINDS[kind][2])
 
     with pytest.raises(ValueError, match=f"a message of {len(sound) + 1} bytes, not {len(sound)}"):
@@ -103,7 +103,7 @@ def test_a_reading_of_several_numbers_is_a_tuple():
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_each_number_of_a_tuple_has_to_be_finite(axis):
-    """Each of the numbers reaches the loss."""
+    """A single NaN in the tuple would reach the loss."""
     point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {axis: math.nan}})
 
     with pytest.raises(ValueError, match=r"nan.* from gps"):
