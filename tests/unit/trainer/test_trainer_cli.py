@@ -50,7 +50,7 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, c
 
 @pytest.mark.parametrize("number", ["0", "-1", "many"])
 def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
-    """The error comes before a simulator is started."""
+    """The number is checked before a simulator is started in vain."""
     with pytest.raises(SystemExit) as ended:
         evaluate(["run", "--episodes", number])
 
@@ -143,7 +143,7 @@ def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(
     ],
 )
 def test_an_option_without_meaning_is_refused_by_its_name(program, arguments, words, capsys):
-    """The line of the error has the remedy."""
+    """The error is one line, which names the option and the remedy."""
     with pytest.raises(SystemExit) as ended:
         program(arguments)
 

@@ -67,7 +67,7 @@ def test_what_is_dumped_is_read_back_as_the_same():
 
 
 def test_all_mistakes_are_reported_at_once():
-    """Otherwise each attempt to correct a mistake would need a new pod."""
+    """A person would need a new pod for each mistake if they were reported one by one."""
     wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
     with pytest.raises(ConfigurationError) as caught:

@@ -94,7 +94,7 @@ def test_a_part_of_the_compiler_can_be_imported_first():
 
 
 def test_a_library_that_a_user_imports_first_is_the_real_one_everywhere():
-    """Otherwise the placeholder would be a second module with the same name."""
+    """If a placeholder were imported later, the library would exist twice under one name."""
     first = "import matplotlib.figure, pandas\n"
     same = "logger.matplotlib is matplotlib, logger.pandas is pandas"
     program = first + IMPORT + f"from stable_baselines3.common import logger\nprint(json.dumps([{same}]))"

@@ -82,7 +82,7 @@ def test_defaults_are_hyperparameters_of_the_class(name):
 
 
 def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name():
-    """The error comes before a simulator is started in vain."""
+    """A person corrects all names in one go, before a simulator is started in vain."""
     wrong = {"learning_rat": 1, "gama": 0.9, "zzz": 0}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -99,7 +99,7 @@ def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name
 
 @pytest.mark.parametrize("name", ["env", "seed", "optimize_memory_usage", "device"])
 def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
-    """Otherwise a job could disable the code that keeps invalid rows out of the losses."""
+    """A job that could set these would disable the code that keeps invalid rows out of the losses."""
     with pytest.raises(ConfigurationError, match=f"{name}: is not a hyperparameter here"):
         check(Algorithm(name="DQN", hyperparameters={name: 1}))
 
@@ -134,7 +134,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("name", "hyperparameters", "line"), WRONG, ids=lambda it: str(it)[:40])
 def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparameters, line):
-    """Otherwise each of four attempts would start the simulators in vain."""
+    """Without the check, each of four attempts would start the simulators in vain."""
     with pytest.raises(ConfigurationError) as refusal:
         check(Algorithm(name=name, hyperparameters=hyperparameters))
 
@@ -233,7 +233,7 @@ def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(mak
 def test_an_update_of_one_row_is_accepted_without_normalization_and_of_two_with_it(
     make_env, members, hyperparameters
 ):
-    """The message of the error above names these two remedies."""
+    """The error in the test above names these two remedies."""
     model = model_of("A2C", make_env(members), **hyperparameters)
 
     assert model.n_steps * model.n_envs >= 1 + model.normalize_advantage

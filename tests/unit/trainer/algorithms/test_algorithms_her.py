@@ -264,7 +264,7 @@ def test_its_size_is_computed_before_it_exists():
     ],
 )
 def test_wrong_options_are_refused_with_field_fact_and_remedy(given, fact):
-    """The error comes before a simulator starts."""
+    """The options are checked before a simulator starts, so a person waits only seconds for the error."""
     chosen = {"replay_buffer_class": "HerReplayBuffer"} | given
     if "no effect" in fact:
         del chosen["replay_buffer_class"]

@@ -234,7 +234,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("name", "fact"), REFUSED, ids=[name for name, _ in REFUSED])
 def test_a_class_that_cannot_be_used_is_refused_in_one_sentence(lab, name, fact):
-    """The error comes before a simulator starts."""
+    """The class is checked before a simulator starts, so a person waits only seconds for the error."""
     del lab
 
     with pytest.raises(ConfigurationError, match=rf"algorithm\.name: {fact}"):
@@ -333,7 +333,7 @@ def test_a_network_that_writes_into_its_input_changes_no_row(lab, make, name, pa
     ],
 )
 def test_wrong_parts_are_refused_by_field_and_remedy(lab, algorithm, fact):
-    """The error comes before a simulator starts."""
+    """The parts are checked before a simulator starts, so a person waits only seconds for the error."""
     del lab
 
     with pytest.raises(ConfigurationError, match=fact):

@@ -134,7 +134,7 @@ def test_what_is_saved_is_restored(trained, name):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_random_numbers_go_on_where_they_were(trained, name):
-    """Otherwise, exploration would draw other numbers than in an uninterrupted run, or repeat some."""
+    """With other generators, exploration after a resume would differ from that of an uninterrupted run."""
     before = trained(name)
     before.save()
 

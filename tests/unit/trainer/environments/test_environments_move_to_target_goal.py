@@ -66,7 +66,7 @@ def test_it_is_made_by_name():
 
 @pytest.mark.parametrize("reward", ["Dense", "Sparse"])
 def test_a_step_s_reward_is_that_of_its_goals(make_env, reward):
-    """Otherwise a replayed goal would have another reward than the same goal in training."""
+    """Hindsight replay computes rewards again, and the same goals must give the same reward."""
     env = make_env(reward=reward)
     env.reset(seed=3)
 

@@ -123,7 +123,7 @@ def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
     ids=["unknown", "cylinder", "wall", "in", "at", "nowhere", "nan", "too few", "matrix", "text", "number"],
 )
 def test_a_place_that_cannot_be_is_refused(chosen, message):
-    """Otherwise the search for a free position would never end."""
+    """With such a position, the search for a free position would never end."""
     with pytest.raises(ConfigurationError, match=message):
         PLACES.chosen_task(np.random.default_rng(0), chosen)
 
@@ -152,7 +152,7 @@ def test_what_is_stored_under_the_floor_or_hangs_above_is_in_nobody_s_way():
 
 
 def test_a_floor_without_room_is_refused():
-    """Otherwise the search for a free position would never end."""
+    """On such a floor, the search for a free position would never end."""
     tiny = FloorLayout(low=(-0.5, -0.5), high=(0.5, 0.5))
 
     with pytest.raises(ConfigurationError, match="no free places for a robot"):

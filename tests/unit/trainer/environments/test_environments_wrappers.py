@@ -99,7 +99,7 @@ def test_each_frame_has_the_bounds_of_its_numbers():
 
 
 def test_an_observation_that_was_returned_does_not_change_later():
-    """Otherwise each row of a buffer would have the newest frames."""
+    """A buffer keeps the returned arrays, and each row would get the newest frames."""
     env = StackedFrames(Count(), 2)
     first, _ = env.reset()
     kept = first.copy()

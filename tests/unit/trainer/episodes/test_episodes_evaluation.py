@@ -113,7 +113,7 @@ def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
 
 
 def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
-    """Otherwise the evaluation would wait for the restart of the broken simulator."""
+    """The evaluation must not wait for the restart of the broken simulator."""
     broken = make_member("evaluate-0", steps=[1], held=True)
     other = make_member("evaluate-1")
 
@@ -142,7 +142,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
 
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
-    """Otherwise the evaluation would wait for ever."""
+    """The evaluation ends with an error, because no simulator would ever play the episodes."""
     restarter = Restarter(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):

@@ -146,7 +146,7 @@ def test_a_dependency_that_the_image_lacks_comes_without_what_the_image_has(proj
 def test_what_does_not_fit_the_image_is_refused_and_installs_nothing(
     project, target, companion, capfd, needs, fact
 ):
-    """Otherwise the project would fail an hour later in a pod, with a traceback."""
+    """Without the check, the project would fail in a pod an hour later, with a traceback."""
     companion("torch>=99")
 
     assert fact in refusal(capfd, project(needs))
@@ -179,7 +179,7 @@ def test_a_newer_version_replaces_an_older_one(project, target):
 
 
 def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
-    """Otherwise a job could still use an environment that the project has deleted."""
+    """If the old module stayed, a job could use an environment that the project has deleted."""
     folder = project()
     file = folder / "pyproject.toml"
     file.write_text(file.read_text().replace('["corridor.py"]', '["corridor.py", "hall.py"]'))

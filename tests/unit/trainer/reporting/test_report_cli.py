@@ -61,7 +61,7 @@ def test_a_folder_that_is_not_a_run_is_named(tmp_path, capsys):
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
-    """The message has the remedy."""
+    """The message asks for another file with `--out`."""
     (tmp_path / "training.yaml").write_text("job: arena\n")
 
     code = main([str(tmp_path), "--out", str(tmp_path / "none" / "report.html")])
@@ -113,7 +113,7 @@ def test_a_run_without_recorded_episodes_has_no_film(run, tmp_path, capsys):
     ],
 )
 def test_a_film_that_cannot_be_written_is_named(run, tmp_path, capsys, name, code, problem):
-    """The message has the remedy."""
+    """The message asks for another file with `--film`, or for a name that ends in .gif or .mp4."""
     assert main([str(run), "--film", str(tmp_path / name)]) == code
     assert problem in capsys.readouterr().err
 

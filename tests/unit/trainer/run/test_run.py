@@ -299,7 +299,7 @@ def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, direc
 
 
 def test_measuring_needs_a_model(job, directory):
-    """The message has the remedy."""
+    """A person may evaluate a run before it has a model; the message asks to train first."""
     with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         measure(job(), directory.model, lambda _: [], episodes=1, stream="B")
 

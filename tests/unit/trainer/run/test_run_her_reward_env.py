@@ -79,7 +79,7 @@ def test_without_a_robot_in_the_job_the_judge_has_a_robotino(job):
 
 
 def test_a_robot_that_does_not_fit_the_task_is_refused_by_its_own_name(job):
-    """The error comes before a simulator starts."""
+    """The robot is checked before a simulator starts, so a person waits only seconds for the error."""
     with pytest.raises(
         MissingCapability, match=r"trainer\.robot: EPuck has no Scanner, which Reach-v0 needs"
     ):

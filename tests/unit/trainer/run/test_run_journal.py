@@ -87,7 +87,7 @@ def test_a_journal_that_cannot_be_written_ends_no_run(progress, clock, tmp_path)
 def test_a_killed_attempt_s_faults_and_steps_are_in_the_next_one_s_counters(
     play, job, directory, monkeypatch, step
 ):
-    """Otherwise, a run that was often killed would seem to have had fewer faults."""
+    """A run that is often killed must not seem to have had fewer faults."""
     monkeypatch.setattr("palaestra_trainer.run.journal.EVERY_S", 0.0)
     play(job(), {"collect-0": {"steps": {20: SimulatorDead("collect-0", "gone"), step: KILLED}}})
     found = checkpoint.newest(directory.checkpoints)

@@ -117,7 +117,7 @@ def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has
 
 
 def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_path, last_word):
-    """Otherwise the run would begin at step 0, and a person would learn that much later."""
+    """Without the error, the run would begin at step 0, and a person would learn that much later."""
     code, members = play(job(resume_from=str(tmp_path / "empty")))
 
     assert code == 2
@@ -198,7 +198,7 @@ def parameters(directory):
 
 
 def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
-    """Otherwise the summary of the first end would pass for the result of the longer run."""
+    """The summary of the first end must not pass for the result of the longer run."""
     play(job())
 
     code, _ = play(job(steps=150), on_step=signal_after(20))

@@ -110,7 +110,7 @@ def test_what_is_no_link_stays(start, volume, make):
 
 @pytest.mark.parametrize("replaced", ["tensorboard", "tensorboard/corridor-0d1f3e5a"])
 def test_a_folder_that_another_job_replaced_by_a_link_is_not_followed(start, volume, tmp_path, replaced):
-    """Otherwise the other job would decide where this trainer writes."""
+    """If the link were followed, the other job would decide where this trainer writes."""
     outside = tmp_path / "outside"
     outside.mkdir()
     (volume / replaced).parent.mkdir(exist_ok=True)

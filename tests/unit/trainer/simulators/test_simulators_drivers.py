@@ -33,7 +33,7 @@ def test_a_model_of_mujoco_is_refused_by_name_before_anything_starts():
 
 
 def test_a_program_that_is_not_installed_is_named(monkeypatch):
-    """Otherwise the simulator would be restarted until its budget is spent."""
+    """Without the check, the simulator would be restarted until its budget is spent."""
     monkeypatch.setenv("PATH", "")
 
     with pytest.raises(ConfigurationError, match="--in webots: webots is not a program on this machine"):

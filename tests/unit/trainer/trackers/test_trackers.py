@@ -107,7 +107,7 @@ def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memo
 
 @pytest.mark.parametrize("tracker", ["wandb:Wandb", "mlflow:MLflow"])
 def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
-    """The error comes before a simulator starts."""
+    """The library is checked before a simulator starts, so a person waits only seconds for the error."""
     library, _, _ = tracker.partition(":")
     if importlib.util.find_spec(library):
         pytest.skip(f"{library} is installed")

@@ -110,7 +110,7 @@ def test_arrows_are_the_bounds_of_the_first_two_numbers():
     ids=str,
 )
 def test_actions_for_which_a_person_has_too_few_keys_are_refused(space):
-    """The message has the remedy."""
+    """The message proposes `--agent random` instead."""
     with pytest.raises(ConfigurationError, match=r"--agent keyboard: the actions are .*use --agent random"):
         keys_of(space)
 
@@ -162,7 +162,7 @@ def test_a_key_ends_the_episode_or_all(typing, key, end):
 
 
 def test_a_terminal_that_is_closed_ends_all(typing):
-    """Otherwise the program would wait for ever."""
+    """No key can arrive any more, so the program would wait for ever."""
     keyboard, typed, _ = typing
     typed.close()
 

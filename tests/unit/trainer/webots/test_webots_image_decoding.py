@@ -104,7 +104,7 @@ def test_a_camera_may_change_its_size():
 
 @pytest.mark.parametrize("known", [False, True], ids=["first", "later"])
 def test_a_message_cut_short_anywhere_is_refused(kind, known):
-    """Otherwise the reader would return pixels of the previous image."""
+    """A reader that accepted the message would return pixels of the previous image."""
     read, make_message, _ = kind
     sound = make_message()
     if known:

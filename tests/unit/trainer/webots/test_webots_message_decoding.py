@@ -56,7 +56,7 @@ def test_a_frame_id_of_another_length_is_read_too(kind, read):
 
 @pytest.mark.parametrize("known", [False, True], ids=["first", "later"])
 def test_a_message_cut_short_anywhere_is_refused(kind, read, known):
-    """Otherwise the reader would take text of the header for a number."""
+    """A reader that accepted the message would take text of the header for a number."""
     sound = message(kind, KINDS[kind][2])
     if known:
         read(sound)

@@ -27,13 +27,13 @@ def test_numbers_are_an_array_of_all():
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_a_number_that_is_not_finite_is_refused(number):
-    """Otherwise a policy would learn from NaN."""
+    """A policy must not learn from NaN or infinity."""
     with pytest.raises(ValueError, match=str(number)):
         read_numbers(message(1.0, number))
 
 
 def test_a_message_cut_short_anywhere_is_refused():
-    """Otherwise the reader would take the length of the list for a number."""
+    """A reader that accepted the message would take the length of the list for a number."""
     sound = message(1.0, 2.0)
 
     for length in range(len(sound)):
